@@ -140,7 +140,7 @@ def main() -> None:
             [
                 kind,
                 len(own),
-                sum(bool(each.run.found) for each in own),
+                sum(each.run.changed for each in own),
                 sum(each.sure == {each.right} for each in own),
                 sum(each.right in each.listed for each in own),
                 sum(bool(each.sure - {each.right}) for each in own),

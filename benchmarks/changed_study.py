@@ -12,6 +12,7 @@ import argparse
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,10 +27,17 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
+from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
+from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST
+from cpfls_cli.commands.changed import units_of
+from cpfls_cli.consistency.check import check
+from cpfls_cli.consistency.findings import contradictions
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 KINDS = {"quadrotor": QUAD, "hexarotor": HEXA, "nano": NANO}
@@ -65,6 +73,7 @@ SIZES = {
     "battery": (0.5, 1.0, 2.0),
     "gusts": (0.4, 1.0, 2.0),
     "wind": (0.2, 0.5, 1.0),
+    "mass and drag of a rotor": (0.1, 0.2, 0.4),
 }
 """Shares; of the arm for the centre of mass, s for lag and delay, rad/s, m/s^2; wind as the acceleration it gives."""
 
@@ -110,6 +119,9 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
         heavy = body._replace(mass=body.mass * (1 + size), centre=body.centre + size / (1 + size) * at, inertia=inertia)
         beside: Right = {f"weight near M{one + 1}": ()} if name == "mass off centre" else {"hover": (size,)}
         return Altered(heavy, {"mass": (size,), **beside})
+    if name == "mass and drag of a rotor":
+        heavy, askew = (altered(each, size, kind, body, draw) for each in ("mass", "drag of a rotor"))
+        return Altered(heavy.body._replace(drag=askew.body.drag), heavy.right | askew.right)
     if name == "centre of mass":
         moved = size * kind.arm * side
         return Altered(body._replace(centre=body.centre + moved), {name: tuple(moved.tolist())})
@@ -238,9 +250,12 @@ _WITHOUT_SHOWS = patch.object(_Space, "shows", lambda *_: np.nan)
 """What would show is not asked of vehicles that nobody changed, and takes long."""
 
 
+_NO_CAUSE = "cause not named"
+
+
 def _alarms(runs: Sequence[Change]) -> list[object]:
-    alarms = [run for run in runs if run.found]
-    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) for run in alarms))
+    alarms = [run for run in runs if run.changed]
+    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) or _NO_CAUSE for run in alarms))
     return [len(runs), len(alarms), sum(run.p_value <= 0.05 for run in runs), said or "—"]
 
 
@@ -288,10 +303,10 @@ def _verdict(case: Case, run: Change) -> Verdict:
         for found in run.found
         for size, true in zip(found.sizes, case.right.get(found.cause.name, ()), strict=False)
     )
-    names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found)
+    names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found) or _NO_CAUSE * run.changed
     rights = set(case.right)
     right, wrong = bool(rights & sure), bool(sure - rights - _part_of(rights))
-    return Verdict(bool(run.found), right, not right and bool(rights & listed), wrong, held, names)
+    return Verdict(run.changed, right, not right and bool(rights & listed), wrong, held, names)
 
 
 def _part_of(rights: Iterable[str]) -> set[str]:
@@ -340,6 +355,53 @@ def _shows(case: Case, run: Change) -> float:
     return min((case.size * shows / np.abs(truth).max() for shows, truth in told), default=np.nan)
 
 
+WRONG: dict[str, Callable[[Signals], Signals]] = {
+    "gyroscope mirrored about x": lambda own: replace(own, body_rate=own.body_rate * [-1.0, 1.0, 1.0]),
+    "gyroscope mirrored about z": lambda own: replace(own, body_rate=own.body_rate * [1.0, 1.0, -1.0]),
+    "axes x and y of the gyroscope exchanged": lambda own: replace(own, body_rate=own.body_rate[:, [1, 0, 2]]),
+    "M1 and M2 exchanged": lambda own: _exchanged(own, 1),
+    "M1 and M3 exchanged": lambda own: _exchanged(own, 2),
+    "rates in deg/s": lambda own: replace(own, body_rate=np.degrees(own.body_rate)),
+    "accelerations in g": lambda own: replace(own, specific_force=own.specific_force / 9.81),
+    "rotors in rpm": lambda own: replace(own, rotor_speed=own.rotor_speed * 30 / np.pi),
+}
+"""Logs of today that are wrong, by what is wrong of them."""
+
+
+def _exchanged(own: Signals, other: int) -> Signals:
+    order = np.arange(own.rotor_speed.shape[1])
+    order[[0, other]] = order[[other, 0]]
+    command = None if own.rotor_command is None else own.rotor_command[:, order]
+    return replace(own, rotor_speed=own.rotor_speed[:, order], rotor_command=command)
+
+
+def _wrong(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> Iterator[list[object]]:
+    """Make a flight of each vehicle wrong in each way, and count the verdicts."""
+    said: dict[tuple[str, str], list[str]] = {}
+    for index, (vehicle, body) in enumerate(fleet.vehicles):
+        own = day_of(kind, body, trim, np.random.default_rng([kind.rotors, series, index, 7]))
+        for instrument, right in flown(kind, vehicle, own, [series, index, 7]).items():
+            for name, make in WRONG.items():
+                recording = replace(right, signals=make(right.signals))
+                today = flight_numbers(recording, kind.volts)
+                before = [day[0][instrument] for day in fleet.days[index][:USUAL]]
+                change = changed([today], before, vehicle, np.random.default_rng(index))
+                units, accused = (
+                    units_of(change.names, vehicle),
+                    contradictions(check([recording.signals], GapSettings())),
+                )
+                record = ChangedRecord.of(
+                    *(change, [today], before, units, [], accused),
+                    false_alarm=FALSE_ALARM,
+                    named_from=NAMED,
+                    fewest=FEWEST,
+                )
+                said.setdefault((name, instrument), []).append(record.verdict)
+    verdicts = ("CHANGED", "CANNOT TELL", "NO CHANGE SEEN", "NO CHANGE")
+    for (name, instrument), each in said.items():
+        yield [name, instrument, len(each), *(each.count(verdict) for verdict in verdicts)]
+
+
 def _kept(path: Path | None, make: Callable[[], Any]) -> Any:
     if path is not None and path.exists():
         return pickle.loads(path.read_bytes())
@@ -357,7 +419,7 @@ def main() -> None:
     parser.add_argument("--series", type=int, default=0, help="of vehicles, days and draws that no other has")
     parser.add_argument("--trim", type=float, default=0.03)
     parser.add_argument("--keep", type=Path)
-    parser.add_argument("--only", choices=["unchanged", "changes", "otherwise"])
+    parser.add_argument("--only", choices=["unchanged", "changes", "otherwise", "wrong"])
     parser.add_argument("--of", nargs="+", choices=SIZES, default=list(SIZES), metavar="CHANGE")
     given = parser.parse_args()
     kind, trim = KINDS[given.kind], Trim(given.trim, given.trim / 30)
@@ -367,6 +429,10 @@ def main() -> None:
         faster = _kept(folder and folder / "faster.pickle", partial(_faster, kind, trim, fleet, given.series))
         header = ["log", "references flown", "references", "sets", "alarms", "p <= 5 %", "said"]
         table(f"changed_otherwise_{given.kind}", header, list(_otherwise(fleet, faster)))
+        return
+    if given.only == "wrong":
+        header = ["wrong", "log", "flights", "changed", "cannot tell", "no change seen", "no change"]
+        table(f"changed_wrong_{given.kind}", header, list(_wrong(kind, trim, fleet, given.series)))
         return
     if given.only != "changes":
         header = ["log", "references", "flights today", "sets", "alarms", "p <= 5 %", "said"]

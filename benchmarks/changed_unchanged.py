@@ -38,8 +38,8 @@ def numbers_of(study: object, paths: list[Path], keep: Path | None) -> dict[str,
         if name in known:
             continue
         try:
-            recording, volts, *_ = read_alone(path, study)
-            known[name] = flight_numbers(recording, volts)
+            read = read_alone(path, study)
+            known[name] = flight_numbers(read.recording, read.full_voltage)
         except CpflsError as error:
             print(f"{name}: {error}", file=sys.stderr)
     if keep:
@@ -80,7 +80,7 @@ def main() -> None:
 
 
 def _counted(runs: list[Change]) -> list[object]:
-    said = sorted("+".join(found.cause.name for found in run.found) for run in runs if run.found)
+    said = sorted("+".join(found.cause.name for found in run.found) or "?" for run in runs if run.changed)
     small = sum(run.p_value <= 0.05 for run in runs)
     return [len(runs), len(said), small, ", ".join(said) or "—"]
 

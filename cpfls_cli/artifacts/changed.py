@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from cpfls_cli.changes.numbers import FlightNumbers
 
 
+CANNOT_TELL = "CANNOT TELL"
+"""The verdict where no change would have shown, or a log is wrong."""
+
+_BESIDE = {"follow": "gusts", "scale": "drift"}
+"""Kinds of ratios, and those that a flight has beside them wherever it holds their channels."""
+
+_BY_CHANCE = ("late", "answer", "unbalance", "swing", "battery")
+"""Kinds of which a good flight can hold too little."""
+
 CABLE = "load on a cable"
 """The change that has a length."""
 
@@ -69,6 +78,11 @@ class FoundRecord(Record):
     alike: AlikeGroup = group()
     shows: ShowsGroup = group()
     warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
+
+    @property
+    def has_size(self) -> bool:
+        """Whether any change would have shown."""
+        return bool(np.isfinite(self.shows.smallest).any())
 
     @property
     def cable_length(self) -> float:
@@ -128,6 +142,23 @@ class ChangedRecord(FoundRecord):
     )
     p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
     by_flight: Array = dataset("the same of each flight of today alone", "today")
+    limit: Array | None = dataset(
+        "deviations beyond which the mean of today's flights is in no number where nothing changed, but for the rate "
+        "of false alarms",
+        "number",
+        default=None,
+    )
+    reversed: tuple[str, ...] = dataset(
+        "numbers that every reference flight has, and that a flight of today has turned round, or as nothing",
+        "reversed",
+        default=(),
+    )
+    missing: tuple[str, ...] = dataset(
+        "other numbers that every reference flight has, and not every one of today", "missing", default=()
+    )
+    contradiction: tuple[str, ...] = dataset(
+        "what of the flights contradicts itself or its vehicle", "contradiction", default=()
+    )
     since_flight: int = dataset("index of the flight of today from which on it looks most as if it had changed")
     fewest: int | None = dataset(
         "reference flights that tell what flights of the vehicle differ by; of fewer, what is usual stands for it",
@@ -142,6 +173,7 @@ class ChangedRecord(FoundRecord):
         before: Sequence[FlightNumbers],
         units: Mapping[str, str],
         warnings: Sequence[str],
+        contradictions: Sequence[str],
         *,
         false_alarm: float,
         named_from: float,
@@ -165,6 +197,10 @@ class ChangedRecord(FoundRecord):
             p_value=change.p_value,
             by_flight=change.by_flight,
             since_flight=change.since,
+            limit=change.limit,
+            reversed=change.reversed,
+            missing=change.missing,
+            contradiction=tuple(contradictions),
             false_alarm=false_alarm,
             named_from=named_from,
             fewest=fewest,
@@ -174,8 +210,18 @@ class ChangedRecord(FoundRecord):
 
     @property
     def changed(self) -> bool:
-        """Whether the vehicle is said to have changed."""
-        return self.p_value <= self.false_alarm
+        """Whether the vehicle is said to have changed: never not where a number is beyond its limit."""
+        return self.p_value <= self.false_alarm or bool(self.reversed) or bool(self.beyond.any())
+
+    @property
+    def furthest(self) -> Array:
+        """Deviations by which the mean of today's flights is off in each number, shape (number,)."""
+        return np.asarray(self.apart.mean(axis=0) / self.deviation)
+
+    @property
+    def beyond(self) -> BoolArray:
+        """Whether the mean of today's flights is beyond the limit of each number, shape (number,)."""
+        return np.asarray(np.abs(self.furthest) > (np.inf if self.limit is None else self.limit))
 
     @property
     def short_of(self) -> int:
@@ -184,8 +230,23 @@ class ChangedRecord(FoundRecord):
 
     @property
     def verdict(self) -> str:
-        """What is said first: that nothing changed only where flights of the vehicle tell what it differs by."""
-        return "CHANGED" if self.changed else "NO CHANGE SEEN" if self.short_of else "NO CHANGE"
+        """What is said first: that nothing changed only of good logs, and where a change would have shown."""
+        if self.changed:
+            return "CHANGED"
+        if self.contradiction or self.undetermined or not self.has_size:
+            return CANNOT_TELL
+        return "NO CHANGE SEEN" if self.short_of or self.lost else "NO CHANGE"
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Ratios that today's flights hold the channels of, and which may be zero or reversed there."""
+        parts = ((name, *name.split()) for name in self.missing if name.split()[0] in _BESIDE)
+        return [name for name, kind, axis in parts if f"{_BESIDE[kind]} {axis}" in self.number]
+
+    @property
+    def lost(self) -> list[str]:
+        """Numbers that today's flights lack, and not by the chance of a flight that holds too little of them."""
+        return [name for name in self.missing if name.split()[0] not in _BY_CHANCE]
 
     @property
     def since(self) -> int | None:
@@ -211,6 +272,10 @@ class ChangedRecord(FoundRecord):
             "verdict": self.verdict,
             "changed": self.changed,
             "reference_flights_lacking": self.short_of,
+            "beyond_limit": [name for name, is_beyond in zip(self.number, self.beyond, strict=True) if is_beyond],
+            "reversed": list(self.reversed),
+            "missing": list(self.missing),
+            "contradictions": list(self.contradiction),
             "p": self.p_value,
             "by_flight": dict(zip(self.today, self.by_flight.tolist(), strict=True)),
             "since": None if since is None else self.today[since],
@@ -222,6 +287,7 @@ class ChangedRecord(FoundRecord):
                     "unit": self.unit[index],
                     "reference": float(self.mean[index]),
                     "deviation": float(self.deviation[index]),
+                    "limit": None if self.limit is None else float(self.limit[index] * self.deviation[index]),
                     "today": (self.mean[index] + self.apart[:, index]).tolist(),
                 }
                 for index, name in enumerate(self.number)

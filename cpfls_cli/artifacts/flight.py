@@ -117,6 +117,24 @@ class DelayGroup:
 
 
 @record
+class StatedGroup:
+    """What the log says of its vehicle, by which flights of two vehicles are told apart."""
+
+    name: tuple[str, ...] = dataset("parameter of the frame and the rotors, or `written by`", "stated")
+    value: tuple[str, ...] = dataset("as the log has it", "stated")
+
+    @classmethod
+    def of(cls, facts: Mapping[str, str]) -> Self | None:
+        """Keep facts; None where there are none."""
+        return cls(name=tuple(facts), value=tuple(facts.values())) if facts else None
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """Values by name."""
+        return dict(zip(self.name, self.value, strict=True))
+
+
+@record
 class AutopilotGroup:
     """What the log knew of the autopilot: parameters of a control law that is known here, as the law names them."""
 
@@ -345,6 +363,7 @@ class FlightRecord(Record):
     quality: QualityGroup | None = group(default=None)
     delay: DelayGroup | None = group(default=None)
     autopilot: AutopilotGroup | None = group(default=None)
+    stated: StatedGroup | None = group(default=None)
     noise: NoiseGroup | None = group(default=None)
     effects: FlownEffectsGroup | None = group(default=None)
     tracking: TrackingGroup | None = group(default=None)
@@ -384,6 +403,7 @@ class FlightRecord(Record):
             clock=ClockGroup(begins=report.first_stamp_s + report.span_s[0]),
             quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz, report.updated_hz),
             autopilot=AutopilotGroup.of(report.system, report.parameters),
+            stated=StatedGroup.of(report.stated),
             delay=DelayGroup(
                 value=report.delay_s,
                 tried=None if estimate is None else estimate.delays,

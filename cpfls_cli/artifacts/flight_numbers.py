@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import Format, Record, dataset, record
+from cpfls_cli.artifacts.flight import StatedGroup
+from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from cpfls_cli.changes.numbers import FlightNumbers
 
@@ -45,6 +46,16 @@ class FlightNumbersRecord(Record):
     )
     flown_at: float = dataset("when it was flown, since 1970 began (UTC), where the log tells", units="s", gaps=True)
     code: str = dataset("hash of the code that computed it: other code computes it anew")
+    reversed: tuple[str, ...] = dataset(
+        "numbers whose ratio is zero or below, where another flight has its logarithm: a sensor or a rotor that is "
+        "still, or turned round",
+        "reversed",
+        default=(),
+    )
+    contradiction: tuple[str, ...] = dataset(
+        "what of the flight contradicts itself or its vehicle", "contradiction", default=()
+    )
+    stated: StatedGroup | None = group(default=None)
     warning: tuple[str, ...] = dataset("what to know about the flight", "warning")
 
     @classmethod
@@ -56,6 +67,8 @@ class FlightNumbersRecord(Record):
         flown_at: float,
         code: str,
         warnings: Sequence[str],
+        contradictions: Sequence[str],
+        stated: Mapping[str, str],
     ) -> Self:
         """Arrange the numbers of a flight."""
         return cls(
@@ -72,6 +85,9 @@ class FlightNumbersRecord(Record):
             agility=told.agility,
             flown_at=flown_at,
             code=code,
+            reversed=told.reversed,
+            contradiction=tuple(contradictions),
+            stated=StatedGroup.of(stated),
             warning=tuple(warnings),
         )
 
@@ -85,5 +101,8 @@ class FlightNumbersRecord(Record):
             "duration_s": self.duration,
             "voltage": self.voltage,
             "commanded": self.commanded,
+            "reversed": list(self.reversed),
+            "contradictions": list(self.contradiction),
+            "stated": {} if self.stated is None else self.stated.facts,
             "numbers": {name: {"value": value, "error": error, "unit": unit} for name, value, error, unit in rows},
         }

@@ -145,4 +145,5 @@ def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
         commanded=record.commanded,
         cable_m=record.cable,
         agility=record.agility,
+        reversed=record.reversed,
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.changed import FoundRecord, found_groups
+from cpfls_cli.artifacts.changed import CANNOT_TELL, FoundRecord, found_groups
 from cpfls_cli.artifacts.spec import Format, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
@@ -49,6 +49,12 @@ class TrendRecord(FoundRecord):
         "deviations beyond which no number of any flight is where nothing changed, but for the rate of false alarms"
     )
     p_value: float = dataset("probability that as many flights of an unchanged vehicle look as much as if it changed")
+    reversed: tuple[str, ...] = dataset(
+        "flights that have numbers of the others turned round, or as nothing, and which", "reversed", default=()
+    )
+    contradiction: tuple[str, ...] = dataset(
+        "what of the flights contradicts itself or its vehicle", "contradiction", default=()
+    )
     shift: ShiftGroup = group()
     shifts: IntArray = dataset(
         "index of the change point of each change that was found", "found", path="found/shift", into="shift"
@@ -62,6 +68,7 @@ class TrendRecord(FoundRecord):
         order: str,
         units: Mapping[str, str],
         warnings: Sequence[str],
+        contradictions: Sequence[str],
         *,
         false_alarm: float,
         named_from: float,
@@ -80,6 +87,8 @@ class TrendRecord(FoundRecord):
             deviation=trend.deviation,
             limit=trend.limit,
             p_value=trend.p_value,
+            reversed=trend.reversed,
+            contradiction=tuple(contradictions),
             false_alarm=false_alarm,
             named_from=named_from,
             shift=ShiftGroup(
@@ -90,6 +99,18 @@ class TrendRecord(FoundRecord):
             **found_groups([each for _, each in found], trend.shows, units),
             warning=tuple(warnings),
         )
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything is said to have changed: never not where a flight is beyond a limit."""
+        return len(self.shift.start) > 0 or bool(self.reversed) or bool(self.beyond.any())
+
+    @property
+    def verdict(self) -> str:
+        """What is said first: that nothing changed only of good logs, and where a change would have shown."""
+        if self.changed:
+            return "CHANGED"
+        return CANNOT_TELL if self.contradiction or not self.has_size else "NO CHANGE"
 
     @property
     def values(self) -> Array:
@@ -134,11 +155,14 @@ class TrendRecord(FoundRecord):
     def summary(self) -> dict[str, Any]:
         """The trend for machines."""
         return {
-            "changed": len(self.shift.start) > 0,
+            "verdict": self.verdict,
+            "changed": self.changed,
             "p": self.p_value,
             "order": self.order,
             "reference_flights": list(self.flight[: self.reference]),
             "limit": self.limit,
+            "reversed": list(self.reversed),
+            "contradictions": list(self.contradiction),
             "shifts": [
                 {
                     "since": self.flight[start],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
 from typing import NamedTuple
@@ -14,12 +14,18 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
-from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
+from cpfls_cli.changes.reference import (
+    EACH_TEST,
+    FALSE_ALARM,
+    Reference,
+    common_numbers,
+    either,
+    furthest,
+    kinds_of,
+    number_limits,
+)
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-FALSE_ALARM = 0.01
-"""Probability at which flights of an unchanged vehicle are said to have changed."""
 
 NAMED = 0.95
 """Share of the belief from which on a change is named; below, it is one of several that look alike."""
@@ -35,6 +41,10 @@ _LOSES = 0.95
 
 _ANY = 10.0
 """Times what is usual: a prior so wide says nothing of a size."""
+
+_WIDTHS = ((1.0, 0.9), (_ANY, 0.1))
+"""Times what is usual, and how probable a size is drawn so wide. With the usual width alone a change would count the
+less the larger it is, for large numbers of an unchanged vehicle, a t, are rare by a power of their size alone."""
 
 _DRAWS, _POWER = 2000, 0.9
 _SHOWN, _SIZES = 100, np.geomspace(0.05, 3.0, 28)
@@ -93,28 +103,43 @@ class Change:
         Numbers of each of today's flights less those of the reference, loads at its voltage.
     deviation : array, shape (number,)
         What flights of one day differ by where nothing changed.
+    limit : array, shape (number,)
+        Deviations beyond which the mean of today's flights is in no number where nothing changed, but for the rate of
+        false alarms: flights beyond one have changed.
     p_value : float
-        Probability that an unchanged vehicle looks as much like any change; the smallest that can be told is one over
-        the number of draws.
+        Probability that an unchanged vehicle looks as much like any change, or is as far off in any number: twice the
+        smaller of both. Of draws none smaller than one over their number is known.
     by_flight : array, shape (flight,)
         The same of each flight alone.
     since : int
         Flight of today from which on it is changed, or looks most like it.
     found : tuple of Found
-        Empty where nothing changed.
+        Empty where nothing changed, and where what changed is none of the known changes.
     shows : mapping of str to float
         Smallest size of each change that shows with 90 %, in its unit; infinite where none does.
+    reversed : tuple of str
+        Numbers that every flight of the reference has, and that a flight of today has turned round, or as nothing.
+    missing : tuple of str
+        Other numbers that every flight of the reference has, and not every one of today.
     """
 
     names: tuple[str, ...]
     reference: Reference
     apart: Array
     deviation: Array
+    limit: Array
     p_value: float
     by_flight: Array
     since: int
     found: tuple[Found, ...]
     shows: dict[str, float]
+    reversed: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether the vehicle is said to have changed."""
+        return self.p_value <= FALSE_ALARM or bool(self.reversed)
 
 
 def changed(
@@ -127,8 +152,8 @@ def changed(
 
     Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
     t; its evidence is the ratio of both densities. It may be there from any flight of today on. The largest evidence
-    counts, against the largest that unchanged flights have, searched alike: the only threshold is the rate of false
-    alarms.
+    counts, against the largest that unchanged flights have, searched alike. Beside that each number is held against its
+    own limit, whatever is known to change it. The only threshold is the rate of false alarms, half of it for each test.
 
     Parameters
     ----------
@@ -145,7 +170,10 @@ def changed(
         raise InputError("flights of today and of the reference tell no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
         names = tuple(name for name in names if not name.startswith("load "))
-    return judged(today, Reference.of(before, names, vehicle), vehicle, rng, range(len(today)))
+    change = judged(today, Reference.of(before, names, vehicle), vehicle, rng, range(len(today)))
+    lost = [name for name in common_numbers(before) if not all(name in flight.values for flight in today)]
+    turned = tuple(name for name in lost if any(name in flight.reversed for flight in today))
+    return replace(change, reversed=turned, missing=tuple(name for name in lost if name not in turned))
 
 
 def judged(
@@ -165,38 +193,45 @@ def judged(
     names = reference.names
     apart, covariance = reference.apart(today)
     listed, kinds = causes(names, vehicle), kinds_of(names)
+    limit = number_limits(reference.freedom, len(starts))
 
-    def held(flights: Sequence[FlightNumbers]) -> tuple[_Space, Array, float]:
-        """Hold flights against what they, and no others of today, can be off by: their mean and its evidence."""
+    def held(flights: Sequence[FlightNumbers], asked: int) -> _Held:
+        """Hold flights against what they, and no others of today, can be off by."""
         beside, own = reference.apart(flights)
         space = _Space(own, reference.freedom, listed, kinds)
         mean = space.whitened(beside.mean(axis=0))
-        return space, mean, float(space.strongest(mean[:, None])[0])
+        return _Held(
+            space,
+            mean,
+            float(space.strongest(mean[:, None])[0]),
+            furthest(space.deviations(mean), reference.freedom, asked),
+        )
 
-    spaces, means, strongest = zip(*(held(today[start:]) for start in starts), strict=True)
+    of_starts = [held(today[start:], len(starts)) for start in starts]
     drawn = drawn_by_chance(rng, kinds, reference.freedom, [len(today) - start for start in starts])
-    most = np.array([space.strongest(rows) for space, rows in zip(spaces, drawn, strict=True)])
+    most = np.array([own.space.strongest(rows) for own, rows in zip(of_starts, drawn, strict=True)])
     chance, alone = np.sort(most.max(axis=0)), np.sort(most[-1])
-    best = int(np.argmax(strongest))
-    p_value, since, found = beyond_chance(chance, strongest[best]), starts[best], tuple[Found, ...]()
+    best = max(range(len(starts)), key=lambda at: (-of_starts[at].p_value(chance), of_starts[at].evidence))
+    p_value, since, found = of_starts[best].p_value(chance), starts[best], tuple[Found, ...]()
     if p_value <= FALSE_ALARM:
-        found = _found(spaces[best], means[best], chance)
-        since = _since(spaces[best], apart, found, starts)
-        at = list(starts).index(since)
-        found = _found(spaces[at], means[at], chance) or found
-    threshold, first = float(np.quantile(chance, 1 - FALSE_ALARM)), dict[str, int]()
-    for index in spaces[0].searched:
+        found = _found(of_starts[best], chance)
+    if found:
+        since = _since(of_starts[best].space, apart, found, starts)
+        found = _found(of_starts[list(starts).index(since)], chance) or found
+    space, threshold, first = of_starts[0].space, float(np.quantile(chance, 1 - EACH_TEST)), dict[str, int]()
+    for index in space.searched:
         first.setdefault(listed[index].name, index)
     return Change(
         names,
         reference,
         apart,
         np.sqrt(np.diag(covariance)),
+        limit,
         p_value,
-        np.array([beyond_chance(alone, held([flight])[2]) for flight in today]),
+        np.array([held([flight], 1).p_value(alone) for flight in today]),
         since,
         found,
-        {name: spaces[0].shows(index, threshold, drawn[0][:, :_SHOWN]) for name, index in first.items()},
+        {name: space.shows(index, threshold, limit, drawn[0][:, :_SHOWN]) for name, index in first.items()},
     )
 
 
@@ -230,6 +265,7 @@ class _Space:
     def __init__(self, covariance: Array, freedom: Array, listed: Sequence[Cause], kinds: Sequence[str]) -> None:
         self.listed, self.freedom = listed, freedom.tolist()
         self.root = np.linalg.cholesky(covariance)
+        self.deviation = np.sqrt(np.diag(covariance))
         self.numbers = [np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)]
         self.white = [self.whitened(cause.directions) for cause in listed]
         self.searched = [index for index, cause in enumerate(listed) if cause.searched]
@@ -240,6 +276,10 @@ class _Space:
     def whitened(self, apart: Array) -> Array:
         """Turn numbers into such that do not go together, of variance 1, along the first axis."""
         return np.asarray(np.linalg.solve(self.root, apart))
+
+    def deviations(self, rows: Array) -> Array:
+        """Turn whitened numbers back into deviations of each, along the first axis."""
+        return np.asarray(((self.root @ rows).T / self.deviation).T)
 
     def ways(self, name: str) -> list[int]:
         """List the ways in which a change shows."""
@@ -261,9 +301,14 @@ class _Space:
         """
         base = rows[:, :0] if beside is None else beside
         told: dict[tuple[bytes, ...], Array] = {}
+
+        def density(own: Array, losses: int) -> Array:
+            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), told)
+
+        widths = np.log([[share] for _, share in _WIDTHS])
         each = [
-            self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(cause.losses), told)
-            for own, cause in ((self.white[index], self.listed[index]) for index in of)
+            _total(widths + [density(width * self.white[index], self.listed[index].losses) for width, _ in _WIDTHS])
+            for index in of
         ]
         return np.array(each) - self._density(rows, base, _NONE, told)
 
@@ -357,16 +402,44 @@ class _Space:
         shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
         return tuple(Size(*map(cause.size, each)) for each in shown.T)
 
-    def shows(self, index: int, threshold: float, drawn: Array) -> float:
-        """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does."""
+    def shows(self, index: int, threshold: float, limit: Array, drawn: Array) -> float:
+        """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does.
+
+        By its evidence, or by any number beyond its limit.
+        """
         cause = self.listed[index]
 
         def is_enough(size: float) -> bool:
             rows = drawn + size * self.white[index][:, :1]
-            return bool(np.mean(self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold) >= _POWER)
+            told = self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold
+            beyond = (np.abs(self.deviations(rows)) > limit[:, None]).any(axis=0)
+            return bool(np.mean(told | beyond) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
+
+
+class _Held(NamedTuple):
+    """Flights that are held against what they can be off by.
+
+    Attributes
+    ----------
+    mean : array, shape (number,)
+        Whitened.
+    evidence : float
+        Logarithm of the largest evidence of a change.
+    furthest : float
+        At most how probable it is that any number is as far off.
+    """
+
+    space: _Space
+    mean: Array
+    evidence: float
+    furthest: float
+
+    def p_value(self, chance: Array) -> float:
+        """Tell how probable it is that an unchanged vehicle looks as much changed, by either test."""
+        return either(beyond_chance(chance, self.evidence), self.furthest)
 
 
 def _total(logarithm: Array) -> Array:
@@ -410,13 +483,18 @@ def _losing(mean: Array, variance: Array) -> Array:
     return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
 
 
-def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
-    """Name one change after another while each explains more than chance beside the others."""
+def _found(held: _Held, chance: Array) -> tuple[Found, ...]:
+    """Name one change after another while each explains more than chance beside the others.
+
+    Where something is off and no change by itself explains it, the first counts on credit: two at once hide each
+    other.
+    """
+    space, row, _, _ = held
     chosen: list[int] = []
     while len(chosen) < _MOST:
         evidence = _beside(space, row, space.searched, chosen) + space.searched_prior
         best = int(np.argmax(evidence))
-        if beyond_chance(chance, float(evidence[best])) > FALSE_ALARM:
+        if chosen and beyond_chance(chance, float(evidence[best])) > EACH_TEST:
             break
         chosen.append(space.searched[best])
         # What came first was chosen for what the others do too.
@@ -426,6 +504,8 @@ def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
             of_name = _by_name(space, beliefs)
             most = max(of_name, key=lambda name: of_name[name])
             chosen = [*others, max(space.ways(most), key=lambda at: beliefs[at])]
+    if len(chosen) == 1 and beyond_chance(chance, held.evidence) > EACH_TEST:
+        return ()
     found = []
     for index in chosen:
         beliefs = _beliefs(space, row, [other for other in chosen if other != index])

@@ -108,6 +108,9 @@ _LATEST_S = 0.12
 _STEP_S = 0.002
 _DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
 
+_CLEARLY = 3.0
+"""Standard errors beyond which a ratio is said to be below 0."""
+
 _COLLINEAR = 1e-9
 """Squared share of a signal of its own below which it goes with the others."""
 
@@ -130,6 +133,9 @@ class FlightNumbers:
         Length of the cable that fits best what swings, if anything does; NaN where the log does not hold it.
     agility : float
         Acceleration that it is flown with beside the mean, root mean square, m/s^2; NaN where the log does not hold it.
+    reversed : tuple of str
+        Numbers that are the logarithm of a ratio which is zero here, or clearly below: a sensor or a rotor that is
+        still, or turned round.
     """
 
     name: str
@@ -140,6 +146,7 @@ class FlightNumbers:
     commanded: bool
     cable_m: float = float("nan")
     agility: float = float("nan")
+    reversed: tuple[str, ...] = ()
 
 
 def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNumbers:
@@ -170,14 +177,17 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
+    below = []
     cable, swing = _swing(signals, flies)
     for names, told, error in (*_told(signals, flies), swing):
         for each, value, apart in zip(names, told, error, strict=True):
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
+            elif np.isinf(value):
+                below.append(each)
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
     agility = _agility(signals, flies)
-    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable, agility)
+    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below))
 
 
 def in_flight(signals: Signals) -> BoolArray:
@@ -343,14 +353,25 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     assert signals.thrust is not None, "rotor speeds are there"
     found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]), signals.period)
     moments = np.diag(inertia)
-    told = np.stack([np.log(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
+    told = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
     for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
-        error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
+        with np.errstate(invalid="ignore"):
+            error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
         yield [f"{kind} {axis}" for axis in _ROTATIONS], values[0], error
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         yield _drift(signals, turns, flies)
         yield _scale(signals, turns, flies)
+
+
+def _logarithms(ratios: Array) -> Array:
+    """Take logarithms of ratios of a whole flight and without each block, shape (1 and block, ...).
+
+    Of one that is clearly below 0 it is that of 0; of one that may be above it is not known.
+    """
+    below = ratios[0] < -_CLEARLY * jackknife_error(ratios[1:])
+    with np.errstate(divide="ignore"):
+        return np.log(np.where(ratios > 0, ratios, np.where(below, 0.0, np.nan)))
 
 
 def _delay_error(left_out: Array) -> Array:
@@ -409,7 +430,7 @@ def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
     gain = found[best, axis, axis] / size[best, 0, axis]
     late = np.where(best < len(left) - 1, best + step, np.nan)
-    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / count)])
+    return np.array([gain, late, np.sqrt(left[best, axis] / count)])
 
 
 def _of_attitude(signals: Signals) -> Array:
@@ -440,14 +461,12 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
         return [], np.zeros(0), np.zeros(0)
     x, y = (own.average(each)[inside] for each in (signals.body_rate, turns))
     x = x - x.mean(axis=0)
-    products = np.stack([x * x, x * y], axis=2)
+    block = contiguous(len(x), _BLOCKS)
+    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
     with np.errstate(invalid="ignore"):
-        return _averaged(
-            [f"scale {axis}" for axis in _AXES],
-            products,
-            np.ones(len(x), dtype=bool),
-            lambda means: np.log(means[:, 0] / means[:, 1]),
-        )
+        ratios = np.array([(x[rows] * y[rows]).sum(axis=0) / (x[rows] ** 2).sum(axis=0) for rows in kept])
+        scale = -_logarithms(ratios)
+        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:])
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:

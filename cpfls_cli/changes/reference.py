@@ -22,8 +22,15 @@ _SCALE_ERROR = 0.8
 """By how much numbers of a kind scatter beside what is usual, from vehicle to vehicle: deviation of the logarithm, of
 loads, vibration and batteries of four."""
 
-_FEWEST_LEFT = 3.0
-"""Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more."""
+_FEWEST_LEFT = 4.0
+"""Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more: one kind of numbers in
+a hundred then scatters by more than 3.7 times what is usual. Of four vehicles none did by more than one and a half."""
+
+FALSE_ALARM = 0.01
+"""Probability at which flights of an unchanged vehicle are said to have changed."""
+
+EACH_TEST = FALSE_ALARM / 2
+"""The same of each of the two tests, of which either says so: of known changes, and of each number by itself."""
 
 _OFFSET_M = 0.001
 """By which the centre of mass lies elsewhere from day to day: a battery put back."""
@@ -146,6 +153,39 @@ def _logarithms(flights: Sequence[FlightNumbers]) -> Array:
 def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
     """Average the variances of numbers over flights, shape (number,)."""
     return np.asarray(np.mean([[flight.errors[name] ** 2 for name in names] for flight in flights], axis=0))
+
+
+def number_limits(freedom: Array, asked: int) -> Array:
+    """Compute the deviations that some number of an unchanged vehicle exceeds at the rate of `EACH_TEST` at most.
+
+    Parameters
+    ----------
+    freedom : array, shape (number,)
+        Degrees of freedom of each.
+    asked : int
+        How many means of flights all of them are asked of.
+    """
+    # Slow to load, and who reads a record computes nothing.
+    from scipy.special import stdtrit
+
+    return np.asarray(-stdtrit(freedom, EACH_TEST / (2 * asked * len(freedom))))
+
+
+def furthest(deviations: Array, freedom: Array, asked: int) -> float:
+    """Compute at most how probable it is that any number of so many means of unchanged flights is as far off.
+
+    Parameters
+    ----------
+    deviations : array, shape (..., number)
+    """
+    from scipy.special import stdtr
+
+    return float(2 * asked * len(freedom) * stdtr(freedom, -np.abs(deviations)).min())
+
+
+def either(*p_values: float) -> float:
+    """Give the probability of what either of two tests says by chance."""
+    return min(2 * min(p_values), 1.0)
 
 
 def common_numbers(flights: Sequence[FlightNumbers]) -> tuple[str, ...]:

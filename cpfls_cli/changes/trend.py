@@ -9,11 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.changes.judge import FALSE_ALARM, Change, beyond_chance, judged
+from cpfls_cli.changes.judge import Change, beyond_chance, judged
 from cpfls_cli.changes.numbers import FlightNumbers
-from cpfls_cli.changes.reference import FEWEST, Reference, expected_covariance, kinds_of, learned_covariance
+from cpfls_cli.changes.reference import (
+    EACH_TEST,
+    FEWEST,
+    Reference,
+    either,
+    expected_covariance,
+    furthest,
+    kinds_of,
+    learned_covariance,
+    number_limits,
+)
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from ruptures import KernelCPD
@@ -52,6 +63,8 @@ class Trend:
         In time order; those that tell all numbers.
     left_out : tuple of str
         Flights that lack some of the numbers.
+    reversed : tuple of str
+        Those of them that have some turned round, or as nothing, and which.
     reference : int
         How many of the first flights are the reference.
     mean : array, shape (number,)
@@ -64,7 +77,8 @@ class Trend:
         Deviations beyond which no number of an unchanged vehicle is in any flight after the reference, but for the rate
         of false alarms.
     p_value : float
-        Probability that a row of flights of an unchanged vehicle looks as much as if it had changed.
+        Probability that a row of flights of an unchanged vehicle looks as much as if it had changed, or is as far off
+        in any number of any flight: twice the smaller of both.
     shifts : tuple of Shift
     shows : mapping of str to float
         Smallest size of each change that shows in one flight after the reference, as of `Change`.
@@ -73,6 +87,7 @@ class Trend:
     names: tuple[str, ...]
     flights: tuple[FlightNumbers, ...]
     left_out: tuple[str, ...]
+    reversed: tuple[str, ...]
     reference: int
     mean: Array
     apart: Array
@@ -115,7 +130,8 @@ def trend(
     Processing 167.
     """
     names, kept = most_told(flights)
-    left_out = tuple(flight.name for flight in flights if not any(flight is each for each in kept))
+    without = [flight for flight in flights if not any(flight is each for each in kept)]
+    turned = [(flight.name, [name for name in flight.reversed if name in names]) for flight in without]
     if len(kept) < (reference or FEWEST) + 1:
         raise InputError(
             f"flights that tell the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
@@ -124,21 +140,23 @@ def trend(
     first = reference or max(FEWEST, len(kept) // 2)
     learned = Reference.of(kept[:first], names, vehicle)
     row = Row.of(kept, learned, vehicle)
-    p_value, starts = change_points(row, rng)
+    of_points, starts = change_points(row, rng)
     if reference is None and starts:
         first = max(FEWEST, min(first, starts[0]))
     held = Reference.of(kept[:first], names, vehicle)
     apart, deviation = _apart(held, kept)
+    asked = len(apart) - first
     return Trend(
         names,
         tuple(kept),
-        left_out,
+        tuple(flight.name for flight in without),
+        tuple(f"{name}: {joined(which)} reversed, or nothing" for name, which in turned if which),
         first,
         held.mean,
         apart,
         deviation,
-        limit=_limit(held.freedom, len(apart) - first),
-        p_value=p_value,
+        limit=float(number_limits(held.freedom, asked).max()),
+        p_value=either(of_points, furthest((apart / deviation)[first:], held.freedom, asked)),
         shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
     )
@@ -184,16 +202,6 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
     each = [reference.apart([flight]) for flight in flights]
     deviation = np.array([np.sqrt(np.diag(covariance)) for _, covariance in each])
     return np.vstack([apart for apart, _ in each]), deviation
-
-
-def _limit(freedom: Array, flights: int) -> float:
-    """Find the deviations that any number of so many flights exceeds at the rate of false alarms at most."""
-    # Slow to load, and who reads a record computes nothing.
-    from scipy.special import stdtr
-
-    limits = np.geomspace(1.0, 1e4, 4000)
-    beyond = 2 * flights * stdtr(freedom[:, None], -limits).sum(axis=0)
-    return float(limits[np.argmax(beyond <= FALSE_ALARM)])
 
 
 @dataclass(frozen=True)
@@ -275,9 +283,9 @@ def change_points(row: Row, rng: np.random.Generator) -> tuple[float, list[int]]
     chance = np.array([_gain(row.whitened(drawn)) for drawn in row.unchanged(rng, _DRAWS)])
     white = row.whitened(row.values)
     p_value = beyond_chance(chance, _gain(white))
-    if p_value > FALSE_ALARM:
+    if p_value > EACH_TEST:
         return p_value, []
-    penalty = float(np.quantile(chance, 1 - FALSE_ALARM))
+    penalty = float(np.quantile(chance, 1 - EACH_TEST))
     return p_value, [int(each) for each in _search(white).predict(pen=penalty)[:-1]]
 
 

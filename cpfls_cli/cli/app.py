@@ -645,6 +645,12 @@ def gap(
     _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
 
 
+OtherVehicleOption = Annotated[
+    bool,
+    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
+]
+
+
 @_command(kind=SeveralAfterOption)
 def changed(
     config: ConfigArgument,
@@ -668,9 +674,11 @@ def changed(
         typer.Option(
             "--fail-on-change",
             help="End with exit code 1 where something has changed, for scripts; with one or two reference flights 0 "
-            "says only that nothing is beyond what is usual of vehicles.",
+            "says only that nothing is beyond what is usual of vehicles. Where it cannot be told the exit code is 3, "
+            "with or without this.",
         ),
     ] = False,
+    anyway: OtherVehicleOption = False,
     *,
     common: Common,
 ) -> None:
@@ -680,7 +688,7 @@ def changed(
         config,
         output,
         common,
-        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change),
+        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change, anyway=anyway),
     )
 
 
@@ -711,6 +719,7 @@ def trend(
         TimeOrder | None,
         typer.Option("--order", help="What orders flights; default: their dates where all logs have one, or names."),
     ] = None,
+    anyway: OtherVehicleOption = False,
     workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that read logs.")] = 1,
     scheduler: SchedulerOption = None,
     *,
@@ -719,7 +728,7 @@ def trend(
     """Say since which of many flights what is changed about a vehicle; a second call reads only new ones."""
 
     def call(command: Any, job: Job) -> Any:
-        chosen = command.Options(reference, order and order.value, workers, scheduler)
+        chosen = command.Options(reference, order and order.value, anyway, workers, scheduler)
         return command.run(job, flights, chosen)
 
     _run("trend", config, output, common, call)

@@ -9,18 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.changed import ChangedRecord
+from cpfls_cli.artifacts.changed import CANNOT_TELL, ChangedRecord
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.job import Job, finish, go_on, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.rebuilt import numbers_of_flight
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.changes.causes import causes
-from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, Change, changed
+from cpfls_cli.changes.judge import NAMED, Change, changed
 from cpfls_cli.changes.numbers import KINDS, FlightNumbers
-from cpfls_cli.changes.reference import FEWEST, common_numbers
+from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST, common_numbers
 from cpfls_cli.commands import report
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.stated_vehicle import vehicles_apart
 from cpfls_cli.flights.inputs import hashes_of, numbered_roles
 from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers
 from cpfls_cli.pages.changed import LEFT_OUT, answer
@@ -33,6 +34,12 @@ from cpfls_cli.words import joined
 FILES = ("changed.h5", "report.html", "changed.json")
 """What a folder holds in the end, beside the numbers of each flight."""
 
+CANNOT_TELL_CODE = 3
+"""Exit code where it cannot be told whether a vehicle changed."""
+
+_APART = 3
+"""Facts that are named where two logs are of different vehicles."""
+
 _RATE = 0.01
 """By which sampling rates differ that are another."""
 
@@ -41,7 +48,9 @@ _UNLIKE = 0.7
 the variance."""
 
 
-def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_change: bool = False) -> Outcome:
+def run(
+    job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_change: bool = False, anyway: bool = False
+) -> Outcome:
     """Hold flights of today against reference flights, and say what has changed."""
     given = numbered_roles("today", today) | numbered_roles("since", since)
     inputs = take_inputs(job, given)
@@ -53,7 +62,8 @@ def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_chang
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
     flights, left_out = _flights(job, kept, inputs)
-    record = _record(job, flights, [*left_out, *twice])
+    other = of_other_vehicles([flights[role] for role in sorted(flights)], anyway=anyway)
+    record = _record(job, flights, [*left_out, *other, *twice])
     with filled_folder(job.output, FILES) as folder:
         written = finish(replace(job, output=folder / FILES[0]), record, {role: inputs[role] for role in flights})
         write_text(folder / FILES[2], json.dumps(as_json(written.summary), indent=1, allow_nan=False) + "\n")
@@ -61,10 +71,38 @@ def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_chang
         report.run(replace(job, output=folder / FILES[1], progress=lambda *_: None), [folder / FILES[0]])
     source = source_of(replace(job, output=job.output / FILES[0]), written)
     page = Text(f"{job.output / FILES[1]}: all of it, with the picture")
-    failed = int(fail_on_change and written.changed)
+    failed = exit_code(written.verdict, fail_on_change=fail_on_change)
     return Outcome(
         written.summary, (*answer(source), page), failed, (_next(job, written, [kept[role] for role in flights]),)
     )
+
+
+def exit_code(verdict: str, *, fail_on_change: bool = False) -> int:
+    """Give the exit code of a verdict."""
+    return CANNOT_TELL_CODE if verdict == CANNOT_TELL else int(fail_on_change and verdict == "CHANGED")
+
+
+def of_other_vehicles(flights: Sequence[FlightNumbersRecord], *, anyway: bool) -> list[str]:
+    """Refuse flights whose logs say that they are of different vehicles, or warn of them where that is asked for."""
+    stating = [own for own in flights if own.stated is not None]
+    warnings = []
+    for own in stating[1:]:
+        first = stating[0]
+        assert first.stated is not None
+        assert own.stated is not None
+        apart = vehicles_apart(first.stated.facts, own.stated.facts)
+        if apart:
+            shown = "; ".join(apart[:_APART])
+            differ = f"{first.flight} and {own.flight} are of different vehicles ({shown})"
+            if not anyway:
+                raise InputError(f"{differ}: compare flights of one vehicle, or give --anyway")
+            warnings.append(f"{differ}, and are compared anyway")
+    return warnings
+
+
+def contradictions_of(flights: Sequence[FlightNumbersRecord]) -> list[str]:
+    """List what of flights contradicts itself or its vehicle, each with the name of its flight."""
+    return [f"{own.flight}: {words}" for own in flights for words in own.contradiction]
 
 
 def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
@@ -123,7 +161,10 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
         *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
     ]
     return ChangedRecord.of(
-        *(change, today, before, units, warnings), false_alarm=FALSE_ALARM, named_from=NAMED, fewest=FEWEST
+        *(change, today, before, units, warnings, contradictions_of([*of_today, *of_before])),
+        false_alarm=FALSE_ALARM,
+        named_from=NAMED,
+        fewest=FEWEST,
     )
 
 

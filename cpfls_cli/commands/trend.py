@@ -22,10 +22,11 @@ from cpfls_cli.artifacts.rebuilt import numbers_of_flight
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import format_name, holds
 from cpfls_cli.artifacts.trend import TrendRecord
-from cpfls_cli.changes.judge import FALSE_ALARM, NAMED
+from cpfls_cli.changes.judge import NAMED
+from cpfls_cli.changes.reference import FALSE_ALARM
 from cpfls_cli.changes.trend import load_ruptures, trend
 from cpfls_cli.commands import report
-from cpfls_cli.commands.changed import once, units_of
+from cpfls_cli.commands.changed import contradictions_of, exit_code, of_other_vehicles, once, units_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
@@ -59,10 +60,13 @@ class Options:
         How many of the first flights are the reference; None for half of them at most.
     order : {"date", "name", "given"} or None
         None for date where every log has one, and name elsewhere.
+    anyway : bool
+        Whether flights are compared whose logs say that they are of different vehicles.
     """
 
     reference: int | None = None
     order: str | None = None
+    anyway: bool = False
     workers: int = 1
     scheduler: str | None = None
 
@@ -95,7 +99,8 @@ def run(job: Job, given: Sequence[Path], options: Options) -> Outcome:
         f"{job.output / FILES[1]}: all of it, with the picture; {new} of {len(told)} flights were new, the others kept."
     )
     paths = {told[role].flight: path for role, path in kept.items() if role in told}
-    return Outcome({**written.summary, "new": new}, (*answer(source), page), next=(_next(job, written, paths),))
+    said, summary = (*answer(source), page), {**written.summary, "new": new}
+    return Outcome(summary, said, exit_code(written.verdict), (_next(job, written, paths),))
 
 
 def _expanded(given: Sequence[Path], output: Path) -> Iterator[Path]:
@@ -201,6 +206,7 @@ def _share_out(job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFi
 def _record(job: Job, told: Mapping[str, FlightNumbersRecord], options: Options, notes: Sequence[str]) -> TrendRecord:
     ordered, order, about = _ordered(told, options.order)
     vehicle = job.study.vehicle
+    apart = of_other_vehicles(ordered, anyway=options.anyway)
     found = trend(
         [numbers_of_flight(own) for own in ordered], vehicle, generator(job.study, "trend"), options.reference
     )
@@ -208,6 +214,7 @@ def _record(job: Job, told: Mapping[str, FlightNumbersRecord], options: Options,
     lacking = f"left out, for they do not tell {len(found.names)} numbers that most do: {', '.join(found.left_out)}"
     warnings = [
         *notes,
+        *apart,
         *([lacking] if found.left_out else []),
         *about,
         *_of_commands(ordered),
@@ -219,6 +226,7 @@ def _record(job: Job, told: Mapping[str, FlightNumbersRecord], options: Options,
         order,
         units_of(found.names, vehicle),
         warnings,
+        contradictions_of(ordered),
         false_alarm=FALSE_ALARM,
         named_from=NAMED,
     )

@@ -15,6 +15,7 @@ from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
+from cpfls_cli.flightlog.stated_vehicle import plain, stated_vehicle, vehicles_apart
 from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
@@ -30,9 +31,6 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
-
-_OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
-"""Beginnings of parameters that two logs of one vehicle have in common."""
 
 _SAME_ARM: Final = 0.05
 """Share by which an arm that is given may differ from the places that a log states: both are rounded."""
@@ -223,15 +221,7 @@ def _require_same_arm(name: str, airframe: Airframe, arm_m: float) -> None:
 
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles."""
-    differing = []
-    names = [one.system.partition(" ")[0] for one in (first, other)]
-    if names[0] != names[1]:
-        differing.append(f"written by {names[0] or 'something unknown'} and {names[1] or 'something unknown'}")
-    for key in sorted(first.parameters.keys() & other.parameters.keys()):
-        if key.startswith(_OF_VEHICLE) and not key.endswith(("_CT", "_SLEW")):
-            values = first.parameters[key], other.parameters[key]
-            if values[0] != values[1]:
-                differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
+    differing = vehicles_apart(*(stated_vehicle(one.system, one.parameters) for one in (first, other)))
     counts = first.recognition.rotors, other.recognition.rotors
     if counts[0] != counts[1] and 0 not in counts:
         differing.append(f"{counts[0]} and {counts[1]} rotors")
@@ -486,9 +476,5 @@ def _rounded_up(value: float) -> float:
 
 
 def _facts(one: KnownLog) -> tuple[str, ...]:
-    noted = (f"{key} = {_plain(one.parameters[key])}" for key in _NOTED if key in one.parameters)
+    noted = (f"{key} = {plain(one.parameters[key])}" for key in _NOTED if key in one.parameters)
     return (*([f"written by {one.system}"] if one.system else []), *noted)
-
-
-def _plain(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"

@@ -88,6 +88,8 @@ class ImportReport:
         What wrote the log, and its version; empty where it does not say.
     parameters : mapping from str to float
         Of the control law that flew, by the autopilot's own names.
+    stated : mapping from str to str
+        What the log says of its vehicle, as `stated_vehicle`.
     """
 
     samples_read: int
@@ -113,6 +115,7 @@ class ImportReport:
     flown_at: float = nan
     system: str = ""
     parameters: Mapping[str, float] = field(default_factory=dict)
+    stated: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.flightlog.stated_vehicle import stated_vehicle
 from cpfls_cli.logs.formats import LogColumns, read_log
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
@@ -51,6 +52,7 @@ def imported(log: Path, study: Study) -> ImportedFlight:
         first_stamp_s=read.begins + flight.report.first_stamp_s,
         system=read.system,
         parameters=_parameters(read),
+        stated=stated_vehicle(read.system, read.parameters),
     )
     return replace(flight, report=report)
 

@@ -38,10 +38,18 @@ def kept_numbers(
     kept = find_kept(flight, file, study, folder)
     if kept is not None:
         return kept
-    recording, full, warnings, flown_at = read_alone(flight, study)
-    told = flight_numbers(recording, full)
-    units = [KINDS[name.split()[0]].unit for name in told.values]
-    made = FlightNumbersRecord.of(told, units, recording.signals.period, flown_at, code_fingerprint(), warnings)
+    read = read_alone(flight, study)
+    told = flight_numbers(read.recording, read.full_voltage)
+    made = FlightNumbersRecord.of(
+        told,
+        [KINDS[name.split()[0]].unit for name in told.values],
+        read.recording.signals.period,
+        read.flight.flown_at,
+        code_fingerprint(),
+        read.warnings,
+        read.contradictions,
+        read.flight.stated,
+    )
     record = made.with_header(header_of(study, {"flight": file}, cautions))
     folder.mkdir(parents=True, exist_ok=True)
     write_record(_path(flight, file, folder), record)

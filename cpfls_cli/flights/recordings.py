@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,14 @@ from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
+from cpfls_cli.flightlog.stated_vehicle import WRITTEN_BY
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
@@ -68,8 +69,8 @@ class ReadFlight:
         Updates a second of signals that its log has more rows than.
     begins : float
         Stamp of the log's own clock at time 0, s; NaN where there is none.
-    system : str
-        What wrote the log; empty where it does not say.
+    stated : mapping of str to str
+        What the log says of its vehicle, as `stated_vehicle`; empty where nothing is known of it.
     """
 
     name: str
@@ -79,7 +80,30 @@ class ReadFlight:
     flown_at: float = nan
     updated_hz: Mapping[str, float] = field(default_factory=dict)
     begins: float = nan
-    system: str = ""
+    stated: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def system(self) -> str:
+        """What wrote the log, such as ``PX4``; empty where it does not say."""
+        return self.stated.get(WRITTEN_BY, "")
+
+
+class ReadAlone(NamedTuple):
+    """One flight that was read by itself.
+
+    Attributes
+    ----------
+    full_voltage : float
+        What its voltages are shares of, V; 1 where it states shares.
+    contradictions : tuple of str
+        Sentences: what of the flight contradicts itself or its vehicle.
+    """
+
+    flight: ReadFlight
+    recording: Recording
+    full_voltage: float
+    warnings: tuple[str, ...]
+    contradictions: tuple[str, ...]
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -91,15 +115,13 @@ def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     return Recordings(tuple(recordings), (*warnings, *notes))
 
 
-def read_alone(path: Path, study: Study) -> tuple[Recording, float, tuple[str, ...], float]:
-    """Read one flight: with it the voltage that its voltages are shares of, 1 where it states shares, and warnings.
-
-    Last comes when it was flown, as `ReadFlight.flown_at`.
-    """
+def read_alone(path: Path, study: Study) -> ReadAlone:
+    """Read one flight, and hold it against itself and its vehicle."""
     flight = read_flight(path, study)
     recording, about = _recording(flight, study)
     volts = _largest_volts(recording.signals, flight)
-    return (_share(recording, volts) if volts else recording), volts or 1.0, about, flight.flown_at
+    wrong = contradictions(check_flight(flight, study))
+    return ReadAlone(flight, _share(recording, volts) if volts else recording, volts or 1.0, about, wrong)
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -109,8 +131,8 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     record = read_record(path, FlightRecord)
     updated = {} if record.quality is None else record.quality.updated_hz
     units = units_of(path, record.origin, study)
-    system = "" if record.autopilot is None else record.autopilot.system
-    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins, system=system)
+    stated = {} if record.stated is None else record.stated.facts
+    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins, stated=stated)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -118,20 +140,20 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
-    flown_at, system = first.report.flown_at, first.report.system
     updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
     done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
         begins = first.report.first_stamp_s + first.report.span_s[0]
-        return ReadFlight(name, signals[0], _units(study), notes, flown_at, updated, begins, system)
+        stated = first.report.stated
+        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins, stated)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     begins = first.report.first_stamp_s
-    return ReadFlight(name, joined, _units(study), (), flown_at, updated, begins, system)
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins, first.report.stated)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.changed import ChangedRecord, FoundRecord
 from cpfls_cli.pages.change_words import cause_name, change_words, hover_words, smallest_words, what_to_check
+from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
@@ -48,6 +49,12 @@ _OTHERS = 3
 _ALIKE = 3
 """Others that are told beside a change that is not sure."""
 
+_WITHIN = 2
+"""Sizes that a verdict names."""
+
+MOST_MOVED = 3
+"""Numbers that are told where no change is known that does this."""
+
 _CHECKED = 2
 _WITH_MORE = {"rotor": ", perhaps with another", "hover": ", perhaps off the centre", "centre": ", perhaps by a mass"}
 """By the first word of a change: what may come with it."""
@@ -84,13 +91,84 @@ def answer(changed: Source[ChangedRecord], index: int = 1) -> Iterator[Block]:
 
 
 def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
-    """Say in a sentence what changed, or that nothing did."""
-    lacks = [_assumed(record)] if record.short_of else []
-    if not record.changed:
-        beyond = "what is usual of vehicles" if lacks else "what flights of this vehicle differ by"
-        return Box(record.verdict, f"nothing beyond {beyond}", lacks, "warning" if lacks else "good")
-    first, *more = (sentence(told(record, index, vehicle)) for index in range(len(record.found.cause)))
-    return Box(record.verdict, first, [*(f"And: {each[:1].lower()}{each[1:]}" for each in more), *lacks], "warning")
+    """Say in a sentence what changed, or that nothing did and what would have shown, or why neither can be said."""
+    wrong = first_of_each(record.contradiction)
+    lacks = [*([_lost(record)] if record.lost else []), *([_assumed(record)] if record.short_of else [])]
+    if record.changed:
+        first, *more = _what_changed(record, vehicle)
+        also = [f"And: {each[:1].lower()}{each[1:]}" for each in more]
+        return Box(record.verdict, first, [*wrong, *also, *lacks], "warning")
+    beyond = "what is usual of vehicles" if record.short_of else "what flights of this vehicle differ by"
+    if wrong:
+        said = f"Nothing is beyond {beyond}, which says little of such a log."
+        return Box(record.verdict, wrong[0], [*wrong[1:], said, *lacks], "unsure")
+    if record.undetermined:
+        return Box(record.verdict, _undetermined(record), lacks, "unsure")
+    if not record.has_size:
+        return Box(record.verdict, NOTHING_SHOWS, lacks, "unsure")
+    within = f"nothing beyond {beyond}; {unchanged_within(record, vehicle)}"
+    return Box(record.verdict, within, lacks, "warning" if lacks else "good")
+
+
+NOTHING_SHOWS = (
+    "no change of any size that is looked for would have shown; give more reference flights, of other days, flown as "
+    "today's are"
+)
+
+
+def first_of_each(contradictions: Sequence[str]) -> list[str]:
+    """Say of each flight that contradicts itself what comes first."""
+    return [contradicted(each) for each in {own.partition(": ")[0]: own for own in reversed(contradictions)}.values()]
+
+
+def _undetermined(record: ChangedRecord) -> str:
+    """Say which ratios may be anything today."""
+    return (
+        f"{joined(record.undetermined)} may be zero or reversed today, and {_IS_REVERSED}; the other numbers are "
+        "within their limits"
+    )
+
+
+_IS_REVERSED = (
+    "in no reference flight: a gyroscope that is mirrored or dead, rotors that are exchanged, "
+    "or a log that is read wrongly"
+)
+
+
+def unchanged_within(record: FoundRecord, vehicle: VehicleSettings) -> str:
+    """Say below which sizes a change would not have shown, of the first that are looked for."""
+    return f"unchanged within these sizes: {', '.join(list(would_have_shown(record, vehicle))[:_WITHIN])}"
+
+
+def _what_changed(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[str]:
+    """Say each change that was found, or else which numbers are off; and which are turned round."""
+    if record.reversed:
+        yield sentence(
+            f"{joined(record.reversed)} {'is' if len(record.reversed) == 1 else 'are'} reversed, or nothing, and "
+            f"{_IS_REVERSED}"
+        )
+    yield from (sentence(told(record, index, vehicle)) for index in range(len(record.found.cause)))
+    if not record.found.cause and (record.p_value <= record.false_alarm or record.beyond.any()):
+        yield no_known_change(record.number, record.furthest)
+
+
+def no_known_change(names: Sequence[str], deviations: Array) -> str:
+    """Say that flights differ, in which numbers most, and that no known change explains it."""
+    return sentence(f"more than chance, but no change that is known explains it: {most_moved(names, deviations)}")
+
+
+def most_moved(names: Sequence[str], deviations: Array) -> str:
+    """List the numbers that differ most, in deviations."""
+    most = np.argsort(-np.abs(deviations), kind="stable")[:MOST_MOVED]
+    return f"{joined(f'{names[at]} by {deviations[at]:+.1f}' for at in most)} deviations"
+
+
+def _lost(record: ChangedRecord) -> str:
+    """Say what today's flights do not determine."""
+    return (
+        f"Not compared, for every reference flight determines it and today's do not: {joined(record.lost)}; if the log "
+        "holds these channels, look whether a sensor or a rotor is dead or turned round."
+    )
 
 
 def _assumed(record: ChangedRecord) -> str:
@@ -168,8 +246,9 @@ def checks(record: FoundRecord, among: Sequence[int] | None = None) -> Iterator[
 
 def _chance(record: ChangedRecord) -> str:
     today, before = len(record.today), len(record.before)
+    of_others = "in the other numbers " if record.reversed else ""
     return (
-        f"an unchanged vehicle looks like this with p = {number(record.p_value, 1)}; {today} "
+        f"{of_others}an unchanged vehicle looks like this with p = {number(record.p_value, 1)}; {today} "
         f"flight{'s' if today > 1 else ''} of today beside {before} of the reference"
     )
 
@@ -188,7 +267,7 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
     rows: list[list[str | Cell]] = []
     for at, name in enumerate(record.number):
         usual, today = float(record.mean[at]), float(record.mean[at] + record.apart[:, at].mean())
-        deviation, apart = float(record.deviation[at]), float(record.apart[:, at].mean() / record.deviation[at])
+        deviation, apart = float(record.deviation[at]), float(record.furthest[at])
         natural = natural_unit(name)
         if natural is None:
             told = [_UNITS.get(record.unit[at], record.unit[at]), *(number(each, 3) for each in (usual, today))]
@@ -196,8 +275,9 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
         else:
             told = [natural, *(number(float(np.exp(each)), 3) for each in (usual, today))]
             told.append(f"{number(100 * float(np.expm1(deviation)), 2)} %")
-        rows.append([name, *told, Cell(number(apart, 2), "warning" if abs(apart) > 2 else "plain")])
-    header = ("Number", "Unit", "Reference", "Today", "Differs by", "Deviations")
+        limit = "—" if record.limit is None else number(float(record.limit[at]), 2)
+        rows.append([name, *told, Cell(number(apart, 2), "warning" if record.beyond[at] else "plain"), limit])
+    header = ("Number", "Unit", "Reference", "Today", "Differs by", "Deviations", "Limit")
     yield Table(
         f"changed-numbers-{index}",
         "Each number of today, on average, beside the reference.",
@@ -205,7 +285,8 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
         rows,
         frozenset({0, 1}),
         legend="Differs by: what flights of one day are off the reference by where nothing changed, one standard "
-        "deviation; deviations: today less the reference in these.",
+        "deviation; deviations: today less the reference in these; limit: beyond it has changed; so high for the few "
+        "flights that tell what it differs by, and the many numbers that are asked.",
     )
     shows = zip(record.shows.cause, record.shows.smallest.tolist(), strict=True)
     caption = "The smallest change of each kind that shows in 9 of 10 days like this one."

@@ -10,13 +10,23 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.trend import TrendRecord
-from cpfls_cli.pages.changed import checks, natural_unit, told, would_have_shown
+from cpfls_cli.pages.changed import (
+    MOST_MOVED,
+    NOTHING_SHOWS,
+    checks,
+    first_of_each,
+    most_moved,
+    natural_unit,
+    no_known_change,
+    told,
+    unchanged_within,
+    would_have_shown,
+)
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, band, in_columns, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text, in_short
 from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,9 +34,6 @@ if TYPE_CHECKING:
 _ORDERS = {"date": "their dates", "name": "their names", "given": "the command line"}
 _SHOWN = 5
 """Change points that a first screen has room for."""
-
-_MOVED = 3
-"""Numbers that are told where no change is known that does this, and flights beyond the limits."""
 
 _COLUMNS, _HEIGHT, _HEAD = 3, 1.35, 0.7
 """Of small multiples: side by side, inches of each, and beside them."""
@@ -49,18 +56,32 @@ def answer(trend: Source[TrendRecord], index: int = 1) -> Iterator[Block]:
 
 def trend_box(record: TrendRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence for each change point what changed; the last comes first, for the vehicle flies as that."""
-    shifts = range(len(record.shift.start))
-    if not shifts:
-        return Box("NO CHANGE", f"over {len(record.flight)} flights, beyond what they differ by", (), "good")
-    last, *before = (_since(record, shift, vehicle) for shift in reversed(shifts))
-    return Box("CHANGED", last, before, "warning")
+    wrong = first_of_each(record.contradiction)
+    if record.changed:
+        first, *more = _what_changed(record, vehicle)
+        return Box(record.verdict, first, [*more, *wrong], "warning")
+    over = f"over {len(record.flight)} flights, beyond what they differ by"
+    if wrong:
+        return Box(record.verdict, wrong[0], [*wrong[1:], f"Nothing changed {over}, which says little then."], "unsure")
+    if not record.has_size:
+        return Box(record.verdict, NOTHING_SHOWS, (), "unsure")
+    return Box(record.verdict, f"{over}; in one flight {unchanged_within(record, vehicle)}", (), "good")
+
+
+def _what_changed(record: TrendRecord, vehicle: VehicleSettings) -> Iterator[str]:
+    """Say each change point, the last first, and single flights that are off by themselves."""
+    yield from (f"{each}, as in no flight of the reference" for each in record.reversed)
+    yield from (_since(record, shift, vehicle) for shift in reversed(range(len(record.shift.start))))
+    for index in np.flatnonzero(record.beyond.any(axis=1)) if not len(record.shift.start) else ():
+        moved = no_known_change(record.number, record.apart[index] / record.deviation[index])
+        yield f"In {_flight(record, int(index))} alone: {moved[:1].lower()}{moved[1:]}"
 
 
 def _since(record: TrendRecord, shift: int, vehicle: VehicleSettings) -> str:
     start = int(record.shift.start[shift])
     causes = record.causes(shift)
-    what = " And: ".join(sentence(told(record, index, vehicle)) for index in causes) or sentence(
-        f"more than chance, but no change that is known stands out of it: {_moved(record, shift)}"
+    what = " And: ".join(sentence(told(record, index, vehicle)) for index in causes) or no_known_change(
+        record.number, record.moved(shift)
     )
     return f"Since {_flight(record, start)}: {what[:1].lower()}{what[1:]}"
 
@@ -74,13 +95,6 @@ def _date(second: float) -> str:
     return datetime.fromtimestamp(second, UTC).strftime("%Y-%m-%d") if np.isfinite(second) else ""
 
 
-def _moved(record: TrendRecord, shift: int) -> str:
-    moved = record.moved(shift)
-    most = np.argsort(-np.abs(moved), kind="stable")[:_MOVED]
-    listed = joined(f"{record.number[at]} by {moved[at]:+.1f}" for at in most)
-    return f"{listed} deviations"
-
-
 def _facts(record: TrendRecord, vehicle: VehicleSettings) -> Iterator[tuple[str, str]]:
     dates = [_date(second) for second in record.flown_at[[0, -1]]]
     span = f", {dates[0]} to {dates[1]}" if record.order == "date" else ""
@@ -90,8 +104,8 @@ def _facts(record: TrendRecord, vehicle: VehicleSettings) -> Iterator[tuple[str,
         f"{record.reference} are the reference.",
     )
     beyond = [row["flight"] for row in record.rows if row["beyond"]]
-    rest = f" and {len(beyond) - _MOVED} more" if len(beyond) > _MOVED else ""
-    yield "Beyond limits", sentence(f"{', '.join(beyond[:_MOVED])}{rest}" if beyond else "no flight")
+    rest = f" and {len(beyond) - MOST_MOVED} more" if len(beyond) > MOST_MOVED else ""
+    yield "Beyond limits", sentence(f"{', '.join(beyond[:MOST_MOVED])}{rest}" if beyond else "no flight")
     if len(record.shift.start):
         # Of the last change point that tells of something: the vehicle flies as that.
         yield from checks(record, [] if not len(record.shifts) else record.causes(int(record.shifts.max())))
@@ -114,7 +128,7 @@ def _tables(record: TrendRecord, index: int) -> Iterator[Table]:
                 _date(record.flown_at[start]),
                 str(start + 1),
                 "; ".join(record.found.cause[at] for at in record.causes(shift)),
-                _moved(record, shift),
+                most_moved(record.number, record.moved(shift)),
             ]
             for shift, start in enumerate(record.shift.start.tolist())
         ]

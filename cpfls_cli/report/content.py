@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 HASH_SHOWN = 12
 
-Tone = Literal["plain", "note", "good", "warning"]
+Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
 
 Drawn = Literal["line", "points", "bars", "band", "map", "mark"]

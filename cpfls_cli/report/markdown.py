@@ -23,7 +23,7 @@ from cpfls_cli.report.content import (
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~#$])")
 _BEGINS = re.compile(r"^(\d+)([.)])(?=\s|$)|^([-+=])")
-_TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning"}
+_TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning", "unsure": "Not known"}
 
 
 def markdown_page(document: Document) -> str:

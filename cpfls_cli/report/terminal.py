@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rich.text import Text as RichText
 
 # Rich is loaded where there is a table: sentences do not wait for it.
-_STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red"}
+_STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red", "unsure": "bold magenta"}
 # Where nothing is a terminal no number or word is cut or folded, so that other programs can read it.
 _UNLIMITED = 100_000
 # Wider tables are hard to read: their sentences are broken.

@@ -47,6 +47,7 @@ def trend_record():
         "date",
         units_of(found.names, QUAD),
         ["left out, 1 flight: a.csv"],
+        [],
         false_alarm=0.01,
         named_from=0.9,
     )

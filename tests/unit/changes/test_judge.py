@@ -86,7 +86,7 @@ def test_quiet_numbers_of_another_kind_tell_nothing_of_a_change():
 
 @pytest.mark.parametrize("losses", [0, 1])
 def test_evidence_by_quadrature(losses):
-    """One direction, sizes integrated one by one; of a loss those above 0 count nineteen times as much."""
+    """One direction, sizes of either width integrated one by one; of a loss those above 0 count nineteen times."""
     direction = np.array([0.8, -0.3, 1.5])
     own, covariance = space([Cause("rotor M1", direction[:, None], 0.1, "1", losses=losses)], freedom=1e9)
     row = np.array([1.2, 0.4, 2.0])
@@ -95,9 +95,10 @@ def test_evidence_by_quadrature(losses):
     def density(size):
         apart = row - size * direction
         sign = 1.0 if not losses else 2 * (0.95 if size > 0 else 0.05)
-        return np.exp(-0.5 * apart @ precision @ apart) * norm.pdf(size) * sign
+        prior = 0.9 * norm.pdf(size) + 0.1 * norm.pdf(size, scale=10.0)
+        return np.exp(-0.5 * apart @ precision @ apart) * prior * sign
 
-    expected = np.log(quad(density, -9, 9, points=[0.0])[0]) + 0.5 * row @ precision @ row
+    expected = np.log(quad(density, -30, 30, points=[0.0], limit=200)[0]) + 0.5 * row @ precision @ row
     assert own.evidence(own.whitened(row[:, None]), [0])[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
@@ -289,3 +290,46 @@ def test_flights_that_are_flown_otherwise_are_said_to_be():
     assert words.startswith("flown unlike the reference: with accelerations of 3 m/s^2 (root mean square), those of")
     assert "late count" in words
     assert not [*_flown_unlike(changed(before[:1], before[1:], QUAD, rng), before[:1], before[1:])]
+
+
+def test_two_changes_at_once_hide_each_other_and_are_found():
+    """A lighter vehicle and a torque about z beside two reference flights: neither explains the loads by itself."""
+    rng = np.random.default_rng(15)
+    both = np.concatenate([np.log(0.75) + 0.15 * np.array([1.0, -1.0, 1.0, -1.0]), np.zeros(6)])
+    change = changed(flights(1, rng, both), flights(2, rng), QUAD, rng)
+    assert change.p_value <= FALSE_ALARM
+    assert {"torque about z", "hover"} <= {found.cause.name for found in change.found}
+
+
+@pytest.mark.parametrize("names", [LOADS, NAMES])
+def test_a_number_beyond_its_limit_is_never_unchanged(names):
+    """In whatever numbers flights are off, alone or with others, and however many flights tell what they differ by."""
+    rng = np.random.default_rng(16)
+    seen = 0
+    for _ in range(40):
+        apart = rng.choice([0.0, 0.1, 0.3, 1.0], len(names)) * rng.normal(size=len(names))
+        before = flights(int(rng.integers(1, 6)), rng, names=names)
+        change = changed(flights(2, rng, apart, names=names), before, QUAD, rng)
+        beyond = np.abs(change.apart.mean(axis=0)) > change.limit * change.deviation
+        assert change.changed >= beyond.any()
+        seen += bool(beyond.any())
+    assert seen > 5
+
+
+def test_a_larger_change_does_not_count_less():
+    """Of a rotor that lacks 30 to 99 % of its thrust, far beyond what is usual of a damaged one."""
+    for lost in (0.3, 0.6, 0.9, 0.99):
+        rng = np.random.default_rng(17)
+        change = changed(flights(1, rng, -np.log(1 - lost) * np.eye(10)[2]), flights(3, rng), QUAD, rng)
+        assert change.p_value <= FALSE_ALARM
+        assert change.found[0].cause.name == "rotor M3"
+
+
+def test_a_ratio_that_is_reversed_today_is_a_change_and_one_that_is_missing_is_not():
+    rng = np.random.default_rng(18)
+    before, (today,) = flights(4, rng), flights(1, rng)
+    left = {name: value for name, value in today.values.items() if name != "late yaw"}
+    missing = changed([replace(today, values=left)], before, QUAD, rng)
+    assert (missing.changed, missing.missing, missing.reversed) == (False, ("late yaw",), ())
+    turned = changed([replace(today, values=left, reversed=("late yaw",))], before, QUAD, rng)
+    assert (turned.changed, turned.missing, turned.reversed) == (True, (), ("late yaw",))

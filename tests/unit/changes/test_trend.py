@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
+from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
 from cpfls_cli.changes.reference import Reference
 from cpfls_cli.changes.trend import most_told, trend
+from cpfls_cli.commands.changed import units_of
 from cpfls_cli.errors import InputError
 from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
 
 
 @pytest.fixture(autouse=True)
 def _few_draws(monkeypatch):
-    """As many as a rate of false alarms of 0.01 needs to be told at all."""
-    monkeypatch.setattr(module, "_DRAWS", 150)
+    """As many as the rate of false alarms of each test, 0.005, needs to be told at all."""
+    monkeypatch.setattr(module, "_DRAWS", 300)
 
 
 def row_of(given):
@@ -125,3 +127,26 @@ def test_the_reference_that_is_asked_for_is_taken():
     given = flights(8, np.random.default_rng(9))
     assert trend(given, QUAD, np.random.default_rng(1), 5).reference == 5
     assert trend(given, QUAD, np.random.default_rng(1)).reference == 4
+
+
+def test_a_single_flight_beyond_its_limits_is_no_green_answer():
+    """One flight of thirty that is off by itself, in a direction that is no known change, and that ends again."""
+    given = flights(30, np.random.default_rng(8))
+    moved = {name: 60 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name == "load M2"}
+    given[22] = replace(given[22], values={name: x + moved.get(name, 0.0) for name, x in given[22].values.items()})
+    found = trend(given, QUAD, np.random.default_rng(1))
+    assert found.p_value <= FALSE_ALARM
+    made = TrendRecord.of(
+        found, [np.nan] * 30, "given", units_of(found.names, QUAD), [], [], false_alarm=FALSE_ALARM, named_from=0.95
+    )
+    assert made.verdict == "CHANGED"
+    assert [row["flight"] for row in made.rows if row["beyond"]] == ["flight23"]
+
+
+def test_a_flight_that_has_a_ratio_reversed_is_a_change():
+    given = flights(12, np.random.default_rng(9))
+    left = {name: value for name, value in given[9].values.items() if name != "late yaw"}
+    given[9] = replace(given[9], values=left, reversed=("late yaw",))
+    found = trend(given, QUAD, np.random.default_rng(1))
+    assert found.left_out == ("flight10",)
+    assert found.reversed == ("flight10: late yaw reversed, or nothing",)

@@ -1,0 +1,113 @@
+"""`cpfls changed` and `cpfls trend` on logs of today that are wrong, or of another vehicle: never a green answer."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.builders.changed_flights import HEADER, flight_table, save, write_flights
+from tests.builders.unknown_logs import ARM, MASS, flat_log, flight, named, ulog_of_flight, write_csv
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+
+RATE, FORCE, SPEED = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z"), ("rpm1", "rpm2", "rpm3", "rpm4")
+TODAY = flight(seed=11)
+RPM = TODAY.speed * 60 / (2 * np.pi)
+WRONG = {
+    "gyroscope mirrored": ({"rate": named(TODAY.rate * [-1, 1, 1], *RATE)}, "follow roll"),
+    "motors exchanged": ({"speed": named(RPM[:, [1, 0, 2, 3]], *SPEED)}, "judged by the motion, the rotors are"),
+    "gyroscope dead": ({"rate": named(0 * TODAY.rate, *RATE)}, "barely agree"),
+    "deg/s as rad/s": ({"rate": named(np.degrees(TODAY.rate), *RATE)}, "does the log give rates in deg/s"),
+    "g as m/s^2": ({"force": named(TODAY.specific_force / 9.81, *FORCE)}, "the accelerometer is in g"),
+    "rad/s as rpm": ({"speed": named(TODAY.speed, *SPEED)}, "rad/s? then it is"),
+}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory, cpfls):
+    """Four reference flights with attitude and motion, one of today like them, and the config of `init`."""
+    folder = tmp_path_factory.mktemp("wrong")
+    before = [write_csv(folder / f"before{seed}.csv", flat_log(flight(seed=seed))) for seed in (1, 2, 3, 4)]
+    write_csv(folder / "same.csv", flat_log(TODAY))
+    made = cpfls("init", *before, "-o", folder / "study.yaml", "--mass", MASS, "--arm", ARM)
+    assert made.exit_code == 0, made.output
+    return folder
+
+
+def changed(cpfls, folder, today, *options):
+    since = sorted(folder.glob("before*"))
+    words = ("changed", folder / "study.yaml", folder / today, "--since", *since, "-o", folder / "out", "--force")
+    return cpfls(*words, "--fail-on-change", *options)
+
+
+def test_a_good_log_of_today_is_unchanged_within_a_size(cpfls, logs):
+    result = changed(cpfls, logs, "same.csv")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("NO CHANGE: ")
+    assert "unchanged within these sizes: a rotor that pulls " in " ".join(result.stdout.split())
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_log_of_today_is_never_green(cpfls, logs, what):
+    columns, words = WRONG[what]
+    write_csv(logs / "wrong.csv", flat_log(TODAY, **columns))
+    result = changed(cpfls, logs, "wrong.csv")
+    assert result.exit_code in (1, 2, 3)
+    assert not result.stdout.startswith("NO CHANGE")
+    assert words.lower() in " ".join(result.output.split()).lower()
+    if result.exit_code != 2:
+        told = json.loads((logs / "out" / "changed.json").read_text())
+        assert told["verdict"] == ("CHANGED" if result.exit_code == 1 else "CANNOT TELL")
+        assert told["contradictions"]
+
+
+def test_it_is_said_of_reference_flights_too(cpfls, logs):
+    """Where all logs are read with a wrong unit numbers cancel, and the logs contradict themselves."""
+    result = changed(cpfls, logs, "same.csv", "--set", "import.signals.body_rate.unit=deg/s")
+    assert result.exit_code == 3
+    assert result.stdout.startswith("CANNOT TELL: The log contradicts itself: ")
+    assert "before1.csv: about body x" in " ".join(result.stdout.split())
+
+
+@pytest.fixture(scope="module")
+def by_torque(tmp_path_factory):
+    """Logs without attitude: only how rotation follows torque shows that an axis is turned round."""
+    folder = write_flights(tmp_path_factory.mktemp("torque"))
+    table = flight_table(11)
+    mirrored, exchanged = table.copy(), table.copy()
+    mirrored[:, 1] *= -1
+    exchanged[:, [7, 9]] = table[:, [9, 7]]
+    save(folder / "mirrored.csv", mirrored, HEADER)
+    save(folder / "exchanged.csv", exchanged, HEADER)
+    return folder
+
+
+@pytest.mark.parametrize(("today", "number"), [("mirrored.csv", "follow roll"), ("exchanged.csv", "follow pitch")])
+def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, number):
+    result = changed(cpfls, by_torque, today)
+    assert result.exit_code == 1, result.output
+    told = json.loads((by_torque / "out" / "changed.json").read_text())
+    assert told["reversed"] == [number]
+    assert "reversed, or nothing, and in no reference flight" in " ".join(result.stdout.split())
+
+
+def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
+    for seed in (1, 2, 3, 4):
+        (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed)))
+    (tmp_path / "other.ulg").write_bytes(ulog_of_flight(TODAY, SYS_AUTOSTART=4601))
+    logs = [tmp_path / f"before{seed}.ulg" for seed in (1, 2, 3, 4)]
+    made = cpfls("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
+    assert made.exit_code == 0, made.output
+    said = "before1.ulg and other.ulg are of different vehicles (SYS_AUTOSTART 4001 and 4601)"
+    refused = changed(cpfls, tmp_path, "other.ulg")
+    assert refused.exit_code == 2
+    assert f"{said}: compare flights of one vehicle, or give --anyway" in refused.stderr
+    words = ("trend", tmp_path / "study.yaml", *logs, tmp_path / "other.ulg", "-o", tmp_path / "trend")
+    assert said in cpfls(*words).stderr
+    asked = changed(cpfls, tmp_path, "other.ulg", "--anyway")
+    assert asked.exit_code in (0, 1, 3)
+    assert f"{said}, and are compared anyway" in " ".join(asked.stderr.split())
+    # What `import` makes of a log keeps what it says of its vehicle.
+    flown = tmp_path / "other.h5"
+    assert cpfls("import", tmp_path / "study.yaml", tmp_path / "other.ulg", "-o", flown).exit_code == 0
+    assert "are of different vehicles" in changed(cpfls, tmp_path, "other.h5").stderr
