@@ -68,7 +68,7 @@ def _next(job: Job, proposal: Proposal, given: Sequence[Path]) -> Iterator[Comma
     Logs whose rotors carry something else are played back along, which shows how far off the same vehicle is there.
     """
     # Many logs are taken as they are.
-    as_logs = bool(proposal.rotors) and len(given) > _IMPORTED
+    as_logs = proposal.has_rotors and len(given) > _IMPORTED
     named = list(given) if as_logs else [job.beside(name) for name in _flight_names(given)]
     for log, flight in zip([] if as_logs else given, named, strict=False):
         yield ("cpfls", "import", job.output, log, "-o", flight)
@@ -76,7 +76,7 @@ def _next(job: Job, proposal: Proposal, given: Sequence[Path]) -> Iterator[Comma
     flights = [flight for log, flight in zip(given, named, strict=True) if log in equal]
     others = [flight for flight in named if flight not in flights]
     learned, judged = (flights[:-1], flights[-1:]) if len(flights) > 1 else (flights, [])
-    if proposal.rotors:
+    if proposal.has_rotors:
         apart = [word for flight in judged for word in ("--held-out", flight)]
         yield ("cpfls", "vehicle", job.output, *learned, *apart, "-o", job.beside("vehicle.h5"))
         if others:

@@ -69,10 +69,10 @@ class LogTable:
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
 
-    def require_long_enough(self, span_s: float) -> None:
-        """Refuse a log, or what of it holds a flight, that is too short to be one."""
+    def require_long_enough(self, span_s: float, does: str = "holds") -> None:
+        """Refuse a log, or what of it holds a flight or flies, that is too short to be one."""
         if span_s < _SHORTEST_S:
-            raise InputError(f"holds only {span_s:.2g} s; a flight to learn from has at least ten")
+            raise InputError(f"{does} only {span_s:.2g} s; a flight to learn from has at least ten")
 
     def parts(self, column: str) -> tuple[str, str]:
         """Split a column into topic and field."""

@@ -14,7 +14,7 @@ from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
-from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
+from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.stated_vehicle import plain, stated_vehicle, vehicles_apart
 from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
@@ -133,6 +133,11 @@ class Proposal:
     def first(self) -> Recognition:
         """What the first log is taken for."""
         return self.logs[0].recognition
+
+    @property
+    def has_rotors(self) -> bool:
+        """Whether columns say what the rotors do, and not parameters alone where they are."""
+        return any(guess.signal in ROTORS for guess in self.signals)
 
     @property
     def states_torque(self) -> bool:

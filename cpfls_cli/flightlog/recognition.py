@@ -116,6 +116,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
     if not flown.flies:
         raise InputError(flown.reasons[0])
+    if flown.span_s is not None:
+        log.require_long_enough(flown.span_s[1] - flown.span_s[0], "flies for")
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
