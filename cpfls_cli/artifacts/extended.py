@@ -10,10 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
-from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
+from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.replay import trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.inertia import more_than_others, six_parameters
 from cpfls_cli.validation.trust import capped
 
 if TYPE_CHECKING:
@@ -106,8 +106,8 @@ class ExtendedRecord(ModelRecord):
 
     @property
     def impossible(self) -> tuple[str, ...]:
-        """Moments of inertia of no body, those of what it was built on among them."""
-        return of_no_body(self.vehicle)
+        """Moments of inertia that are more than the other two together; others are as stated, or as they were found."""
+        return tuple(f"inertia.{name}" for name in more_than_others(self.vehicle.inertia.tolist()))
 
     @property
     def summary(self) -> dict[str, Any]:
