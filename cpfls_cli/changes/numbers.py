@@ -111,6 +111,9 @@ _DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
 _CLEARLY = 3.0
 """Standard errors beyond which a ratio is said to be below 0."""
 
+_ABOVE = 1.96
+"""Standard errors by which a ratio is above 0 that has a logarithm: of exchanged rotors hardly any is left."""
+
 _COLLINEAR = 1e-9
 """Squared share of a signal of its own below which it goes with the others."""
 
@@ -367,11 +370,12 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
 def _logarithms(ratios: Array) -> Array:
     """Take logarithms of ratios of a whole flight and without each block, shape (1 and block, ...).
 
-    Of one that is clearly below 0 it is that of 0; of one that may be above it is not known.
+    Of one that is clearly below 0 it is that of 0; of one that may be 0 it is not known.
     """
-    below = ratios[0] < -_CLEARLY * jackknife_error(ratios[1:])
+    error = jackknife_error(ratios[1:])
+    below, above = ratios[0] < -_CLEARLY * error, (ratios[0] > _ABOVE * error) & (ratios > 0)
     with np.errstate(divide="ignore"):
-        return np.log(np.where(ratios > 0, ratios, np.where(below, 0.0, np.nan)))
+        return np.log(np.where(above, ratios, np.where(below, 0.0, np.nan)))
 
 
 def _delay_error(left_out: Array) -> Array:
