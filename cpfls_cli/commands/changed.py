@@ -118,7 +118,7 @@ def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[di
         elif same.partition("-")[0] != role.partition("-")[0]:
             also = "" if given[same].name == path.name else f", as {given[same]}"
             raise InputError(
-                f"{path}: is both a flight of today and one of the reference (--since){also}; leave it out of one"
+                f"{path}: is both a flight of today and one of the reference (--reference){also}; leave it out of one"
             )
         else:
             warnings.append(f"{path.name}: is given twice, also as {given[same].name}; counted once")

@@ -284,4 +284,4 @@ def _next(job: Job, record: TrendRecord, paths: Mapping[str, Path]) -> Command:
     start = int(record.shift.start[-1])
     after = [paths[name] for name in record.flight[start:][-_COMPARED:]]
     before = [paths[name] for name in record.flight[: min(record.reference, start)][-_BEFORE:]]
-    return go_on(job, "changed", *after, "--since", *before, output=job.beside("changed"))
+    return go_on(job, "changed", *after, "--reference", *before, output=job.beside("changed"))

@@ -9,7 +9,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.changed import ChangedRecord, FoundRecord
-from cpfls_cli.pages.change_words import cause_name, change_words, hover_words, smallest_words, what_to_check
+from cpfls_cli.pages.change_words import (
+    cause_name,
+    change_words,
+    hover_words,
+    number_meanings,
+    smallest_words,
+    what_to_check,
+)
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
@@ -286,7 +293,8 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
         frozenset({0, 1}),
         legend="Differs by: what flights of one day are off the reference by where nothing changed, one standard "
         "deviation; deviations: today less the reference in these; limit: beyond it has changed; so high for the few "
-        "flights that tell what it differs by, and the many numbers that are asked.",
+        "flights that tell what it differs by, and the many numbers that are asked. "
+        f"{sentence(number_meanings(record.number))}",
     )
     shows = zip(record.shows.cause, record.shows.smallest.tolist(), strict=True)
     caption = "The smallest change of each kind that shows in 9 of 10 days like this one."

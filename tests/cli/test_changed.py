@@ -131,7 +131,7 @@ def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
 def test_what_a_user_gets_wrong_is_refused(cpfls, refuse, folder, tmp_path):
     study, same, before = folder / "study.yaml", folder / "same.csv", folder / "before1.csv"
     (message,) = refuse("changed", study, same, before, "--since", before, "-o", tmp_path / "out")
-    assert message.endswith("is both a flight of today and one of the reference (--since); leave it out of one")
+    assert message.endswith("is both a flight of today and one of the reference (--reference); leave it out of one")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").write_text("mine")
     (message,) = refuse("changed", study, same, "--since", before, "-o", tmp_path / "full")
