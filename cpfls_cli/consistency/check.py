@@ -19,6 +19,7 @@ from cpfls_cli.consistency.sensors import Sensors, sensors_of
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
+from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
 
 _HANGS = -0.5
@@ -26,6 +27,10 @@ _HANGS = -0.5
 
 _SHORT_S = 5.0
 """A shorter part is no log with a take-off and a landing."""
+
+_WEIGHED_S, _WEIGHED = 10.0, (0.7, 5.0)
+"""Seconds in which nobody falls or climbs enough to feel less than the first share of gravity on average (that takes
+30 m/s), or pulls the second without an end."""
 
 ENOUGH = 50_000
 """Samples that tell units, axes and which rotor is where."""
@@ -88,6 +93,8 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
     yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
+    if parts[0].attitude is None:
+        yield _unlike_gravity(max(_middle(parts), key=len))
     if hangs is None:
         yield from beside_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
@@ -111,6 +118,21 @@ def _upside_down(parts: Sequence[Signals]) -> Finding | None:
         "check import.world_frame, import.body_frame and the order of the quaternion",
         ("attitude",),
         upright,
+    )
+
+
+def _unlike_gravity(part: Signals) -> Finding | None:
+    """Hold the accelerometer against gravity, which no other channel does where there is no attitude."""
+    if part.specific_force is None or len(part) * part.period < _WEIGHED_S:
+        return None
+    felt = float(np.linalg.norm(part.specific_force, axis=1).mean())
+    if _WEIGHED[0] < felt / STANDARD_GRAVITY < _WEIGHED[1]:
+        return None
+    return Finding(
+        f"its accelerometer feels {felt:.3g} m/s^2 on average, where gravity alone is {STANDARD_GRAVITY:.3g}",
+        "check import.signals.acceleration, its unit and scale",
+        ("acceleration",),
+        felt / STANDARD_GRAVITY,
     )
 
 

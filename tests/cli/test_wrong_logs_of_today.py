@@ -111,3 +111,12 @@ def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
     flown = tmp_path / "other.h5"
     assert cpfls("import", tmp_path / "study.yaml", tmp_path / "other.ulg", "-o", flown).exit_code == 0
     assert "are of different vehicles" in changed(cpfls, tmp_path, "other.h5").stderr
+
+
+def test_without_attitude_gravity_tells_the_unit_of_the_accelerometer(cpfls, by_torque):
+    result = changed(cpfls, by_torque, "same.csv", "--set", "import.signals.acceleration.unit=g")
+    assert result.exit_code == 3, result.output
+    said = " ".join(result.stdout.split())
+    assert said.startswith("CANNOT TELL: The log contradicts itself: ")
+    assert "its accelerometer feels 9" in said
+    assert "where gravity alone is 9.81: check import.signals.acceleration, its unit and scale" in said
