@@ -17,10 +17,8 @@ from cpfls_cli.changes.reference import (
     Reference,
     either,
     expected_covariance,
-    furthest,
     kinds_of,
     learned_covariance,
-    number_limits,
 )
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -155,11 +153,25 @@ def trend(
         held.mean,
         apart,
         deviation,
-        limit=float(number_limits(held.freedom, asked).max()),
-        p_value=either(of_points, furthest((apart / deviation)[first:], held.freedom, asked)),
+        limit=_limit(held.freedom, asked),
+        p_value=either(of_points, _as_far(held.freedom, asked, float(np.abs(apart / deviation)[first:].max()))),
         shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
     )
+
+
+def _as_far(freedom: Array, flights: int, deviations: float) -> float:
+    """Compute at most how probable it is that any number of so many unchanged flights is as far off."""
+    # Slow to load, and who reads a record computes nothing.
+    from scipy.special import stdtr
+
+    return float(2 * flights * stdtr(freedom, -deviations).sum())
+
+
+def _limit(freedom: Array, flights: int) -> float:
+    """Find the deviations that some number of an unchanged flight exceeds at the rate of `EACH_TEST` at most."""
+    limits = np.geomspace(1.0, 1e4, 4000)
+    return float(next((each for each in limits if _as_far(freedom, flights, each) <= EACH_TEST), limits[-1]))
 
 
 def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:

@@ -9,7 +9,7 @@ from scipy.special import stdtrit
 from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
-from cpfls_cli.changes.reference import Reference
+from cpfls_cli.changes.reference import EACH_TEST, Reference
 from cpfls_cli.changes.trend import most_told, trend
 from cpfls_cli.commands.changed import units_of
 from cpfls_cli.errors import InputError
@@ -150,3 +150,11 @@ def test_a_flight_that_has_a_ratio_reversed_is_a_change():
     found = trend(given, QUAD, np.random.default_rng(1))
     assert found.left_out == ("flight10",)
     assert found.reversed == ("flight10: late yaw reversed, or nothing",)
+
+
+def test_the_probability_and_the_limit_are_one_rule():
+    """A number is beyond the limit of all just where the probability of that is half the rate of false alarms."""
+    freedom = np.array([4.0, 4.0, 30.0, 30.0])
+    limit = module._limit(freedom, 3)
+    assert module._as_far(freedom, 3, limit) == pytest.approx(EACH_TEST, rel=0.02)
+    assert module._as_far(freedom, 3, 0.99 * limit) > EACH_TEST
