@@ -199,7 +199,9 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
     values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
     height = rate = None
     if "position" in values:
-        height = values["position"][:, 2] / (1000 if first["position"].unit == "mm" else 1)
+        named = first["position"]
+        up = -1.0 if named.frame == "NED" else 1.0
+        height = up * values["position"][:, 2] / (1000 if named.unit == "mm" else 1)
     if "body_rate" in values:
         unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(values["body_rate"]), 0.99)) > _FASTEST_RAD_S
         rate = values["body_rate"] / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)

@@ -6,6 +6,7 @@ import pytest
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import find_flown, rotor_shares
 from tests.builders import ended_flights as ended
+from tests.builders.topic_logs import ardupilot, proposed
 from tests.builders.unknown_logs import flight
 
 HIGH = np.array([0.0, 0.0, 30.0])
@@ -88,3 +89,13 @@ def test_what_only_shakes_on_a_bench_does_not_fly(own, known):
     bench.specific_force = np.array([0.0, 0.0, 9.81]) + 0.5 * rng.standard_normal(own.rate.shape)
     found = flown(bench, known)
     assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
+
+
+def test_height_of_an_autopilot_that_counts_downward(own):
+    """Without an accelerometer only the height tells that rotors stop in the air."""
+    topics = ardupilot(ended.stops_in_the_air(own))
+    topics = {name: fields for name, fields in topics.items() if not name.startswith("ESC")}
+    topics["IMU"] = {name: values for name, values in topics["IMU"].items() if not name.startswith("Acc")}
+    functions = {f"SERVO{output}_FUNCTION": 28.0 + output for output in range(5, 9)}
+    found = proposed(topics, "ArduCopter 4.3.0", functions).logs[0].recognition.flown
+    assert found.ended.startswith("the rotors stop in the air at ")
