@@ -354,7 +354,8 @@ def _span(prefix: str, outputs: Sequence[int], parameters: Parameters) -> tuple[
 def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int, str]:
     """List outputs that do not move as a motor does, with the reason: a camera, a gimbal or a landing gear.
 
-    What drives a motor changes as often as what drives the others, and stands at its least while they stand before they fly.
+    What drives a motor changes as often as what drives the others, and stands at its least while they do before they
+    fly.
     """
     if len(moving) <= _FEWEST:
         return {}
