@@ -46,8 +46,9 @@ _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
 """Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 range of leans above which a vehicle moves."""
 
-_FAR_RAD, _PUSHED = 0.2, 0.3
-"""Ranges of leans and of slow forces, in weights, of what surely moves."""
+_FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
+"""Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
+of the height that is estimated for it."""
 
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 """Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
@@ -267,19 +268,21 @@ def _quiet(rate: Array, period: float) -> BoolArray:
 def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
-    moves = height is not None and float(np.ptp(height[active])) > _STILL_M
+    rises = 0.0 if height is None else float(np.ptp(height[active]))
     if signs.turning is None or signs.slow is None:
-        return height is not None and not moves
+        return height is not None and rises <= _STILL_M
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    leans = _leans(signs, active)
-    if leans is not None:
-        shakes = shakes and leans < _LEANS_RAD
-    if turning < _STILL_RAD_S or (turning < _SOFT_RAD_S and leans is not None and leans < _LEANS_RAD):
+    leans, pushed = _leans(signs, active), _pushed(signs, active)
+    level = leans is not None and leans < _LEANS_RAD
+    # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
+    drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
+    if turning < _STILL_RAD_S:
         return True
-    return not moves and (shakes or (turning < _SOFT_RAD_S and height is not None))
+    soft = turning < _SOFT_RAD_S and height is not None
+    return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:
@@ -290,17 +293,23 @@ def _leans(signs: Signs, active: BoolArray) -> float | None:
     return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
 
 
+def _pushed(signs: Signs, active: BoolArray) -> float | None:
+    """Give the range of what an accelerometer feels, in weights, without vibration."""
+    edge = round(SLOW_S / signs.period)
+    if signs.felt is None or not active[edge : len(active) - edge].any():
+        return None
+    felt = averaged(signs.felt, signs.period, SLOW_S)
+    return float(np.ptp(felt[edge : len(felt) - edge][active[edge : len(felt) - edge]], axis=0).max())
+
+
 def _dead_rates(signs: Signs) -> bool:
-    """Tell whether body rates deny what leans and forces show."""
+    """Tell whether body rates deny what leans, forces or height show."""
     if signs.turning is None or float(np.sqrt(np.mean(signs.turning**2))) > _STILL_RAD_S:
         return False
     everywhere = np.ones(len(signs.time), dtype=bool)
-    if (_leans(signs, everywhere) or 0.0) > _FAR_RAD:
-        return True
-    if signs.felt is None:
-        return False
-    felt = averaged(signs.felt, signs.period, SLOW_S)
-    return float(np.ptp(np.quantile(felt, [0.05, 0.95], axis=0), axis=0).max()) > _PUSHED
+    rises = 0.0 if signs.height is None else float(np.ptp(signs.height))
+    leans, pushed = _leans(signs, everywhere) or 0.0, _pushed(signs, everywhere) or 0.0
+    return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
