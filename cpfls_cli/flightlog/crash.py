@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, binary_opening
 
-from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.units import STANDARD_GRAVITY
 
 ALIVE = 0.02
@@ -40,6 +40,10 @@ _THEN_S, _LIES_S = 1.0, 3.0
 _BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
 """Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes."""
 
+_STRAINED_RAD_S, _STRAINED_RAD, _AT_LIMIT = 1.0, 0.5, 0.95
+"""Rate and lean beyond those of the flight before, at least, by which control is lost where a rotor is at its limit,
+as a share of the largest command."""
+
 _TURN_S, _NOT_FOLLOWED = 0.1, 0.7
 """Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does
 not follow them."""
@@ -56,7 +60,7 @@ class Signs:
     Attributes
     ----------
     time : array, shape (time,), s
-        From 0.
+        As it is said.
     rotors : array, shape (time, rotor), or None
         Commands or speeds as shares, 0 where they stand.
     height : array, shape (time,), m, or None
@@ -216,27 +220,58 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
     first, after = part
     rests_then = bool(rests.carried[after : after + 1].any())
     lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
-    time = signs.time
-    wild, hard = _beyond_flight(signs, part, lies_then=lies_then)
-    troubled = first + np.flatnonzero(wild)
+    trouble = _beyond_flight(signs, part, lies_then=lies_then)
+    troubled, hits = first + np.flatnonzero(trouble.wild), first + np.flatnonzero(trouble.hard)
+    stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
+    # What falls since its rotors stopped hits the ground later.
+    lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
     # Who ends the log in a flip has lost nothing.
-    if lost and (after < len(time) or hard.any() or _ignores_rotors(signs, part, int(troubled[0]))):
-        apart = np.flatnonzero(np.diff(troubled) * signs.period > _AT_ONCE_S)
-        begin = int(troubled[apart[-1] + 1 if len(apart) else 0])
-        hits = first + np.flatnonzero(hard)
-        hits = hits[np.abs(hits - begin) * signs.period < _AT_ONCE_S / 2]
-        begin = min(begin, int(hits[0])) if len(hits) else begin
-        return EarlyEnd(min(begin, after), f"{'impact' if len(hits) else 'loss of control'} at {time[begin]:.1f} s")
+    if lost and (after < len(signs.time) or len(hits) or _ignores_rotors(signs, part, int(troubled[0]))):
+        return _crash(signs, troubled, hits, first + np.flatnonzero(trouble.strained), after)
     if rests_then:
-        return EarlyEnd(after, f"from {time[after]:.1f} s on it rests on something, with its rotors on")
-    if _stops_in_the_air(signs, after):
-        return EarlyEnd(after, f"the rotors stop in the air at {time[after]:.1f} s")
+        return EarlyEnd(after, f"from {signs.time[after]:.1f} s on it rests on something, with its rotors on")
+    if stops:
+        hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
+        onto = "" if hit is None else f", impact at {signs.time[hit]:.1f} s"
+        return EarlyEnd(after, f"the rotors stop in the air at {signs.time[after]:.1f} s{onto}")
     return None
 
 
-def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray]:
-    """Mark, from the first sample of a stretch on, motion and force near its end that the flight before never had."""
+def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray, after: int) -> EarlyEnd:
+    """Say where a crash began: where it hit, or lost control before that."""
+    begin = _last_burst(troubled, signs.period)
+    struck = hits[(hits - begin) * signs.period > -_AT_ONCE_S / 2]
+    at_once = len(struck) > 0 and (struck[0] - begin) * signs.period < _AT_ONCE_S / 2
+    begin = min(begin, int(struck[0])) if at_once else begin
+    origin = _last_burst(np.append(strained[strained < begin], begin), signs.period)
+    for fall, hit in _falls(signs):
+        if fall < origin and abs(hit - origin) * signs.period < _AT_ONCE_S / 2:
+            what = f"it falls freely from {signs.time[fall]:.1f} s on, impact at {signs.time[hit]:.1f} s"
+            return EarlyEnd(min(fall, after), what)
+    if at_once and origin == begin:
+        return EarlyEnd(min(begin, after), f"impact at {signs.time[begin]:.1f} s")
+    what = f"loss of control at {signs.time[origin]:.1f} s"
+    what += f", impact at {signs.time[struck[0]]:.1f} s" if len(struck) else ""
+    return EarlyEnd(min(origin, after), what)
+
+
+def _last_burst(samples: IntArray, period: float) -> int:
+    """Give the first sample of the last of those that follow each other at once."""
+    apart = np.flatnonzero(np.diff(samples) * period > _AT_ONCE_S)
+    return int(samples[apart[-1] + 1 if len(apart) else 0])
+
+
+class _Trouble(NamedTuple):
+    """What the flight before never had: motion, force, and motion with a rotor at its limit."""
+
+    wild: BoolArray
+    hard: BoolArray
+    strained: BoolArray
+
+
+def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> _Trouble:
+    """Mark motion and force near the end of a stretch that the flight before never had."""
     first, after = part
     last = min(round(_LAST_S / signs.period), (after - first) // 2)
     before = slice(first, after - last)
@@ -245,7 +280,7 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
     if signs.turning is None or (before.stop - first) * signs.period < _FEWEST_S:
-        return nothing, nothing
+        return _Trouble(nothing, nothing, nothing)
 
     def beyond(values: Array, least: float) -> BoolArray:
         most = float(np.max(values[before]))
@@ -253,14 +288,20 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
 
     assert signs.body_rate is not None, "it turns"
     spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
-    wild = beyond(signs.turning, _WILD_RAD_S)
+    wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
     if signs.upright is not None:
         up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
         # What never was upside down, and is.
         wild |= late & (up[first:stop] < 0) & bool((up[before] > 0).all())
+        strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
+    if signs.rotors is None:
+        strained = nothing
+    else:
+        strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
     hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
     # A touchdown jolts too; but then the vehicle stands on its feet.
-    return (wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild), hard
+    wild = wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild
+    return _Trouble(wild, hard, strained)
 
 
 def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
@@ -292,3 +333,13 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
         light = np.linalg.norm(signs.felt[second], axis=1) < _FALLS
         return any((b - a) * signs.period >= _FALL_S for a, b in runs(light))
     return False
+
+
+def _falls(signs: Signs) -> list[tuple[int, int]]:
+    """List where it falls freely, and where each fall ends with a jolt."""
+    if signs.felt is None:
+        return []
+    size, most = np.linalg.norm(signs.felt, axis=1), round(_FALL_S / signs.period)
+    long = [(first, after) for first, after in runs(size < _FALLS) if after - first >= most]
+    jolts = [(first, after + np.flatnonzero(size[after : after + most] > _HARD)) for first, after in long]
+    return [(first, int(own[0])) for first, own in jolts if len(own)]

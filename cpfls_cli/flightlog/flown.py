@@ -46,6 +46,10 @@ _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
 """Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 range of leans above which a vehicle moves."""
 
+_FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
+"""Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
+of the height that is estimated for it."""
+
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 """Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
 
@@ -57,6 +61,14 @@ _MOST_CLOCK_HZ = 50.0
 
 _FEWEST_ROWS = 10
 """Of which it can be told."""
+
+SHORTEST_FLIGHT_S = 2.0
+"""Below which nothing is a flight."""
+
+
+def too_short(span_s: float) -> str:
+    """Say that so many s are no flight."""
+    return f"only {span_s:.2g} s; a flight to learn from has at least ten"
 
 
 @dataclass(frozen=True)
@@ -84,11 +96,11 @@ class FlownPart:
     ended: str = ""
     used: str = ""
 
-    def within(self, ended: str, seconds: float) -> Self:
-        """Say that a part of so many s was looked at alone, since sources of the log ended there."""
+    def within(self, ended: str, looked_at: tuple[float, float]) -> Self:
+        """Say that a part, from and to s, was looked at alone, since sources of the log ended there."""
         if not ended or not self.flies:
             return self
-        span = self.span_s or (0.0, round(seconds, 2))
+        span = self.span_s or (round(looked_at[0], 2), round(looked_at[1], 2))
         words = f"the {span[1] - span[0]:.0f} s of flight in between are used"
         return replace(
             self,
@@ -116,32 +128,33 @@ def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[floa
     SettingError
         If nothing in it flies.
     """
-    flown, off = _flown_of(table, settings)
+    flown = _flown_of(table, settings)
     if not flown.flies:
         raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
-    span = None if flown.span_s is None else (flown.span_s[0] + off, flown.span_s[1] + off)
-    return span, flown.cut
+    return flown.span_s, flown.cut
 
 
 def warn_of_end(table: SignalTable, settings: ImportSettings) -> tuple[str, ...]:
     """Say how flight ends early in what a crop keeps."""
-    flown, _ = _flown_of(table, settings)
-    ended = flown.ended
-    return (f"{ended}, and import.crop_s keeps what comes after; import.crop_s: flown cuts it",) if ended else ()
+    flown = _flown_of(table, settings)
+    begin, end = flown.span_s or (-np.inf, np.inf)
+    if not flown.ended or max(begin - table.time[0], table.time[-1] - end) < _MARGIN_S:
+        return ()
+    return (f"{flown.ended}, and import.crop_s keeps what comes after; import.crop_s: flown cuts it",)
 
 
-def _flown_of(table: SignalTable, settings: ImportSettings) -> tuple[FlownPart, float]:
-    """Find what flies by the signals that a config maps, and the stamp that its spans count from."""
+def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
+    """Find what flies by the signals that a config maps, on the clock of the log."""
     rows, _ = increasing_rows(table.time)
     table = table.rows(rows)
-    live = live_rows(table)
+    live = live_rows(table, 0.0)
     table = table.rows(live.rows)
     if len(table.time) < _FEWEST_ROWS:
-        return FlownPart(None, ()), 0.0
+        return FlownPart(None, ())
     step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
     clock = np.arange(table.time[0], table.time[-1], step)
     if len(clock) < _FEWEST_ROWS:
-        return FlownPart(None, ()), 0.0
+        return FlownPart(None, ())
     known = {
         name: fill(table.time, table.signals[name], clock)
         for name in ("rotor_command", "rotor_speed", "position", "body_rate", "acceleration", "quaternion", "attitude")
@@ -153,7 +166,7 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> tuple[FlownPart, 
     senses = settings.acceleration_frame == "body-specific-force"
     flown = find_flown(
         Signs(
-            time=clock - clock[0],
+            time=clock,
             rotors=rotors,
             height=up * known["position"][:, 2] if "position" in known else None,
             body_rate=known.get("body_rate"),
@@ -161,12 +174,13 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> tuple[FlownPart, 
             force=known.get("acceleration") if senses else None,
         )
     )
-    return flown.within(live.ended, float(clock[-1] - clock[0])), float(clock[0])
+    return flown.within(live.ended, (float(clock[0]), float(clock[-1])))
 
 
 def find_flown(signs: Signs) -> FlownPart:
     """Find the stretches of a log that are flown, and the longest of them."""
     signs = signs.slower(_MOST_CLOCK_HZ)
+    signs = replace(signs, body_rate=None) if _dead_rates(signs) else signs
     active, told = _active(signs)
     if active is None:
         return FlownPart(None, (told,), flies=False)
@@ -254,19 +268,48 @@ def _quiet(rate: Array, period: float) -> BoolArray:
 def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
-    moves = height is not None and float(np.ptp(height[active])) > _STILL_M
+    rises = 0.0 if height is None else float(np.ptp(height[active]))
     if signs.turning is None or signs.slow is None:
-        return height is not None and not moves
+        return height is not None and rises <= _STILL_M
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    if signs.upright is not None:
-        upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
-        shakes = shakes and float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95]))) < _LEANS_RAD
+    leans, pushed = _leans(signs, active), _pushed(signs, active)
+    level = leans is not None and leans < _LEANS_RAD
+    # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
+    drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
     if turning < _STILL_RAD_S:
         return True
-    return not moves and (shakes or (turning < _SOFT_RAD_S and height is not None))
+    soft = turning < _SOFT_RAD_S and height is not None
+    return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
+
+
+def _leans(signs: Signs, active: BoolArray) -> float | None:
+    """Give the range of leans, rad, without their vibration."""
+    if signs.upright is None:
+        return None
+    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
+    return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
+
+
+def _pushed(signs: Signs, active: BoolArray) -> float | None:
+    """Give the range of what an accelerometer feels, in weights, without vibration."""
+    edge = round(SLOW_S / signs.period)
+    if signs.felt is None or not active[edge : len(active) - edge].any():
+        return None
+    felt = averaged(signs.felt, signs.period, SLOW_S)
+    return float(np.ptp(felt[edge : len(felt) - edge][active[edge : len(felt) - edge]], axis=0).max())
+
+
+def _dead_rates(signs: Signs) -> bool:
+    """Tell whether body rates deny what leans, forces or height show."""
+    if signs.turning is None or float(np.sqrt(np.mean(signs.turning**2))) > _STILL_RAD_S:
+        return False
+    everywhere = np.ones(len(signs.time), dtype=bool)
+    rises = 0.0 if signs.height is None else float(np.ptp(signs.height))
+    leans, pushed = _leans(signs, everywhere) or 0.0, _pushed(signs, everywhere) or 0.0
+    return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
@@ -277,11 +320,13 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
         for (first, after), end in zip(stretches, ends, strict=True)
     ]
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
+    if cut[chosen][1] - cut[chosen][0] < SHORTEST_FLIGHT_S:
+        return FlownPart(None, (f"flies for {too_short(cut[chosen][1] - cut[chosen][0])}",), flies=False)
     (first, after), (begin, end) = stretches[chosen], cut[chosen]
     reasons = []
     early = [(index, each) for index, each in enumerate(ends) if each is not None]
     if first > 0 and not any(index < chosen for index, _ in early):
-        reasons.append(f"the first {begin:.1f} s are cut: {_how(signs, slice(0, first), told)}")
+        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), told)}")
     if after < len(time) and ends[chosen] is None:
         last = float(time[-1]) - end
         reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), told)}")

@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
+from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, too_short
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
@@ -44,9 +45,6 @@ _SLOWEST_HZ = 0.5
 _FEWEST_SAMPLES = 20
 """For medians and rates."""
 
-_SHORTEST_S = 2.0
-"""Below which a log holds no flight."""
-
 _LARGEST_SPAN = 100
 """Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses."""
 _GRID_HZ = 100.0
@@ -69,10 +67,10 @@ class LogTable:
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
 
-    def require_long_enough(self, span_s: float, does: str = "holds") -> None:
-        """Refuse a log, or what of it holds a flight or flies, that is too short to be one."""
-        if span_s < _SHORTEST_S:
-            raise InputError(f"{does} only {span_s:.2g} s; a flight to learn from has at least ten")
+    def require_long_enough(self, span_s: float) -> None:
+        """Refuse a log, or what of it holds a flight, that is too short to be one."""
+        if span_s < SHORTEST_FLIGHT_S:
+            raise InputError(f"holds {too_short(span_s)}")
 
     def parts(self, column: str) -> tuple[str, str]:
         """Split a column into topic and field."""

@@ -113,11 +113,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
     shares = _shares(log, rotors)
-    flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
+    flown = find_flown(_signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
         raise InputError(flown.reasons[0])
-    if flown.span_s is not None:
-        log.require_long_enough(flown.span_s[1] - flown.span_s[0], "flies for")
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
@@ -156,7 +154,8 @@ def _live_part(
         name: np.column_stack([np.asarray(fields[column], dtype=float) for column in found[0].group.columns])
         for name, found in candidates.items()
     }
-    live = live_rows(SignalTable(log.clock(""), {str(name): values for name, values in leading.items()}))
+    clock = log.clock("")
+    live = live_rows(SignalTable(clock, {str(name): values for name, values in leading.items()}), float(clock[0]))
     if not live.ended:
         return log, candidates, ""
     part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)

@@ -46,9 +46,9 @@ _SAME = 0.02
 _SELDOM = 0.1
 """Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller."""
 
-_AT_REST, _STANDS_S, _AWAY = 0.02, 1.0, 0.25
-"""Share of its range from its least up to which an output stands, how long the motors have to stand for it to be known
-from which on, s, and the share away from it that no motor has then."""
+_AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
+"""Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
+to stand for it to be known from which on, s, and the share away from it that no motor has then."""
 
 _PX4_MOTORS = range(101, 113)
 """Values of *_FUNCn of PX4 that are its motors."""
@@ -354,7 +354,8 @@ def _span(prefix: str, outputs: Sequence[int], parameters: Parameters) -> tuple[
 def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int, str]:
     """List outputs that do not move as a motor does, with the reason: a camera, a gimbal or a landing gear.
 
-    What drives a motor changes as often as what drives the others, and stands at its least while they stand.
+    What drives a motor changes as often as what drives the others, and stands at its least while they do before they
+    fly.
     """
     if len(moving) <= _FEWEST:
         return {}
@@ -366,13 +367,15 @@ def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int
         for index, share in enumerate(changes)
         if share < _SELDOM * float(np.median(changes))
     }
-    least = own.min(axis=0) + _AT_REST * np.ptp(own, axis=0)
-    resting = (own <= least).sum(axis=1) >= max(_FEWEST, (len(moving) + 1) // 2)
+    most = max(_FEWEST, (len(moving) + 1) // 2)
+    driven = (own - own.min(axis=0)) / np.ptp(own, axis=0)
     stands = np.zeros(len(time), dtype=bool)
-    for first, after in runs(resting):
-        stands[first:after] = time[after - 1] - time[first] >= _STANDS_S
+    # Before they first drive: a controller that lost its vehicle may hold one motor at full and all others at rest.
+    for first, after in runs((driven <= _AT_REST).sum(axis=1) >= most):
+        before = not ((driven[:first] > _DRIVES).sum(axis=1) >= most).any()
+        stands[first:after] = before and time[after - 1] - time[first] >= _STANDS_S
     if stands.any():
-        level = (np.median(own[stands], axis=0) - own.min(axis=0)) / np.ptp(own, axis=0)
+        level = np.median(driven[stands], axis=0)
         odd |= {
             moving[index]: "it stands away from its least while the motors stand: no motor"
             for index, share in enumerate(level)

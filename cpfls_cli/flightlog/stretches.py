@@ -205,10 +205,11 @@ class LiveRows:
     ended: str = ""
 
 
-def live_rows(table: SignalTable) -> LiveRows:
+def live_rows(table: SignalTable, origin: float) -> LiveRows:
     """Find where a source ended and its columns were extrapolated: straight lines, which noise never draws.
 
     Signals of sensors and rotors are asked; what a slow source draws from update to update is as short everywhere.
+    Times are said from an origin on.
     """
     first, after, ends, begins = 0, len(table.time), [], []
     for name in _WITNESSES & table.signals.keys():
@@ -218,7 +219,6 @@ def live_rows(table: SignalTable) -> LiveRows:
         first, after = max(first, begin), min(after, end)
     if after - first < _FEWEST_IN_PAUSE or not (ends or begins):
         return LiveRows(slice(0, len(table.time)))
-    origin = table.time[0]
     words = [
         f"{joined(sorted(names))} run in straight lines {side}, where their source was silent"
         for names, side in (

@@ -72,6 +72,20 @@ def tumbles(own):
     return then(own, 2.5, rate=17.0, felt=(0.0, 0.0, 1.0), rotors=ONE_AT_FULL, falls=7.0)
 
 
+def gives_way(own):
+    """Lean more and more with two rotors at full, swing, and hit the ground three seconds later."""
+    leans = then(own, 1.5, rate=0.8, felt=(0.0, 0.0, 9.0), rotors=(2.5, 0.9, 2.5, 0.9))
+    swings = then(
+        then(leans, 0.75, rate=-3.0, rotors=(2.5, 0.9, 1.2, 0.9)), 0.75, rate=3.0, rotors=(0.9, 0.9, 2.5, 1.0)
+    )
+    return hits(swings)
+
+
+def falls_and_hits(own):
+    """Cut the throttle in the air, fall with idling rotors, hit, and lie on the back with one motor at full."""
+    return hits(then(own, 0.6, felt=(0.0, 0.0, 0.5), rotors=0.08, falls=9.3))
+
+
 def turns_over(own):
     """Tip over when landing, slowly, and lie on the back with the rotors on."""
     tips = then(own, 1.0, rate=3.0, felt=(0.0, 7.0, 6.0), rotors=0.8)

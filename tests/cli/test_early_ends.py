@@ -45,6 +45,13 @@ def test_a_crash_is_said_first_and_cut(cpfls, tmp_path, crashed):
     )
 
 
+def test_a_crop_of_ones_own_is_warned_of_on_the_clock_of_the_log_and_only_if_flown_cuts_more(cpfls, tmp_path, crashed):
+    log, config, _ = proposed(cpfls, tmp_path, crashed)
+    first = imported(cpfls, config, log, [10.0, 45.0]).splitlines()[0]
+    assert first.startswith("cpfls: note: impact at 40.0 s, and import.crop_s keeps what comes after")
+    assert "import.crop_s: flown" not in imported(cpfls, config, log, [10.0, 40.2])
+
+
 def test_columns_that_run_on_in_straight_lines_are_cut_where_their_source_ends(cpfls, tmp_path):
     contents = run_on(flat_log(flight(40.0)), 15.0, "gyro", "acc", "rpm")
     log, config, result = proposed(cpfls, tmp_path, contents)

@@ -48,6 +48,18 @@ def test_the_part_before_a_crash_is_used(own, ends, without_force, with_force, k
     assert found.reasons == ()
 
 
+def test_a_crash_begins_where_rotors_at_their_limit_no_longer_hold_it(own):
+    found = flown(ended.gives_way(own))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 0.6, abs=0.2))
+    assert found.ended == f"loss of control at {found.span_s[1] + 0.02:.1f} s, impact at 43.0 s"
+
+
+def test_a_fall_that_ends_with_a_jolt_is_an_impact(own):
+    found = flown(ended.falls_and_hits(own))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))
+    assert found.ended == "it falls freely from 40.0 s on, impact at 40.6 s"
+
+
 @pytest.mark.parametrize("known", [ALL, ("force",), ("upright",)])
 def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
     found = flown(ended.turns_over(own), known)
@@ -58,7 +70,8 @@ def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
 @pytest.mark.parametrize("known", [ALL, ("force",), ("height",)])
 def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
     found = flown(ended.stops_in_the_air(own), known)
-    assert found.ended == "the rotors stop in the air at 40.0 s"
+    hit = ", impact at 41.2 s" if "force" in known else ""
+    assert found.ended == f"the rotors stop in the air at 40.0 s{hit}"
     landed = ended.then(ended.then(own, 0.04, rate=1.0, felt=(0.0, 0.0, 40.0)), 5.0)
     assert flown(landed, known).ended == ""
 
@@ -99,3 +112,39 @@ def test_height_of_an_autopilot_that_counts_downward(own):
     functions = {f"SERVO{output}_FUNCTION": 28.0 + output for output in range(5, 9)}
     found = proposed(topics, "ArduCopter 4.3.0", functions).logs[0].recognition.flown
     assert found.ended.startswith("the rotors stop in the air at ")
+
+
+@pytest.mark.parametrize("known", [("height",), ("force",), ("upright",)])
+def test_dead_rates_deny_no_flight_that_leans_is_pushed_or_climbs(own, known):
+    dead = type(own)(**vars(own))
+    dead.position = own.position + np.outer(own.time, [0.0, 0.0, 1.0])
+    dead.rate, dead.specific_force = (
+        0.001 * own.rate,
+        own.specific_force * np.linspace(0.6, 1.4, len(own.time))[:, None],
+    )
+    assert flown(dead, known).flies
+
+
+def test_an_estimate_of_height_that_drifts_on_the_ground_is_no_flight(own):
+    rng = np.random.default_rng(1)
+    stands = type(own)(**vars(own))
+    stands.rate = 0.006 * rng.standard_normal(own.rate.shape)
+    stands.angles = 0.001 * rng.standard_normal(own.rate.shape)
+    stands.specific_force = np.array([0.0, 0.0, 9.81]) + 0.05 * rng.standard_normal(own.rate.shape)
+    stands.rate += 0.01 * np.sin(own.time)[:, None]
+    stands.position = np.outer(0.4 * np.sin(0.2 * own.time), [0.0, 0.0, 1.0])
+    found = flown(stands, ALL)
+    assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
+
+
+def test_a_climb_that_neither_turns_nor_leans_is_a_flight(own):
+    climbs = type(own)(**vars(own))
+    climbs.rate, climbs.angles = 0.006 * np.random.default_rng(1).standard_normal(own.rate.shape), 0 * own.angles
+    assert flown(climbs).flies
+
+
+def test_a_hop_is_no_flight():
+    hop = ended.joined(ended.then(flight(1.0), 10.0), ended.then(flight(1.5), 10.0))
+    found = flown(hop, ())
+    assert not found.flies
+    assert found.reasons[0].startswith("flies for only ")
