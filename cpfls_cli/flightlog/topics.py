@@ -206,6 +206,8 @@ def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]
 def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
     """Count how often a second each mapped signal was logged, by the stamps of its own topic, lost samples left out.
 
+    Pauses longer than `gap_s` count for none, where anything is logged without them: nothing is read of them.
+
     Parameters
     ----------
     settings : ImportSettings
@@ -217,7 +219,10 @@ def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
         own = topics.get(topic, {})
         if topic and name not in SETPOINTS and field in own and STAMP in own:
             time, _ = _present(own[STAMP], np.asarray(own[field], dtype=float))
-            rates[name] = (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else 0.0
+            steps = np.diff(time)
+            bridged = steps[steps <= settings.gap_s * _ROUNDING]
+            steps = bridged if len(bridged) else steps
+            rates[name] = float(1 / steps.mean()) if len(steps) else 0.0
     return rates
 
 
