@@ -270,3 +270,39 @@ def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
     assert together.clear
     assert max(late.explained[:2]) > 0.3
     assert not late.clear
+
+
+def test_a_flight_in_a_plane_turns_no_axis():
+    # An airplane that pitches up climbs and slows down: its lean pushes it backward, and y of all stands still.
+    time = np.arange(0.0, 30.0, 0.02)
+    pitch = 0.2 * np.sin(1.1 * time) + 0.1 * np.sin(2.3 * time)
+    velocity = np.column_stack([12.0 - 3.0 * np.sin(1.1 * time - 0.3), 0 * time, -2.0 * np.sin(1.1 * time)])
+    still = np.zeros_like(time)
+    force = np.column_stack([np.gradient(velocity[:, 0], time), still, np.full_like(time, -GRAVITY)])
+    log = {
+        "t": {"t": time},
+        "q": named(np.column_stack([np.cos(pitch / 2), still, np.sin(pitch / 2), still]), *Q),
+        "rate": named(np.column_stack([still, np.gradient(pitch, time), still]), *GYRO),
+        "force": named(force, *ACC),
+        "velocity": named(velocity, *SPEED),
+    }
+    own = {name: values for part in log.values() for name, values in part.items()}
+    proposal = propose([known_log("log", {"": own}, {}, {}, "")], None, None)
+    assert signal(proposal, "velocity").columns.sign is None
+    assert all(guess.columns.sign is None for guess in proposal.signals)
+    assert not any("opposite" in warning for warning in proposal.warnings)
+
+
+def test_axes_that_an_autopilot_states_are_not_turned():
+    topics = {
+        "vehicle_local_position": {
+            "timestamp": OWN.time,
+            **named(OWN.position @ NED.T, *PLACE),
+            **named(OWN.velocity @ NED.T * UP_DOWN, *SPEED),
+        },
+        "vehicle_angular_velocity": {"timestamp": OWN.time, **named(OWN.rate @ FLIP, "xyz[0]", "xyz[1]", "xyz[2]")},
+    }
+    log = known_log("log", topics, {}, {}, "PX4 1.14.0")
+    velocity = log.recognition.signal("velocity")
+    assert velocity.columns.sign is None
+    assert not any("opposite" in warning for warning in log.recognition.warnings)
