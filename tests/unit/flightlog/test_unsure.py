@@ -273,10 +273,10 @@ def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
 
 
 def test_a_flight_in_a_plane_turns_no_axis():
-    # An airplane that pitches up climbs and slows down: its lean pushes it backward, and y of all stands still.
+    # An airplane that climbs with more throttle gets faster with its nose up, as no rotor above it would have it.
     time = np.arange(0.0, 30.0, 0.02)
     pitch = 0.2 * np.sin(1.1 * time) + 0.1 * np.sin(2.3 * time)
-    velocity = np.column_stack([12.0 - 3.0 * np.sin(1.1 * time - 0.3), 0 * time, -2.0 * np.sin(1.1 * time)])
+    velocity = np.column_stack([12.0 - 3.0 * np.cos(1.1 * time), 0 * time, -2.0 * np.sin(1.1 * time)])
     still = np.zeros_like(time)
     force = np.column_stack([np.gradient(velocity[:, 0], time), still, np.full_like(time, -GRAVITY)])
     log = {
