@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.layouts import USUAL
 from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice
-from cpfls_cli.flightlog.settings import ColumnMap
+from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import capitalised, joined
@@ -189,16 +189,18 @@ def _rotors_in_words(proposal: Proposal) -> str:
             " them in import.signals (rotor_speed or rotor_command)"
             + (f"; else log them ({log_faster(system)})" if system else "")
         )
+    own = (guess.other_columns for guess in proposal.signals if guess.signal in ROTORS)
+    more = next((f", or more {rival.reason}" for rival in own if rival is not None), "")
     if proposal.airframe is None:
         unknown = (
             "neither parameters nor the motion say where they are; a log with more motion, given beside this one, may"
         )
-        return f"{proposal.rotors} rotors; {unknown}"
+        return f"{proposal.rotors} rotors{more}; {unknown}"
     places = ", ".join(
         f"M{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}"
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
-    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}"
+    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}{more}"
 
 
 def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:

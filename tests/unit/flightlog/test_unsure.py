@@ -306,3 +306,25 @@ def test_axes_that_an_autopilot_states_are_not_turned():
     velocity = log.recognition.signal("velocity")
     assert velocity.columns.sign is None
     assert not any("opposite" in warning for warning in log.recognition.warnings)
+
+
+def test_outputs_that_swing_against_the_rotors_are_no_rotors_for_sure():
+    pulses = 1000.0 + 1000.0 * OWN.speed / OWN.speed.max()
+    elevons = 1500.0 + 600.0 * OWN.angles[:, 1:2] + 900.0 * OWN.angles[:, :1] * [1, -1]
+    speed = named(np.hstack([pulses, elevons]), *(f"actuator_outputs[{index}]" for index in range(6)))
+    proposal = proposed(speed=speed)
+    rotors = signal(proposal, "rotor_command")
+    assert rotors.columns.columns == tuple(f"actuator_outputs[{index}]" for index in range(4))
+    assert rotors.sure == "guess"
+    assert "actuator_outputs[4] and actuator_outputs[5]" in rotors.rivals[0].reason
+    assert proposal.logs[0].recognition.load is None
+    assert proposal.airframe is None or proposal.airframe.is_guess
+
+
+def test_six_rotors_of_a_hexarotor_in_hover_are_all_rotors():
+    rng = np.random.default_rng(2)
+    turns = np.linspace(0, 2 * np.pi, 6, endpoint=False) + np.pi / 6
+    mixed = np.column_stack([0.05 * np.ones(6), np.sin(turns), 0.1 * np.cos(turns), 0.1 * (-1) ** np.arange(6)])
+    pulses = 1500.0 + 60.0 * (OWN.angles @ mixed[:, 1:].T) + 2.0 * rng.standard_normal((len(OWN.time), 6))
+    speed = named(pulses, *(f"actuator_outputs[{index}]" for index in range(6)))
+    assert proposed(speed=speed).rotors == 6
