@@ -179,11 +179,20 @@ def _unit(columns: ColumnMap) -> str:
     return f"{columns.unit}{scale}{offset}{sign}{mixed}"
 
 
+_SURFACE: Final = re.compile(r"aileron|elevator|rudder|elevon")
+
+
 def _rotors_in_words(proposal: Proposal) -> str:
     if proposal.states_torque:
         return "the log states a torque and no rotors"
     if not proposal.has_rotors:
         system = proposal.logs[0].system
+        surfaces = [name for name in proposal.first.unused if _SURFACE.search(name.lower())]
+        if len(surfaces) > 1:
+            return (
+                f"no column is recognised as a rotor's, and {joined(surfaces)} are by their names surfaces of an"
+                " airplane, or sticks: only vehicles that rotors carry are modelled"
+            )
         return (
             "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are, name"
             " them in import.signals (rotor_speed or rotor_command)"
