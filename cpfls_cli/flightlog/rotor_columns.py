@@ -15,6 +15,7 @@ from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.topics import logged_hz
 from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
@@ -193,7 +194,7 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     guess = Guess(signal="rotor_command", columns=mapped, reason=reason, sure="named")
     older = Rival("rotor_command_is: speed", "before 2022 the firmware passed what it had mixed to the motors")
     said = "a Crazyflie mixes thrusts, before it compensates for the battery"
-    command = RotorGuess(guess, 1 / float(np.median(np.diff(time))), "Crazyflie")
+    command = RotorGuess(guess, logged_hz(time), "Crazyflie")
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(
         speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command, "Crazyflie"))
@@ -264,7 +265,7 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
         rivals=rivals,
     )
     left_out = tuple(f"{column}: {why}" for column, why in chosen.others.items())
-    return RotorGuess(guess, 1 / float(np.median(np.diff(time))), named.known, left_out)
+    return RotorGuess(guess, logged_hz(time), named.known, left_out)
 
 
 class _Connected(NamedTuple):
