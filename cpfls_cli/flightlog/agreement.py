@@ -37,6 +37,9 @@ _AS_NAMED_IS_GOOD_ENOUGH = 0.02
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
 """Share that other axes than named have to explain, and how many times less they have to leave."""
 
+_STILL = 1e-3
+"""Share of the spread of the axis that moves most below which another hardly moves: its sign is that of noise."""
+
 _MOVES_RAD_S = 0.03
 """Rate below which noise and drift of an attitude are as large as its motion."""
 
@@ -110,7 +113,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     Returns
     -------
     AxisFit
-        As named where that is as good as the best, within 0.02 of explained share: axes that hardly move say nothing.
+        As named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
+        with one or two axes, a turn and a mirrored column look alike.
     """
     reference = reference - reference.mean(axis=0)
     measured = measured - measured.mean(axis=0)
@@ -129,7 +133,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     runner_up = max(value for axes, value in explained.items() if axes != best)
     # Other axes than the names say have to be clearly better.
     clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[named]) / _TIMES_BETTER
-    if not clearly or explained[named] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
+    moving = _all_move(reference) and _all_move(measured)
+    if not (moving and clearly) or explained[named] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
         best = named
         runner_up = max(value for axes, value in explained.items() if axes != best)
     # Noise in the reference makes the regression's gain small, that of the spreads does not.
@@ -146,6 +151,11 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
         float(explained[named]),
         (along[0], along[1], along[2]),
     )
+
+
+def _all_move(vectors: Array) -> bool:
+    spread = vectors.std(axis=0)
+    return bool(spread.min() > _STILL * spread.max())
 
 
 def slow(values: Array, rate_hz: float, cutoff_hz: float = SLOW_HZ) -> Array:
@@ -239,7 +249,8 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
     """Hold the acceleration over ground against the lean of a body in every order and with every sign of the columns.
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
-    in the world, which is the body's third axis where that points up and its opposite where it points down.
+    in the world, which is the body's third axis where that points up and its opposite where it points down. What moves
+    along one axis alone, such as an airplane in a plane, explains nothing.
 
     Parameters
     ----------
@@ -252,11 +263,12 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
     lean, ground = lean - lean.mean(axis=0), moving.horizontal - moving.horizontal.mean(axis=0)
     power, total = float((lean**2).sum()), float((ground**2).sum())
     cross = ground.T @ lean
+    told = _all_move(lean) and _all_move(ground)
     shares = {}
     for order in ((0, 1), (1, 0)):
         for first, second in product((1.0, -1.0), repeat=2):
             together = first * cross[order[0], 0] + second * cross[order[1], 1]
-            share = max(float(together), 0.0) ** 2 / (power * total) if power * total else 0.0
+            share = max(float(together), 0.0) ** 2 / (power * total) if told else 0.0
             shares[(order, (first, second))] = share
     rises = 0.0 if lift is None else _rises(moving.vertical, lift * np.abs(axis[:, 2]), rate_hz)
     return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))

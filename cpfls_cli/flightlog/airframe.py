@@ -19,6 +19,9 @@ from cpfls_cli.rounding import largest
 _ACCELERATION_HZ = 12.0
 """Below which torque and angular acceleration are compared: a controller answers slower, and noise is above."""
 
+_FAST_HZ = (6.0, 20.0)
+"""A band above that of most gusts and of a controller's answer to them: there the rotors are the cause of motion."""
+
 _LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
 _SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
 """Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough."""
@@ -264,7 +267,8 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     """Find out which of four rotors is where and which way it turns, from what the vehicle does.
 
     The angular acceleration about each axis is regressed on the rotors' torque in every numbering of an X and of a
-    plus; the one that explains most is taken.
+    plus; the one that explains most is taken. Where that is not clear, slow gusts and the answer to them may hide it:
+    then what is fast alone may say it, as a guess.
 
     Parameters
     ----------
@@ -291,12 +295,26 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     alike = layout.weights() * weights
     least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)
     clear = by_axes and bool((alike > least)[layout.weights() != 0].all())
+    band = ""
+    if not by_axes and rate_hz / 5 > 2 * _FAST_HZ[0]:
+        fast = [_shares(*each)[0] for each in _driven(body_rate, speed, rate_hz, is_command, *_FAST_HZ)]
+        quick = _chosen(_best_of(fast), ("X",))
+        if quick[2]:
+            (layout, explained, by_axes), band = quick, f" above {_FAST_HZ[0]:g} Hz"
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
     form = "an X" if layout.form == "X" else "a plus"
-    reason = f"the motion: as {form} in this order, the rotors explain {words} acceleration"
+    reason = f"the motion: as {form} in this order, the rotors explain {words} acceleration{band}"
     return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, by_axes, clear)
+
+
+def _best_of(tried: list[list[tuple[_RotorLayout, _Explained]]]) -> list[tuple[_RotorLayout, _Explained]]:
+    """Give of each layout what it explains about each axis with the lag that suits this axis best."""
+    return [
+        (same[0][0], (max(own[0] for _, own in same), max(own[1] for _, own in same), max(own[2] for _, own in same)))
+        for same in zip(*tried, strict=True)
+    ]
 
 
 def _chosen(
@@ -336,15 +354,28 @@ def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_comma
     return max(shares)
 
 
-def _driven(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> Iterator[tuple[Array, Array]]:
-    """Give what is fast enough of the angular acceleration and what drives it, with every lag and shift of rotors."""
-    cutoff = min(_ACCELERATION_HZ, rate_hz / 5)
+def _driven(
+    body_rate: Array,
+    speed: Array,
+    rate_hz: float,
+    is_command: bool,
+    lowest_hz: float = 0.0,
+    highest_hz: float = _ACCELERATION_HZ,
+) -> Iterator[tuple[Array, Array]]:
+    """Give a band of the angular acceleration and of what drives it, with every lag and shift of rotors."""
+    cutoff = min(highest_hz, rate_hz / 5)
+
+    def in_band(values: Array) -> Array:
+        return values - low_pass(values, rate_hz, lowest_hz, 2) if lowest_hz else values
+
     rate = low_pass(body_rate, rate_hz, cutoff, 2)
-    acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
+    acceleration = in_band(derivative(np.arange(len(rate)) / rate_hz, rate))
     squared = (speed / np.mean(speed)) ** 2
     # Motors follow a command late; stamps of a measured speed may be late or early.
     moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
-    moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
+    if not (is_command or lowest_hz):
+        # Of what is fast such a shift is half a cycle, and turns its sign.
+        moved += [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     edge = max(1, len(rate) // 50)
     inner = slice(edge, len(rate) - edge)
     # What turning itself does to the acceleration, and a constant torque, are not the work of the rotors.
@@ -352,7 +383,7 @@ def _driven(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) ->
     for own in moved:
         wanted, rotors = (
             values[inner] - basis @ (basis.T @ values[inner])
-            for values in (acceleration, low_pass(own, rate_hz, cutoff, 2))
+            for values in (acceleration, in_band(low_pass(own, rate_hz, cutoff, 2)))
         )
         yield wanted, rotors
 

@@ -264,10 +264,12 @@ def _tell_place(
             unit, sure = units[gain > 100], "data" if gain > 100 else "guess"
             reason += f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit}"
             seen.disagree(named, unit, "judged by tilt and gravity, it is in")
-    order, sign = AS_NAMED if tilt is None else (tilt.place_order, tilt.place_sign)
+    # The kind of log states its axes.
+    free = named.frame is None
+    order, sign = (tilt.place_order, tilt.place_sign) if free and tilt is not None else AS_NAMED
     if named.signal == "velocity" and follows and relative is not None:
         reason += f"; the position's derivative explains {100 * relative.explained:.0f} % of it"
-        order, sign = _behind(relative, order, sign)
+        order, sign = _behind(relative, order, sign) if free else AS_NAMED
     if (order, sign) != AS_NAMED:
         reason += "; rotated into the axes of the attitude, as the tilt requires"
     seen.tell(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)

@@ -29,6 +29,9 @@ _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 """Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long."""
 
+_SAME_RANGE: Final = 0.01
+"""Share of the range of commands by which its ends may differ: a stick is calibrated anew to a few us."""
+
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
 
@@ -312,18 +315,38 @@ def _require_same_map(
     """Refuse two maps of a signal that both logs are sure of."""
     first, kept = surest
     sure = [(one, guess) for one, guess in others if "guess" not in (guess.sure, kept.sure)]
-    read = [(one, replace(guess.columns, required=True)) for one, guess in sure]
-    for (second, columns), (_, guess) in zip(read, sure, strict=True):
-        if columns == replace(kept.columns, required=True):
+    own = replace(kept.columns, required=True)
+    read = [(one, _as_read(replace(guess.columns, required=True), own)) for one, guess in sure]
+    for second, columns in read:
+        if columns == own:
             continue
         maps = [
-            f"{', '.join(g.columns.columns)} in {g.columns.unit} (sign {g.columns.sign or 'as logged'}) in {one.name}"
-            for one, g in (surest, (second, guess))
+            f"{', '.join(each.columns)} in {_unit_in_words(each)} (sign {each.sign or 'as logged'}) in {one.name}"
+            for one, each in ((first, own), (second, columns))
         ]
         raise InputError(
             f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both:"
             f" {_way_on(read)}"
         )
+
+
+def _as_read(columns: SignalMap, first: SignalMap) -> SignalMap:
+    """Give a map with the scale and offset of the first one, where the ranges of commands are next to the same."""
+    apart = np.abs(np.subtract(_span(columns), _span(first))).max()
+    same = columns.unit == first.unit == "1" and apart < _SAME_RANGE * np.ptp(_span(first))
+    return replace(columns, scale=first.scale, offset=first.offset) if same else columns
+
+
+def _span(columns: SignalMap) -> tuple[float, float]:
+    """Give the logged numbers that are 0 and 1."""
+    return -columns.offset / columns.scale, (1 - columns.offset) / columns.scale
+
+
+def _unit_in_words(columns: SignalMap) -> str:
+    if columns.unit == "1" and columns.offset:
+        low, high = _span(columns)
+        return f"shares from {low:.6g} to {high:.6g}"
+    return columns.unit + (f" x {columns.scale:.4g}" if columns.scale != 1.0 else "")
 
 
 def _way_on(read: Sequence[tuple[KnownLog, object]]) -> str:

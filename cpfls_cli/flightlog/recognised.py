@@ -45,6 +45,11 @@ class Guess:
     sure: Sure
     rivals: tuple[Rival, ...] = ()
 
+    @property
+    def other_columns(self) -> Rival | None:
+        """Columns that may be its own too, so that their number is a guess."""
+        return next((rival for rival in self.rivals if rival.text.startswith("columns: [")), None)
+
 
 @dataclass(frozen=True)
 class KeyChoice:

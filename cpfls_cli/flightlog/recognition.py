@@ -338,10 +338,14 @@ def _tell_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedB
     if seen.choices["body_frame"].value == "FRD":
         body = body * np.array([1.0, -1.0, -1.0])
     moved = airframe_from_motion(body, speeds, seen.rate_hz, rotors.speed is None)
-    if moved is not None and "guess" in (rate.sure, seen.choices["body_frame"].sure):
+    if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or _open_rotors(seen)):
         # Whose axes are not known says left for right.
         moved = replace(moved, clear=False, airframe=replace(moved.airframe, sure="guess"))
     return speeds, moved
+
+
+def _open_rotors(seen: Seen) -> bool:
+    return any(seen.guesses[name].other_columns is not None for name in ROTORS if name in seen.guesses)
 
 
 def _load(seen: Seen, speeds: Array) -> Load | None:
@@ -419,7 +423,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         kind=kind,
         moved=moved,
         speeds=speeds,
-        load=None if speeds is None else _load(seen, speeds),
+        load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
         warnings=tuple(seen.warnings),
         unused=_unused(log, (*signals, *asked), time_column),
     )

@@ -15,9 +15,11 @@ from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.topics import logged_hz
 from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
+from cpfls_cli.words import joined
 
 _FEWEST = 3
 """Rotors of a multirotor."""
@@ -49,6 +51,13 @@ _SELDOM = 0.1
 _AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
 """Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
 to stand for it to be known from which on, s, and the share away from it that no motor has then."""
+
+_RISES, _SWINGS, _SWING_S = 0.3, 2.5, 0.25
+"""Correlation with the others below which an output does not rise with them, and how many times as far as the others it
+swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another."""
+
+_FEWEST_BESIDE = 4
+"""Rotors of those whose columns hold more."""
 
 _PX4_MOTORS = range(101, 113)
 """Values of *_FUNCn of PX4 that are its motors."""
@@ -185,7 +194,7 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     guess = Guess(signal="rotor_command", columns=mapped, reason=reason, sure="named")
     older = Rival("rotor_command_is: speed", "before 2022 the firmware passed what it had mixed to the motors")
     said = "a Crazyflie mixes thrusts, before it compensates for the battery"
-    command = RotorGuess(guess, 1 / float(np.median(np.diff(time))), "Crazyflie")
+    command = RotorGuess(guess, logged_hz(time), "Crazyflie")
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(
         speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command, "Crazyflie"))
@@ -237,6 +246,10 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
     if len(columns) == _FEWEST and still and not chosen.stated:
         every = f"columns: [{', '.join(named.group.columns)}]"
         sure, rivals = "guess", (*rivals, Rival(every, f"if {', '.join(still)}, which never changes, is a rotor's"))
+    if chosen.doubtful:
+        every = f"columns: [{', '.join((*columns, *chosen.doubtful))}]"
+        words = f"if {joined(chosen.doubtful)}, which do not rise with the others and swing further, are no servos"
+        sure, rivals = "guess", (Rival(every, words), *rivals)
     sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
     guess = Guess(
         signal=named.signal,
@@ -252,7 +265,7 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
         rivals=rivals,
     )
     left_out = tuple(f"{column}: {why}" for column, why in chosen.others.items())
-    return RotorGuess(guess, 1 / float(np.median(np.diff(time))), named.known, left_out)
+    return RotorGuess(guess, logged_hz(time), named.known, left_out)
 
 
 class _Connected(NamedTuple):
@@ -266,12 +279,15 @@ class _Connected(NamedTuple):
         What moves and is no motor, and why.
     span : tuple of float and str, or None
         Range of the outputs that their own parameters state, and the names of these.
+    doubtful : tuple of str
+        Outputs of `others` that may be motors all the same.
     """
 
     outputs: list[int]
     stated: bool
     others: dict[str, str]
     span: tuple[float, float, str] | None = None
+    doubtful: tuple[str, ...] = ()
 
 
 def _connected(found: Found, parameters: Parameters) -> _Connected:
@@ -298,7 +314,27 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
         motors = list(range(count))
         more = _not_motors(named, kept, motors, f"the frame has {count} motors")
         return _Connected(motors, True, others | more)
-    return _Connected(kept, False, others)
+    apart = [named.group.columns[index] for index in _swung_apart(time, values, kept)]
+    why = "it does not rise with the others and swings further: a servo?"
+    motors = [index for index in kept if named.group.columns[index] not in apart]
+    return _Connected(motors, False, others | dict.fromkeys(apart, why), doubtful=tuple(apart))
+
+
+def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:
+    """List outputs that swing far and not with the rest, which lifts: surfaces beside motors, where nothing says so."""
+    rows = max(1, round(_SWING_S / float(np.median(np.diff(time)))))
+    if len(kept) <= _FEWEST_BESIDE or len(time) < _FEWEST_SAMPLES + rows:
+        return []
+    own = values[:, kept]
+    changes = own[rows:] - own[:-rows]
+    sizes = np.quantile(np.abs(changes), 0.9, axis=0)
+    far = [index for index, size in enumerate(sizes) if size > _SWINGS * float(np.median(sizes)) > 0]
+    apart = []
+    for index in far:
+        common = np.median(np.delete(own, index, axis=1), axis=1)
+        if np.ptp(common) == 0 or np.corrcoef(common, own[:, index])[0, 1] < _RISES:
+            apart.append(kept[index])
+    return apart if len(kept) - len(apart) >= _FEWEST_BESIDE else []
 
 
 def _other_functions(named: Named, parameters: Parameters, moving: Sequence[int]) -> dict[int, str]:

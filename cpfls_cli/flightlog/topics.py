@@ -22,6 +22,9 @@ _ANGLES_THAT_JUMP = (0, 2)
 _STEPS_HELD = 3
 """Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
 
+_MOST_STEPS, _PAUSE_STEPS = 0.9, 2.5
+"""Share of the steps that none of the others is so many times as long as, unless it is a pause."""
+
 _ON_TIME = 0.01
 _THINNED = 1.5
 """Times as fast that a topic has to be for its thinning to matter."""
@@ -217,8 +220,23 @@ def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
         own = topics.get(topic, {})
         if topic and name not in SETPOINTS and field in own and STAMP in own:
             time, _ = _present(own[STAMP], np.asarray(own[field], dtype=float))
-            rates[name] = (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else 0.0
+            rates[name] = logged_hz(time)
     return rates
+
+
+def logged_hz(time: Array) -> float:
+    """Count how often a second there is a sample, lost ones and pauses left out; 0 where there are fewer than two.
+
+    Parameters
+    ----------
+    time : array, shape (sample,), s
+        A pause, such as before arming, is far longer than most steps.
+    """
+    steps = np.diff(time)
+    if not len(steps):
+        return 0.0
+    usual = float(np.quantile(steps, _MOST_STEPS, method="lower"))
+    return float(1 / steps[steps <= _PAUSE_STEPS * usual].mean())
 
 
 def _step(time: Array) -> float:

@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.layouts import USUAL
 from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice
-from cpfls_cli.flightlog.settings import ColumnMap
+from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import capitalised, joined
@@ -179,26 +179,37 @@ def _unit(columns: ColumnMap) -> str:
     return f"{columns.unit}{scale}{offset}{sign}{mixed}"
 
 
+_SURFACE: Final = re.compile(r"aileron|elevator|rudder|elevon")
+
+
 def _rotors_in_words(proposal: Proposal) -> str:
     if proposal.states_torque:
         return "the log states a torque and no rotors"
     if not proposal.has_rotors:
         system = proposal.logs[0].system
+        surfaces = [name for name in proposal.first.unused if _SURFACE.search(name.lower())]
+        if len(surfaces) > 1:
+            return (
+                f"no column is recognised as a rotor's, and {joined(surfaces)} are by their names surfaces of an"
+                " airplane, or sticks: only vehicles that rotors carry are modelled"
+            )
         return (
             "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are, name"
             " them in import.signals (rotor_speed or rotor_command)"
             + (f"; else log them ({log_faster(system)})" if system else "")
         )
+    own = (guess.other_columns for guess in proposal.signals if guess.signal in ROTORS)
+    more = next((f", or more {rival.reason}" for rival in own if rival is not None), "")
     if proposal.airframe is None:
         unknown = (
             "neither parameters nor the motion say where they are; a log with more motion, given beside this one, may"
         )
-        return f"{proposal.rotors} rotors; {unknown}"
+        return f"{proposal.rotors} rotors{more}; {unknown}"
     places = ", ".join(
         f"M{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}"
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
-    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}"
+    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}{more}"
 
 
 def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:

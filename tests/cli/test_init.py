@@ -252,6 +252,14 @@ def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
     ]
 
 
+def test_surfaces_of_an_airplane_are_named_where_no_rotors_are(proposed, tmp_path, own):
+    surfaces = named(np.sin(own.time[:, None] * [1.0, 2.0]), "aileron", "elevator")
+    path = write_csv(tmp_path / "log.csv", flat_log(own, speed=surfaces))
+    said = " ".join(proposed(path, "--mass", MASS)[0].stdout.split())
+    assert "aileron and elevator are by their names surfaces of an airplane, or sticks: only vehicles" in said
+    assert "if some are" not in said
+
+
 def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tmp_path, own):
     path = write_csv(tmp_path / "log.csv", flat_log(own, speed=None))
     result, text, data = proposed(path, "--mass", MASS)

@@ -40,6 +40,16 @@ def test_rotors_that_turn_the_other_way_are_found():
     assert [rotor.spin for rotor in found.airframe.rotors] == [-spin for spin in spins]
 
 
+def test_gusts_that_turn_a_vehicle_slowly_hide_no_rotors():
+    own = flight(seconds=20.0, angle=0.01, highest_hz=12.0, noise=0.1, climb=0.1)
+    gusts = 10.0 * flight(seconds=20.0, seed=8, noise=0.0).rate
+    found = airframe_from_motion(own.rate + gusts, own.speed, 100.0, False)
+    assert [(rotor.name, rotor.spin) for rotor in found.airframe.rotors] == [(NAMES[hub[:2]], hub[2]) for hub in HUBS]
+    assert found.by_axes
+    assert found.airframe.is_asked
+    assert "above 6 Hz" in found.airframe.reason
+
+
 def test_noise_tells_no_rotors():
     noise = np.random.default_rng(1)
     found = airframe_from_motion(noise.normal(size=(3000, 3)), noise.normal(500, 5, (3000, 4)), 100.0, False)

@@ -93,6 +93,21 @@ def test_the_range_of_a_copter_is_that_of_its_motors_or_of_the_throttle_stick(ow
     assert command.sure == sure
 
 
+def two_sticks(own, *highest):
+    topics = copter(own, pulses(own))
+    return [
+        known_log(f"{high:g}", topics, {}, X | {"RC3_MIN": 1094.0, "RC3_MAX": high}, "ArduCopter 3.6.8")
+        for high in highest
+    ]
+
+
+def test_a_stick_that_is_calibrated_anew_makes_no_other_vehicle(own):
+    rotors = maps(propose(two_sticks(own, 1934.0, 1933.0), None, None))["rotor_command"]
+    assert (rotors.scale, rotors.offset) == pytest.approx((1 / 840, -1094 / 840))
+    with pytest.raises(InputError, match=r"shares from 1094 to 1934 .* and .* shares from 1094 to 1900 "):
+        propose(two_sticks(own, 1934.0, 1900.0), None, None)
+
+
 def px4(own, instances, parameters):
     """A log of PX4 with outputs of one or two instances."""
     turned = own.rotation

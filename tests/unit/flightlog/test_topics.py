@@ -242,3 +242,10 @@ def test_how_often_a_signal_was_logged_is_counted_by_the_stamps_of_its_topic():
     )
     assert stamped_rates(topics, settings) == pytest.approx({"body_rate": 250, "voltage": 7 / 3})
     assert stamped_rates({"": {"gyro.x": GYRO}}, settings) == {}
+
+
+def test_a_pause_makes_no_topic_slow():
+    flown = np.arange(0.0, 20.0, 0.1)
+    kept = np.concatenate([flown, 648.0 + flown])
+    settings = ImportSettings(time_column=None, torque_source=None, signals=signals(voltage=["battery.v"]))
+    assert stamped_rates({"battery": {"timestamp": kept, "v": kept}}, settings) == pytest.approx({"voltage": 10})

@@ -270,3 +270,61 @@ def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
     assert together.clear
     assert max(late.explained[:2]) > 0.3
     assert not late.clear
+
+
+def test_a_flight_in_a_plane_turns_no_axis():
+    # An airplane that climbs with more throttle gets faster with its nose up, as no rotor above it would have it.
+    time = np.arange(0.0, 30.0, 0.02)
+    pitch = 0.2 * np.sin(1.1 * time) + 0.1 * np.sin(2.3 * time)
+    velocity = np.column_stack([12.0 - 3.0 * np.cos(1.1 * time), 0 * time, -2.0 * np.sin(1.1 * time)])
+    still = np.zeros_like(time)
+    force = np.column_stack([np.gradient(velocity[:, 0], time), still, np.full_like(time, -GRAVITY)])
+    log = {
+        "t": {"t": time},
+        "q": named(np.column_stack([np.cos(pitch / 2), still, np.sin(pitch / 2), still]), *Q),
+        "rate": named(np.column_stack([still, np.gradient(pitch, time), still]), *GYRO),
+        "force": named(force, *ACC),
+        "velocity": named(velocity, *SPEED),
+    }
+    own = {name: values for part in log.values() for name, values in part.items()}
+    proposal = propose([known_log("log", {"": own}, {}, {}, "")], None, None)
+    assert signal(proposal, "velocity").columns.sign is None
+    assert all(guess.columns.sign is None for guess in proposal.signals)
+    assert not any("opposite" in warning for warning in proposal.warnings)
+
+
+def test_axes_that_an_autopilot_states_are_not_turned():
+    topics = {
+        "vehicle_local_position": {
+            "timestamp": OWN.time,
+            **named(OWN.position @ NED.T, *PLACE),
+            **named(OWN.velocity @ NED.T * UP_DOWN, *SPEED),
+        },
+        "vehicle_angular_velocity": {"timestamp": OWN.time, **named(OWN.rate @ FLIP, "xyz[0]", "xyz[1]", "xyz[2]")},
+    }
+    log = known_log("log", topics, {}, {}, "PX4 1.14.0")
+    velocity = log.recognition.signal("velocity")
+    assert velocity.columns.sign is None
+    assert not any("opposite" in warning for warning in log.recognition.warnings)
+
+
+def test_outputs_that_swing_against_the_rotors_are_no_rotors_for_sure():
+    pulses = 1000.0 + 1000.0 * OWN.speed / OWN.speed.max()
+    elevons = 1500.0 + 600.0 * OWN.angles[:, 1:2] + 900.0 * OWN.angles[:, :1] * [1, -1]
+    speed = named(np.hstack([pulses, elevons]), *(f"actuator_outputs[{index}]" for index in range(6)))
+    proposal = proposed(speed=speed)
+    rotors = signal(proposal, "rotor_command")
+    assert rotors.columns.columns == tuple(f"actuator_outputs[{index}]" for index in range(4))
+    assert rotors.sure == "guess"
+    assert "actuator_outputs[4] and actuator_outputs[5]" in rotors.rivals[0].reason
+    assert proposal.logs[0].recognition.load is None
+    assert proposal.airframe is None or proposal.airframe.is_guess
+
+
+def test_six_rotors_of_a_hexarotor_in_hover_are_all_rotors():
+    rng = np.random.default_rng(2)
+    turns = np.linspace(0, 2 * np.pi, 6, endpoint=False) + np.pi / 6
+    mixed = np.column_stack([0.05 * np.ones(6), np.sin(turns), 0.1 * np.cos(turns), 0.1 * (-1) ** np.arange(6)])
+    pulses = 1500.0 + 60.0 * (OWN.angles @ mixed[:, 1:].T) + 2.0 * rng.standard_normal((len(OWN.time), 6))
+    speed = named(pulses, *(f"actuator_outputs[{index}]" for index in range(6)))
+    assert proposed(speed=speed).rotors == 6
