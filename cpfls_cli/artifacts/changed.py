@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 CANNOT_TELL = "CANNOT TELL"
 """The verdict where no change would have shown, or a log is wrong."""
 
-_BESIDE = {"follow": "gusts", "scale": "drift"}
-"""Kinds of ratios, and those that a flight has beside them wherever it holds their channels."""
-
 _BY_CHANCE = ("late", "answer", "unbalance", "swing", "battery")
 """Kinds of which a good flight can hold too little."""
 
@@ -156,6 +153,11 @@ class ChangedRecord(FoundRecord):
     missing: tuple[str, ...] = dataset(
         "other numbers that every reference flight has, and not every one of today", "missing", default=()
     )
+    undetermined: tuple[str, ...] = dataset(
+        "ratios among these that are likelier zero or reversed today than what they are in the reference",
+        "undetermined",
+        default=(),
+    )
     contradiction: tuple[str, ...] = dataset(
         "what of the flights contradicts itself or its vehicle", "contradiction", default=()
     )
@@ -200,6 +202,7 @@ class ChangedRecord(FoundRecord):
             limit=change.limit,
             reversed=change.reversed,
             missing=change.missing,
+            undetermined=change.undetermined,
             contradiction=tuple(contradictions),
             false_alarm=false_alarm,
             named_from=named_from,
@@ -236,12 +239,6 @@ class ChangedRecord(FoundRecord):
         if self.contradiction or self.undetermined or not self.has_size:
             return CANNOT_TELL
         return "NO CHANGE SEEN" if self.short_of or self.lost else "NO CHANGE"
-
-    @property
-    def undetermined(self) -> list[str]:
-        """Ratios that today's flights hold the channels of, and which may be zero or reversed there."""
-        parts = ((name, *name.split()) for name in self.missing if name.split()[0] in _BESIDE)
-        return [name for name, kind, axis in parts if f"{_BESIDE[kind]} {axis}" in self.number]
 
     @property
     def lost(self) -> list[str]:

@@ -39,7 +39,8 @@ def kept_numbers(
     if kept is not None:
         return kept
     read = read_alone(flight, study)
-    told = flight_numbers(read.recording, read.full_voltage)
+    has_gyroscope = "body_rate" in read.flight.signals
+    told = flight_numbers(read.recording, read.full_voltage, has_gyroscope=has_gyroscope)
     made = FlightNumbersRecord.of(
         told,
         [KINDS[name.split()[0]].unit for name in told.values],
