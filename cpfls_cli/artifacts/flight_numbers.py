@@ -52,7 +52,9 @@ class FlightNumbersRecord(Record):
         "reversed",
         default=(),
     )
-    unsure: tuple[str, ...] = dataset("numbers whose ratio may be zero, so that they are not told", "unsure", default=())
+    unsure: tuple[str, ...] = dataset(
+        "numbers whose ratio may be zero, so that they are not told", "unsure", default=()
+    )
     unsure_ratio: Array | None = dataset("these ratios", "unsure", default=None)
     contradiction: tuple[str, ...] = dataset(
         "what of the flight contradicts itself or its vehicle", "contradiction", default=()

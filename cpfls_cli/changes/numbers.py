@@ -197,7 +197,9 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyros
                 unsure[each] = float(ratios[0][index])
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
     agility = _agility(signals, flies)
-    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below), unsure)
+    return FlightNumbers(
+        name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below), unsure
+    )
 
 
 def in_flight(signals: Signals) -> BoolArray:
@@ -217,9 +219,19 @@ def _agility(signals: Signals, flies: BoolArray) -> float:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or not inside.any():
         return float("nan")
-    assert signals.thrust is not None, "rotor speeds are there"
-    asked = own.average(signals.rotation[:, :, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None])[inside]
+    asked = own.average(_asked(signals, flies))[inside]
     return float(np.sqrt(((asked - asked.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def _asked(signals: Signals, flies: BoolArray) -> Array:
+    """Give the acceleration that attitude and thrust ask for, shape (time, 3), m/s^2, world axes.
+
+    Of a thrust that carries the vehicle on average, so that neither its mass nor its rotors' factors have to be known.
+    """
+    assert signals.thrust is not None, "rotor speeds are there"
+    force = signals.rotation[:, :, 2] * signals.thrust[:, None]
+    carried = max(float(force[flies, 2].mean()), 0.2 * float(signals.thrust[flies].mean()))
+    return np.asarray(force * (signals.vehicle.gravity_m_s2 / carried if carried else 0.0))
 
 
 _Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array]
@@ -250,9 +262,7 @@ def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
-        assert signals.thrust is not None, "rotor speeds are there"
-        leans = signals.rotation[:, :2, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None]
-        yield _averaged(["lean x", "lean y"], leans, flies, lambda means: means)
+        yield _averaged(["lean x", "lean y"], _asked(signals, flies)[:, :2], flies, lambda means: means)
     if turns:
         yield from _rotation(signals, flies)
     if signals.voltage is not None and signals.voltage[~flies].size:
@@ -497,8 +507,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
-    assert signals.thrust is not None, "rotor speeds are there"
-    drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
+    drives = _asked(signals, flies)[:, :2]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     block = contiguous(len(left), _BLOCKS)
