@@ -206,9 +206,14 @@ def _datasets(path: Path) -> dict[str, np.ndarray]:
     return found
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Run or hold, as the command line says."""
     command, first, second, *rest = sys.argv[1:]
     if command == "run":
         run(Path(first).absolute(), Path(second).absolute(), rest)
     else:
         sys.exit(min(1, hold(Path(first), Path(second))))
+
+
+if __name__ == "__main__":
+    main()

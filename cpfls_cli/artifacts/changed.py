@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 CANNOT_TELL = "CANNOT TELL"
 """The verdict where no change would have shown, or a log is wrong."""
 
-_BESIDE = {"follow": "gusts", "scale": "drift"}
-"""Kinds of ratios, and those that a flight has beside them wherever it holds their channels."""
-
 _BY_CHANCE = ("late", "answer", "unbalance", "swing", "battery")
 """Kinds of which a good flight can hold too little."""
+
+_OF_LOADS = ("rotor ", "mass", "centre of mass")
+"""Changes one of which has to have a size where loads are compared, by the beginnings of their names."""
 
 CABLE = "load on a cable"
 """The change that has a length."""
@@ -78,11 +78,25 @@ class FoundRecord(Record):
     alike: AlikeGroup = group()
     shows: ShowsGroup = group()
     warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
+    unlike: tuple[str, ...] = dataset(
+        "where logs state another board, version or range of outputs than the first", "unlike", default=()
+    )
+    ranges: tuple[str, ...] = dataset(
+        "flights whose commands are shares of another range than the first flight's", "ranges", default=()
+    )
+
+    @property
+    def loads_show(self) -> bool:
+        """Whether a rotor, a mass or its centre would have shown, where loads are compared."""
+        if not any(name.startswith("load ") for name in self.number):
+            return True
+        sizes = zip(self.shows.cause, self.shows.smallest.tolist(), strict=True)
+        return any(cause.startswith(_OF_LOADS) and np.isfinite(size) for cause, size in sizes)
 
     @property
     def has_size(self) -> bool:
-        """Whether any change would have shown."""
-        return bool(np.isfinite(self.shows.smallest).any())
+        """Whether what is looked for would have shown: where loads are compared, a change of these."""
+        return self.loads_show and bool(np.isfinite(self.shows.smallest).any())
 
     @property
     def cable_length(self) -> float:
@@ -156,6 +170,11 @@ class ChangedRecord(FoundRecord):
     missing: tuple[str, ...] = dataset(
         "other numbers that every reference flight has, and not every one of today", "missing", default=()
     )
+    undetermined: tuple[str, ...] = dataset(
+        "ratios among these that are likelier zero or reversed today than what they are in the reference",
+        "undetermined",
+        default=(),
+    )
     contradiction: tuple[str, ...] = dataset(
         "what of the flights contradicts itself or its vehicle", "contradiction", default=()
     )
@@ -178,6 +197,8 @@ class ChangedRecord(FoundRecord):
         false_alarm: float,
         named_from: float,
         fewest: int,
+        unlike: Sequence[str] = (),
+        ranges: Sequence[str] = (),
     ) -> Self:
         """Arrange a change, with the units of its numbers and causes by name."""
         hover, hover_deviation = _in_common(change, today)
@@ -200,10 +221,13 @@ class ChangedRecord(FoundRecord):
             limit=change.limit,
             reversed=change.reversed,
             missing=change.missing,
+            undetermined=change.undetermined,
             contradiction=tuple(contradictions),
             false_alarm=false_alarm,
             named_from=named_from,
             fewest=fewest,
+            unlike=tuple(unlike),
+            ranges=tuple(ranges),
             **found_groups(change.found, change.shows, units),
             warning=tuple(warnings),
         )
@@ -224,6 +248,12 @@ class ChangedRecord(FoundRecord):
         return np.asarray(np.abs(self.furthest) > (np.inf if self.limit is None else self.limit))
 
     @property
+    def loads_differ(self) -> float:
+        """By which share a load differs within the reference at most; 0 of one flight."""
+        loads = [name.startswith("load ") for name in self.number]
+        return float(np.expm1(np.ptp(self.scatter[:, loads], axis=0).max(initial=0.0)))
+
+    @property
     def short_of(self) -> int:
         """How many more reference flights would tell what flights differ by, which is assumed without them."""
         return max((self.fewest or 0) - len(self.before), 0)
@@ -235,13 +265,7 @@ class ChangedRecord(FoundRecord):
             return "CHANGED"
         if self.contradiction or self.undetermined or not self.has_size:
             return CANNOT_TELL
-        return "NO CHANGE SEEN" if self.short_of or self.lost else "NO CHANGE"
-
-    @property
-    def undetermined(self) -> list[str]:
-        """Ratios that today's flights hold the channels of, and which may be zero or reversed there."""
-        parts = ((name, *name.split()) for name in self.missing if name.split()[0] in _BESIDE)
-        return [name for name, kind, axis in parts if f"{_BESIDE[kind]} {axis}" in self.number]
+        return "NO CHANGE SEEN" if self.short_of or self.lost or self.ranges else "NO CHANGE"
 
     @property
     def lost(self) -> list[str]:
@@ -275,6 +299,9 @@ class ChangedRecord(FoundRecord):
             "beyond_limit": [name for name, is_beyond in zip(self.number, self.beyond, strict=True) if is_beyond],
             "reversed": list(self.reversed),
             "missing": list(self.missing),
+            "undetermined": list(self.undetermined),
+            "stated_otherwise": list(self.unlike),
+            "other_ranges": list(self.ranges),
             "contradictions": list(self.contradiction),
             "p": self.p_value,
             "by_flight": dict(zip(self.today, self.by_flight.tolist(), strict=True)),

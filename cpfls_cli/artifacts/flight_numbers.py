@@ -52,6 +52,10 @@ class FlightNumbersRecord(Record):
         "reversed",
         default=(),
     )
+    unsure: tuple[str, ...] = dataset(
+        "numbers whose ratio may be zero, so that they are not told", "unsure", default=()
+    )
+    unsure_ratio: Array | None = dataset("these ratios", "unsure", default=None)
     contradiction: tuple[str, ...] = dataset(
         "what of the flight contradicts itself or its vehicle", "contradiction", default=()
     )
@@ -86,6 +90,8 @@ class FlightNumbersRecord(Record):
             flown_at=flown_at,
             code=code,
             reversed=told.reversed,
+            unsure=tuple(told.unsure),
+            unsure_ratio=np.array(list(told.unsure.values())),
             contradiction=tuple(contradictions),
             stated=StatedGroup.of(stated),
             warning=tuple(warnings),

@@ -146,4 +146,7 @@ def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
         cable_m=record.cable,
         agility=record.agility,
         reversed=record.reversed,
+        unsure={}
+        if record.unsure_ratio is None
+        else dict(zip(record.unsure, record.unsure_ratio.tolist(), strict=True)),
     )

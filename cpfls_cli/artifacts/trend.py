@@ -72,6 +72,8 @@ class TrendRecord(FoundRecord):
         *,
         false_alarm: float,
         named_from: float,
+        unlike: Sequence[str] = (),
+        ranges: Sequence[str] = (),
     ) -> Self:
         """Arrange a trend, with the units of its numbers and causes by name."""
         found = [(index, each) for index, shift in enumerate(trend.shifts) for each in shift.change.found]
@@ -96,6 +98,8 @@ class TrendRecord(FoundRecord):
                 p_value=np.array([shift.change.p_value for shift in trend.shifts]),
             ),
             shifts=np.array([index for index, _ in found], dtype=np.int64),
+            unlike=tuple(unlike),
+            ranges=tuple(ranges),
             **found_groups([each for _, each in found], trend.shows, units),
             warning=tuple(warnings),
         )
@@ -110,7 +114,7 @@ class TrendRecord(FoundRecord):
         """What is said first: that nothing changed only of good logs, and where a change would have shown."""
         if self.changed:
             return "CHANGED"
-        return CANNOT_TELL if self.contradiction or not self.has_size else "NO CHANGE"
+        return CANNOT_TELL if self.contradiction or self.ranges or not self.has_size else "NO CHANGE"
 
     @property
     def values(self) -> Array:

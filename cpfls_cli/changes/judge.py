@@ -39,6 +39,9 @@ _MOST = 3
 _LOSES = 0.95
 """Probability that what is damaged pulls less, and not more."""
 
+_NEARER = 0.5
+"""Share of the usual ratio below which one is likelier nothing, whatever its error is."""
+
 _ANY = 10.0
 """Times what is usual: a prior so wide says nothing of a size."""
 
@@ -121,6 +124,8 @@ class Change:
         Numbers that every flight of the reference has, and that a flight of today has turned round, or as nothing.
     missing : tuple of str
         Other numbers that every flight of the reference has, and not every one of today.
+    undetermined : tuple of str
+        Those of them whose ratio is likelier nothing today than what it is in the reference.
     """
 
     names: tuple[str, ...]
@@ -135,6 +140,7 @@ class Change:
     shows: dict[str, float]
     reversed: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    undetermined: tuple[str, ...] = ()
 
     @property
     def changed(self) -> bool:
@@ -173,7 +179,20 @@ def changed(
     change = judged(today, Reference.of(before, names, vehicle), vehicle, rng, range(len(today)))
     lost = [name for name in common_numbers(before) if not all(name in flight.values for flight in today)]
     turned = tuple(name for name in lost if any(name in flight.reversed for flight in today))
-    return replace(change, reversed=turned, missing=tuple(name for name in lost if name not in turned))
+    missing = tuple(name for name in lost if name not in turned)
+    nothing = tuple(name for name in missing if any(_likelier_nothing(name, flight, before) for flight in today))
+    return replace(change, reversed=turned, missing=missing, undetermined=nothing)
+
+
+def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightNumbers]) -> bool:
+    """Tell whether a ratio that may be zero is nearer to that than to what it is in the reference.
+
+    One that is only told badly, as in a quiet hover, agrees with the reference as well as with zero.
+    """
+    usual = float(np.mean([own.values[name] for own in before]))
+    # The scale of a gyroscope is the inverse of the ratio that is fitted.
+    ratio = np.exp(-usual if name.startswith("scale ") else usual)
+    return bool(flight.unsure.get(name, np.inf) < _NEARER * ratio)
 
 
 def judged(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -139,6 +139,8 @@ class FlightNumbers:
     reversed : tuple of str
         Numbers that are the logarithm of a ratio which is zero here, or clearly below: a sensor or a rotor that is
         still, or turned round.
+    unsure : mapping of str to float
+        Ratios that may be zero here, so that they have no logarithm, by the names of their numbers.
     """
 
     name: str
@@ -150,15 +152,18 @@ class FlightNumbers:
     cable_m: float = float("nan")
     agility: float = float("nan")
     reversed: tuple[str, ...] = ()
+    unsure: Mapping[str, float] = field(default_factory=dict)
 
 
-def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNumbers:
+def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
     """Tell the numbers of a flight.
 
     Parameters
     ----------
     full_voltage : float
         What its voltage is a share of, V; 1 for shares.
+    has_gyroscope : bool
+        Whether the log holds body rates, though they never move.
 
     Raises
     ------
@@ -180,17 +185,21 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
-    below = []
+    below, unsure = [], {}
     cable, swing = _swing(signals, flies)
-    for names, told, error in (*_told(signals, flies), swing):
-        for each, value, apart in zip(names, told, error, strict=True):
+    for names, told, error, *ratios in (*_told(signals, flies, has_gyroscope), swing):
+        for index, (each, value, apart) in enumerate(zip(names, told, error, strict=True)):
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
             elif np.isinf(value):
                 below.append(each)
+            elif ratios and np.isfinite(ratios[0][index]):
+                unsure[each] = float(ratios[0][index])
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
     agility = _agility(signals, flies)
-    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below))
+    return FlightNumbers(
+        name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below), unsure
+    )
 
 
 def in_flight(signals: Signals) -> BoolArray:
@@ -210,15 +219,26 @@ def _agility(signals: Signals, flies: BoolArray) -> float:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or not inside.any():
         return float("nan")
-    assert signals.thrust is not None, "rotor speeds are there"
-    asked = own.average(signals.rotation[:, :, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None])[inside]
+    asked = own.average(_asked(signals, flies))[inside]
     return float(np.sqrt(((asked - asked.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-_Numbers = tuple[list[str], Array, Array]
+def _asked(signals: Signals, flies: BoolArray) -> Array:
+    """Give the acceleration that attitude and thrust ask for, shape (time, 3), m/s^2, world axes.
+
+    Of a thrust that carries the vehicle on average, so that neither its mass nor its rotors' factors have to be known.
+    """
+    assert signals.thrust is not None, "rotor speeds are there"
+    force = signals.rotation[:, :, 2] * signals.thrust[:, None]
+    carried = max(float(force[flies, 2].mean()), 0.2 * float(signals.thrust[flies].mean()))
+    return np.asarray(force * (signals.vehicle.gravity_m_s2 / carried if carried else 0.0))
 
 
-def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
+_Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array]
+"""Names, values, errors, and of logarithms that a flight may lack the ratios that they are of."""
+
+
+def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
     rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
     yield _averaged([f"load {name}" for name in rotors], _loads(signals), flies, np.log)
     if signals.rotor_command is not None:
@@ -228,7 +248,7 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
             [f"turn {name}" for name in rotors], both, flies, lambda means: np.log(means[:, 0] / means[:, 1])
         )
         yield _answer(signals, flies, rotors)
-    turns, feels = bool(signals.body_rate.any()), _felt(signals)
+    turns, feels = has_gyroscope or bool(signals.body_rate.any()), _felt(signals)
     across = _ACROSS_HZ if signals.specific_force is not None else _ABOVE_HZ
     for sensor, values, above in (
         ("gyroscope", signals.body_rate if turns else None, (_ABOVE_HZ,) * 3),
@@ -242,9 +262,7 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
-        assert signals.thrust is not None, "rotor speeds are there"
-        leans = signals.rotation[:, :2, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None]
-        yield _averaged(["lean x", "lean y"], leans, flies, lambda means: means)
+        yield _averaged(["lean x", "lean y"], _asked(signals, flies)[:, :2], flies, lambda means: means)
     if turns:
         yield from _rotation(signals, flies)
     if signals.voltage is not None and signals.voltage[~flies].size:
@@ -356,11 +374,14 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     assert signals.thrust is not None, "rotor speeds are there"
     found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]), signals.period)
     moments = np.diag(inertia)
-    told = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
+    with np.errstate(divide="ignore"):
+        gusts = np.log(found[:, 2] / moments)
+    told = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
     for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
         with np.errstate(invalid="ignore"):
             error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
-        yield [f"{kind} {axis}" for axis in _ROTATIONS], values[0], error
+        names = [f"{kind} {axis}" for axis in _ROTATIONS]
+        yield (names, values[0], error, found[0, 0]) if kind == "follow" else (names, values[0], error)
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         yield _drift(signals, turns, flies)
@@ -470,7 +491,7 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
     with np.errstate(invalid="ignore"):
         ratios = np.array([(x[rows] * y[rows]).sum(axis=0) / (x[rows] ** 2).sum(axis=0) for rows in kept])
         scale = -_logarithms(ratios)
-        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:])
+        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), ratios[0]
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
@@ -486,8 +507,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
-    assert signals.thrust is not None, "rotor speeds are there"
-    drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
+    drives = _asked(signals, flies)[:, :2]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     block = contiguous(len(left), _BLOCKS)

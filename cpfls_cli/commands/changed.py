@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,9 +23,9 @@ from cpfls_cli.changes.numbers import KINDS, FlightNumbers
 from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST, common_numbers
 from cpfls_cli.commands import report
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.stated_vehicle import vehicles_apart
+from cpfls_cli.flightlog.stated_vehicle import autopilots_apart, ranges_apart, vehicles_apart
 from cpfls_cli.flights.inputs import hashes_of, numbered_roles
-from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers
+from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers, stated_of, with_absent_signals
 from cpfls_cli.pages.changed import LEFT_OUT, answer
 from cpfls_cli.pages.source import source_of, unique_labels
 from cpfls_cli.report.content import Text
@@ -36,6 +38,8 @@ FILES = ("changed.h5", "report.html", "changed.json")
 
 CANNOT_TELL_CODE = 3
 """Exit code where it cannot be told whether a vehicle changed."""
+
+_NO_COLUMN = re.compile(r"import\.signals\.(?P<signal>\w+)\.columns: the log has no column '(?P<column>[^']+)'")
 
 _APART = 3
 """Facts that are named where two logs are of different vehicles."""
@@ -61,8 +65,8 @@ def run(
     if job.dry_run:
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
-    flights, left_out = _flights(job, kept, inputs)
-    other = of_other_vehicles([flights[role] for role in sorted(flights)], anyway=anyway)
+    flights, left_out = _flights(job, kept, inputs, anyway=anyway)
+    other = of_other_vehicles(stated_by([flights[role] for role in sorted(flights)]), anyway=anyway)
     record = _record(job, flights, [*left_out, *other, *twice])
     with filled_folder(job.output, FILES) as folder:
         written = finish(replace(job, output=folder / FILES[0]), record, {role: inputs[role] for role in flights})
@@ -82,22 +86,48 @@ def exit_code(verdict: str, *, fail_on_change: bool = False) -> int:
     return CANNOT_TELL_CODE if verdict == CANNOT_TELL else int(fail_on_change and verdict == "CHANGED")
 
 
-def of_other_vehicles(flights: Sequence[FlightNumbersRecord], *, anyway: bool) -> list[str]:
-    """Refuse flights whose logs say that they are of different vehicles, or warn of them where that is asked for."""
-    stating = [own for own in flights if own.stated is not None]
+def of_other_vehicles(stated: Sequence[tuple[str, Mapping[str, str]]], *, anyway: bool) -> list[str]:
+    """Refuse flights whose logs say that they are of different vehicles, or warn of them where that is asked for.
+
+    Parameters
+    ----------
+    stated : sequence of (str, mapping of str to str)
+        Flights and what their logs state of their vehicles; those that state nothing are passed over.
+    """
+    (first, own), *others = [each for each in stated if each[1]] or [("", {})]
     warnings = []
-    for own in stating[1:]:
-        first = stating[0]
-        assert first.stated is not None
-        assert own.stated is not None
-        apart = vehicles_apart(first.stated.facts, own.stated.facts)
+    for name, facts in others:
+        apart = vehicles_apart(own, facts)
         if apart:
-            shown = "; ".join(apart[:_APART])
-            differ = f"{first.flight} and {own.flight} are of different vehicles ({shown})"
+            differ = f"{first} and {name} are of different vehicles ({'; '.join(apart[:_APART])})"
             if not anyway:
                 raise InputError(f"{differ}: compare flights of one vehicle, or give --anyway")
             warnings.append(f"{differ}, and are compared anyway")
     return warnings
+
+
+def of_other_autopilots(flights: Sequence[FlightNumbersRecord], *, loads: bool) -> tuple[list[str], list[str]]:
+    """List where logs state another board, version or range of outputs than the first, and whose loads that touches.
+
+    Parameters
+    ----------
+    loads : bool
+        Whether loads are compared; of commands they are shares of what full throttle stands for.
+    """
+    (first, own), *others = [each for each in stated_by(flights) if each[1]] or [("", {})]
+    unlike, ranges = [], []
+    for name, facts in others:
+        apart = autopilots_apart(own, facts)
+        if apart:
+            unlike.append(f"the logs of {first} and {name} state {', '.join(apart)}")
+        if loads and flights[0].commanded and ranges_apart(own, facts):
+            ranges.append(name)
+    return unlike, ranges
+
+
+def stated_by(flights: Sequence[FlightNumbersRecord]) -> list[tuple[str, Mapping[str, str]]]:
+    """Give what the logs of flights state of their vehicles, with the names of the flights."""
+    return [(own.flight, {} if own.stated is None else own.stated.facts) for own in flights]
 
 
 def contradictions_of(flights: Sequence[FlightNumbersRecord]) -> list[str]:
@@ -126,7 +156,7 @@ def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[di
 
 
 def _flights(
-    job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFile]
+    job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFile], *, anyway: bool
 ) -> tuple[dict[str, FlightNumbersRecord], list[str]]:
     """Tell the numbers of all flights by role, under names that tell them apart; one that tells none is left out."""
     labels = unique_labels(list(given.values()))
@@ -139,11 +169,38 @@ def _flights(
             flights[role] = replace(told, flight=label)
         except InputError as error:
             refused[role] = error
+            if anyway:
+                # Of another vehicle's log what it holds is compared.
+                with suppress(InputError):
+                    study = with_absent_signals(job.study)
+                    told = kept_numbers(path, inputs[role], study, job.output / FOLDER, job.cautions)
+                    flights[role] = replace(told, flight=label)
+                    del refused[role]
     job.progress(len(given), len(given))
+    if refused and not anyway:
+        # Why a log is another vehicle's comes before what it lacks.
+        by_role = dict(zip(given, labels, strict=True))
+        stated = dict(stated_by(list(flights.values()))) | {by_role[role]: stated_of(given[role]) for role in refused}
+        of_other_vehicles([(by_role[role], stated[by_role[role]]) for role in sorted(given)], anyway=anyway)
     for side in ("today", "since"):
         if not any(role.startswith(side) for role in flights):
-            raise next(error for role, error in refused.items() if role.startswith(side))
+            role, error = next((role, error) for role, error in refused.items() if role.startswith(side))
+            raise InputError(_lacking(given[role], str(error), anyway=anyway))
     return flights, [f"{LEFT_OUT}{error}" for error in refused.values()]
+
+
+def _lacking(path: Path, why: str, *, anyway: bool) -> str:
+    """Say in one line which columns of the config a log lacks, if that is all, and what helps."""
+    found = [_NO_COLUMN.search(line) for line in why.splitlines()]
+    lacks = [(each["signal"], each["column"]) for each in found if each is not None]
+    if anyway or len(lacks) < len(found):
+        return why
+    signals, more = joined(dict.fromkeys(signal for signal, _ in lacks)), len(lacks) - 1
+    return (
+        f"{path}: has other columns than the config reads for {signals}: no {lacks[0][1]}"
+        f"{f' and {more} more' if more else ''}; if it is the same vehicle, name those of this log as otherwise of "
+        "import.signals, or give --anyway to compare without them"
+    )
 
 
 def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequence[str]) -> ChangedRecord:
@@ -154,6 +211,8 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
     today, before = ([numbers_of_flight(own) for own in side] for side in (of_today, of_before))
     change = changed(today, before, vehicle, np.random.default_rng(job.study.seed))
     units = units_of(change.names, vehicle)
+    loads = any(name.startswith("load ") for name in change.names)
+    unlike, ranges = of_other_autopilots([*of_before, *of_today], loads=loads)
     warnings = [
         *notes,
         *_warnings(of_today, of_before, change.names),
@@ -165,6 +224,8 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
         false_alarm=FALSE_ALARM,
         named_from=NAMED,
         fewest=FEWEST,
+        unlike=unlike,
+        ranges=ranges,
     )
 
 

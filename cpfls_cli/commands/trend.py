@@ -26,7 +26,15 @@ from cpfls_cli.changes.judge import NAMED
 from cpfls_cli.changes.reference import FALSE_ALARM
 from cpfls_cli.changes.trend import load_ruptures, trend
 from cpfls_cli.commands import report
-from cpfls_cli.commands.changed import contradictions_of, exit_code, of_other_vehicles, once, units_of
+from cpfls_cli.commands.changed import (
+    contradictions_of,
+    exit_code,
+    of_other_autopilots,
+    of_other_vehicles,
+    once,
+    stated_by,
+    units_of,
+)
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
@@ -206,11 +214,13 @@ def _share_out(job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFi
 def _record(job: Job, told: Mapping[str, FlightNumbersRecord], options: Options, notes: Sequence[str]) -> TrendRecord:
     ordered, order, about = _ordered(told, options.order)
     vehicle = job.study.vehicle
-    apart = of_other_vehicles(ordered, anyway=options.anyway)
+    apart = of_other_vehicles(stated_by(ordered), anyway=options.anyway)
     found = trend(
         [numbers_of_flight(own) for own in ordered], vehicle, generator(job.study, "trend"), options.reference
     )
     flown = {own.flight: own.flown_at for own in ordered}
+    loads = any(name.startswith("load ") for name in found.names)
+    unlike, ranges = of_other_autopilots(ordered, loads=loads)
     lacking = f"left out, for they do not tell {len(found.names)} numbers that most do: {', '.join(found.left_out)}"
     warnings = [
         *notes,
@@ -229,6 +239,8 @@ def _record(job: Job, told: Mapping[str, FlightNumbersRecord], options: Options,
         contradictions_of(ordered),
         false_alarm=FALSE_ALARM,
         named_from=NAMED,
+        unlike=unlike,
+        ranges=ranges,
     )
 
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 
+_CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -39,6 +41,11 @@ class Finding:
     unit: str = ""
     contradiction: bool = True
     repairable: bool = False
+
+    @property
+    def of_constants(self) -> bool:
+        """Whether speeds of rotors only do not suit numbers of the vehicle, which cancel between flights of it."""
+        return self.channels[:1] == ("rotors",) and set(self.channels[1:]) <= _CONSTANTS
 
     @property
     def sentence(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
@@ -13,7 +14,9 @@ from cpfls_cli.changes.numbers import KINDS, flight_numbers
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.stated_vehicle import stated_vehicle
 from cpfls_cli.flights.recordings import read_alone
+from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.version import code_fingerprint
 
 FOLDER = "flights"
@@ -39,7 +42,8 @@ def kept_numbers(
     if kept is not None:
         return kept
     read = read_alone(flight, study)
-    told = flight_numbers(read.recording, read.full_voltage)
+    has_gyroscope = "body_rate" in read.flight.signals
+    told = flight_numbers(read.recording, read.full_voltage, has_gyroscope=has_gyroscope)
     made = FlightNumbersRecord.of(
         told,
         [KINDS[name.split()[0]].unit for name in told.values],
@@ -54,6 +58,23 @@ def kept_numbers(
     folder.mkdir(parents=True, exist_ok=True)
     write_record(_path(flight, file, folder), record)
     return record
+
+
+def stated_of(flight: Path) -> dict[str, str]:
+    """Read what a log states of its vehicle, whatever else it holds; nothing where it cannot be read."""
+    if not is_log(flight):
+        return {}
+    try:
+        contents = log_contents(flight, ())
+    except InputError:
+        return {}
+    return stated_vehicle(contents.system, contents.parameters)
+
+
+def with_absent_signals(study: Study) -> Study:
+    """Let a log lack any signal but those that the import cannot do without."""
+    signals = {name: replace(signal, required=False) for name, signal in study.import_.signals.items()}
+    return study.model_copy(update={"import_": replace(study.import_, signals=signals)})
 
 
 def _path(flight: Path, file: InputFile, folder: Path) -> Path:

@@ -96,7 +96,7 @@ class ReadAlone(NamedTuple):
     full_voltage : float
         What its voltages are shares of, V; 1 where it states shares.
     contradictions : tuple of str
-        Sentences: what of the flight contradicts itself or its vehicle.
+        Sentences: what of the flight contradicts itself or its vehicle, but for numbers that cancel between flights.
     """
 
     flight: ReadFlight
@@ -120,7 +120,9 @@ def read_alone(path: Path, study: Study) -> ReadAlone:
     flight = read_flight(path, study)
     recording, about = _recording(flight, study)
     volts = _largest_volts(recording.signals, flight)
-    wrong = contradictions(check_flight(flight, study))
+    found = [each for each in check_flight(flight, study) if each.contradiction]
+    wrong = contradictions(each for each in found if not each.of_constants)
+    about = (*about, *(each.sentence for each in found if each.of_constants))
     return ReadAlone(flight, _share(recording, volts) if volts else recording, volts or 1.0, about, wrong)
 
 

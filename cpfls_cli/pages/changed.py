@@ -101,6 +101,7 @@ def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence what changed, or that nothing did and what would have shown, or why neither can be said."""
     wrong = first_of_each(record.contradiction)
     lacks = [*([_lost(record)] if record.lost else []), *([_assumed(record)] if record.short_of else [])]
+    lacks += other_autopilots(record)
     if record.changed:
         first, *more = _what_changed(record, vehicle)
         also = [f"And: {each[:1].lower()}{each[1:]}" for each in more]
@@ -112,15 +113,26 @@ def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
     if record.undetermined:
         return Box(record.verdict, _undetermined(record), lacks, "unsure")
     if not record.has_size:
-        return Box(record.verdict, NOTHING_SHOWS, lacks, "unsure")
+        differ = f", as loads differ by up to {whole_percent(record.loads_differ)} within the reference"
+        return Box(record.verdict, nothing_shows(record, differ if record.loads_differ > 0 else ""), lacks, "unsure")
     within = f"nothing beyond {beyond}; {unchanged_within(record, vehicle)}"
-    return Box(record.verdict, within, lacks, "warning" if lacks else "good")
+    return Box(record.verdict, within, lacks, "good" if record.verdict == "NO CHANGE" else "warning")
 
 
-NOTHING_SHOWS = (
-    "no change of any size that is looked for would have shown; give more reference flights, of other days, flown as "
-    "today's are"
-)
+def nothing_shows(record: FoundRecord, because: str = "") -> str:
+    """Say what would not have shown, so that it cannot be told whether anything changed."""
+    what = "no change" if record.loads_show else "no weak rotor, mass or centre of mass"
+    return (
+        f"{what} of any size that is looked for would have shown{because}; give more reference flights, of other days, "
+        "flown as today's are"
+    )
+
+
+def other_autopilots(record: FoundRecord) -> list[str]:
+    """Say where logs state another board, version or range of outputs, as one vehicle can have in turn."""
+    first = [sentence(f"{record.unlike[0]}: make sure that it is one vehicle")] if record.unlike else []
+    scaled = f"Commands of {joined(record.ranges)} are shares of another range: loads may differ by that alone."
+    return [*first, *([scaled] if record.ranges else [])]
 
 
 def first_of_each(contradictions: Sequence[str]) -> list[str]:

@@ -12,12 +12,13 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.pages.changed import (
     MOST_MOVED,
-    NOTHING_SHOWS,
     checks,
     first_of_each,
     most_moved,
     natural_unit,
     no_known_change,
+    nothing_shows,
+    other_autopilots,
     told,
     unchanged_within,
     would_have_shown,
@@ -56,16 +57,18 @@ def answer(trend: Source[TrendRecord], index: int = 1) -> Iterator[Block]:
 
 def trend_box(record: TrendRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence for each change point what changed; the last comes first, for the vehicle flies as that."""
-    wrong = first_of_each(record.contradiction)
+    wrong, other = first_of_each(record.contradiction), other_autopilots(record)
     if record.changed:
         first, *more = _what_changed(record, vehicle)
-        return Box(record.verdict, first, [*more, *wrong], "warning")
+        return Box(record.verdict, first, [*more, *wrong, *other], "warning")
     over = f"over {len(record.flight)} flights, beyond what they differ by"
     if wrong:
         return Box(record.verdict, wrong[0], [*wrong[1:], f"Nothing changed {over}, which says little then."], "unsure")
+    if record.ranges:
+        return Box(record.verdict, other[-1], [*other[:-1], f"Nothing changed {over}."], "unsure")
     if not record.has_size:
-        return Box(record.verdict, NOTHING_SHOWS, (), "unsure")
-    return Box(record.verdict, f"{over}; in one flight {unchanged_within(record, vehicle)}", (), "good")
+        return Box(record.verdict, nothing_shows(record), other, "unsure")
+    return Box(record.verdict, f"{over}; in one flight {unchanged_within(record, vehicle)}", other, "good")
 
 
 def _what_changed(record: TrendRecord, vehicle: VehicleSettings) -> Iterator[str]:
