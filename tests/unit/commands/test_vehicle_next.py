@@ -19,14 +19,19 @@ from tests.builders.vehicle_search import CONFIG
 def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust):
     study = validate(parse_config(CONFIG, "config"), "config")
     job = Job(study, Path("own/found.h5"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
-    page, (_, command, *words) = next_commands(job, SimpleNamespace(complete=True, trust=trust), [Path("f.h5")], ())
+    record = SimpleNamespace(complete=True, trust=trust, rotors_told=None)
+    page, (_, command, *words) = next_commands(job, record, [Path("f.h5")], ())
     assert page[:2] == ("cpfls", "report")
     poor = trust in (Trust.LACKING, Trust.NOT_DETERMINED, Trust.LOOP, Trust.DO_NOT_USE)
     assert command == ("trajectory" if poor else "export")
     assert words[-1] == (Path("own/found-mission.h5") if poor else Path("own/found.c"))
     coarse = replace(job, study=study.model_copy(update={"trajectory": replace(study.trajectory, sample_time_s=0.1)}))
-    _, (*mission, _) = next_commands(coarse, SimpleNamespace(complete=True, trust=Trust.LOOP), [Path("f.h5")], ())
+    record.trust = Trust.LOOP
+    _, (*mission, _) = next_commands(coarse, record, [Path("f.h5")], ())
     assert "trajectory.sample_time_s=0.02" in mission
+    # No flight tells more before its log is faster.
+    slow = SimpleNamespace(complete=True, trust=trust, rotors_told=10.0, logged_by=("ArduPilot",))
+    assert next_commands(job, slow, [Path("f.h5")], ()) == (page,)
 
 
 def test_logs_of_ardupilot_are_followed_by_sweeps_of_its_own(tmp_path):
