@@ -223,7 +223,7 @@ def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job, fa
 def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> tuple[VehicleResponse, ...]:
     """Estimate frequency responses beside those of the model; none where the flights tell of the loop alone."""
     own = [flight for flight in flights if not flight.group]
-    if vehicle.constants is None and vehicle.loop.shows_loop:
+    if vehicle.constants is None and vehicle.loop.unexplained:
         return ()
     try:
         return vehicle_responses(vehicle.model, own, vehicle.instruments.beside)

@@ -49,6 +49,7 @@ from cpfls_cli.pages.replay import (
 )
 from cpfls_cli.pages.source import Source
 from cpfls_cli.pages.trust import model_words
+from cpfls_cli.playback.loop import ANY
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
@@ -154,6 +155,8 @@ def _as_vehicle(record: VehicleRecord) -> str:
         return "its constants are those of vehicle and autopilot together"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
+    if record.loop.misses and record.instruments is None:
+        return "what was found does not explain these flights"
     constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
     lacks = ["an effect is missing besides its constants"] if record.trust == Trust.LACKING else []
     if constants:
@@ -187,6 +190,8 @@ def _against(record: VehicleRecord) -> Iterator[str]:
         yield from slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
+    elif record.loop.misses and record.instruments is None:
+        yield _missed_words(record.loop)
     heavy = too_heavy(record)
     if heavy:
         yield f"Inertia and drag factor: {heavy}."
@@ -381,11 +386,8 @@ def loop_words(record: VehicleRecord) -> str:
     """Say how far the loop may have misled the fit, and what to fly."""
     loop = record.loop
     shares = joined(_of_bands(loop, index, axis) for index, axis in enumerate(("roll", "pitch")))
-    times = joined(
-        f"{name} {number(float(low), 2)} to {number(float(high), 2)} times"
-        for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
-        if np.isfinite(low)
-    )
+    ends = zip(INERTIA_PARAMETERS[:2], loop.low.tolist(), loop.high.tolist(), strict=False)
+    times = joined(f"{name} {_times(low, high)}" for name, low, high in ends if np.isfinite(low))
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
         f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found."
@@ -393,23 +395,44 @@ def loop_words(record: VehicleRecord) -> str:
     )
 
 
+def _times(low: float, high: float) -> str:
+    """Give the factors that bounds allow; those at the limit of what is told may lie beyond it."""
+    least, most = number(low, 2), number(high, 2)
+    if least != most:
+        return f"{least} to {most} times"
+    beyond = "at most " if low <= 1 / ANY else "at least " if high >= ANY else ""
+    return f"{beyond}{most} times"
+
+
+def _missed_words(loop: LoopGroup) -> str:
+    """Say that rotors that only lag explain more of the flights than what was found, and what to do."""
+    assert loop.missed is not None, "where more is missed"
+    turns = list(enumerate(("roll", "pitch")))
+    missed = joined(f"{_share(share)} of {axis}" for (_, axis), share in zip(turns, loop.missed, strict=False))
+    better = joined(_of_bands(loop, index, axis) for index, axis in turns)
+    return (
+        f"What was found does not explain these flights: its torque explains {missed} acceleration, that of the rotors "
+        f"with nothing but a lag {better}. Its numbers are not the vehicle's: state what is known of the vehicle, or "
+        "leave blocks out (playback.leave_out)."
+    )
+
+
+def _share(share: float) -> str:
+    return whole_percent(float(np.clip(share, 0.0, 1.0))) if np.isfinite(share) else "nothing known"
+
+
 def _of_bands(loop: LoopGroup, index: int, axis: str) -> str:
     """Say what torque explains about an axis where it explains least, and where most."""
     least, whole = loop.explained[index], f"{axis} acceleration"
     if loop.by_band is None or loop.band_hz is None or not np.isfinite(least):
-        return (
-            f"{whole_percent(float(least))} of the {whole}" if np.isfinite(least) else f"nothing known of the {whole}"
-        )
+        return f"{_share(least)} of the {whole}"
     shares = loop.by_band[:, index]
     known = np.flatnonzero(np.isfinite(shares))
     worst = int(known[np.argmin(np.abs(shares[known] - least))])
     best = int(known[np.argmax(levelled(shares[known]))])
-    words = [
-        f"{whole_percent(float(np.clip(shares[band], 0.0, 1.0)))} from {number(float(loop.band_hz[band, 0]), 2)} to "
-        f"{number(float(loop.band_hz[band, 1]), 2)} Hz"
-        for band in dict.fromkeys((worst, best))
-    ]
-    return f"{words[0]} of the {whole}{f' ({words[1]})' if len(words) > 1 else ''}"
+    hz = [f"from {number(low, 2)} to {number(high, 2)} Hz" for low, high in loop.band_hz.tolist()]
+    most = f" ({_share(shares[best])} {hz[best]})" if best != worst else ""
+    return f"{_share(shares[worst])} of the {whole} {hz[worst]}{most}"
 
 
 def _turns_to_fly(record: VehicleRecord) -> str:
