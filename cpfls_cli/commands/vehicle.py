@@ -166,7 +166,7 @@ def _what_can_come(
     along = [flight.playback for flight in own]
     if settings.anyway or not shows_loop_anyhow(job.study.vehicle, along, told_hz):
         return settings, ()
-    said = too_slow(told_hz, [flight.system for flight in own])
+    said = too_slow(told_hz)
     logging.getLogger("cpfls_cli").warning(said)
     return replace(settings, leave_out=blocks_of(job.study.vehicle), history_s=0.0), (said,)
 

@@ -38,7 +38,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.replay import (
     beside_past,
     beside_rivals,
@@ -103,9 +103,6 @@ _OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was fo
 
 _LIVELY_RAD_S = 1.0
 """Body rate, root mean square, above which larger turns show no more of the vehicle."""
-
-_FLOWN_BY_HAND = {"bbl", "bfl"}
-"""Formats of logs whose autopilot flies no mission file."""
 
 _LEAST_HZ = 1 / coarsest_excited(ExciteSettings())
 """At which rotors have to be logged for what a flight is asked to show."""
@@ -186,7 +183,7 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
         yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
-    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED):
+    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED, Trust.DO_NOT_USE):
         yield from slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
@@ -359,26 +356,25 @@ def _share_words(share: Array, error: Array) -> str:
 
 
 def slow_words(record: VehicleRecord) -> Iterator[str]:
-    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster."""
+    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster, and how."""
     if record.rotors_told is not None and round(record.rotors_told) < round(_LEAST_HZ):
-        yield f"{_slowly_logged(record.rotors_told, record.logged_by or ())} Flights logged so say no more."
+        faster = log_faster("rotors and body rates", _LEAST_HZ, *(record.logged_by or ()))
+        yield f"{_slowly_logged(record.rotors_told)} Flights logged so say no more; first {faster}."
 
 
-def _slowly_logged(told_hz: float, systems: Sequence[str]) -> str:
-    """Say how slowly rotors are logged, and what to set in the autopilots."""
+def _slowly_logged(told_hz: float) -> str:
     return (
         f"The rotors are logged {number(told_hz, 2)} times a second, which shows no motion above "
-        f"{number(told_hz / 2, 2)} Hz. Log rotors and body rates at {_LEAST_HZ:g} Hz or more first: "
-        f"{log_faster(*systems)}."
+        f"{number(told_hz / 2, 2)} Hz."
     )
 
 
-def too_slow(told_hz: float, systems: Sequence[str]) -> str:
-    """Say of rotors logged so slowly that no body can be found what is computed then."""
+def too_slow(told_hz: float) -> str:
+    """Say of rotors logged so slowly that no body can be found what is computed then; the answer says what to set."""
     return (
-        f"{_slowly_logged(told_hz, systems)} Inertia, drag factor, lag and effects cannot be found in these flights; "
-        "only the constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway "
-        "searches all the same."
+        f"{_slowly_logged(told_hz)} Inertia, drag factor, lag and effects cannot be found in these flights; only the "
+        "constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway searches "
+        "all the same."
     )
 
 
@@ -440,11 +436,10 @@ def _turns_to_fly(record: VehicleRecord) -> str:
     turning = record.loop.turning
     lively = turning is not None and bool((turning[:2] > _LIVELY_RAD_S).all())
     how = "with quick turns about one axis at a time" if lively else "with larger and faster turns"
-    by_hand = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
     formats = {file.format.lower() for role, file in record.origin.inputs.items() if not role.startswith("config")}
-    if formats and formats <= _FLOWN_BY_HAND:
-        return f"{how}: {by_hand}."
-    return f"{how}, the same path several times ({by_hand}; or as a mission): {WHAT_TO_FLY}"
+    if formats and formats <= FLOWN_BY_HAND:
+        return f"{how}: {BY_HAND}."
+    return f"{how}, the same path several times ({BY_HAND}; or as a mission): {WHAT_TO_FLY}"
 
 
 def warnings(record: VehicleRecord) -> list[str]:

@@ -11,6 +11,7 @@ from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.vehicle import next_commands
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC
+from cpfls_cli.report.outcome import command_line
 from cpfls_cli.validation.trust import Trust
 from tests.builders.vehicle_search import CONFIG
 
@@ -40,3 +41,11 @@ def test_logs_of_ardupilot_are_followed_by_sweeps_of_its_own(tmp_path):
     job = Job(study, tmp_path / "found.h5", False, False, lambda *_: None, lambda _: None, inputs=[tmp_path / "c.yaml"])
     assert "ardupilot" not in to_fly(job)
     assert to_fly(replace(job, inputs=[*job.inputs, log]))[-4:-1] == ("--format", "ardupilot", "-o")
+
+
+def test_logs_whose_autopilot_flies_no_mission_are_followed_by_sticks(tmp_path):
+    (log := tmp_path / "fpv.bbl").write_bytes(b"H Product:Blackbox")
+    study = validate(parse_config(CONFIG, "config"), "config")
+    job = Job(study, tmp_path / "found.h5", False, False, lambda *_: None, lambda _: None, inputs=[log])
+    assert command_line(to_fly(job)).startswith("fly by hand, stick left and right")
+    assert command_line(to_fly(replace(job, inputs=[]))).startswith("cpfls trajectory ")
