@@ -159,6 +159,8 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     ]
     if record.loop.shown and record.instruments is None and name != FOUND_AS[THRUST]:
         return "these flights show the loop, not the vehicle"
+    if record.loop.misses and record.instruments is None and name != FOUND_AS[THRUST]:
+        return "what was found does not explain these flights"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)
     if name in excess(record):

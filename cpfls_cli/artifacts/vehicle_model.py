@@ -113,18 +113,30 @@ class LoopGroup:
         "share of the rotation in a band that torque explains, the least", "axis", frame=BODY, gaps=True
     )
     shown: bool = dataset("1 where so little is explained that the numbers may be those of the loop")
-    band_hz: Array | None = dataset("ends of bands, about", "band", "end", units="Hz", default=None)
+    band_hz: Array | None = dataset("ends of bands, about", "loop band", "end", units="Hz", default=None)
     by_band: Array | None = dataset(
-        "share of the rotation that torque explains", "band", "axis", frame=BODY, gaps=True, default=None
+        "share of the rotation that torque explains", "loop band", "axis", frame=BODY, gaps=True, default=None
     )
     turning: Array | None = dataset(
         "body rate, root mean square", "axis", units="rad/s", frame=BODY, gaps=True, default=None
+    )
+    missed: Array | None = dataset(
+        "explained by the model that was found, where that of rotors that only lag is much more, and in the others",
+        "axis",
+        frame=BODY,
+        gaps=True,
+        default=None,
     )
 
     @classmethod
     def of(cls, bounds: LoopBounds) -> Self:
         """Arrange bounds."""
         return group_of(cls, bounds, shown=bounds.shows_loop)
+
+    @property
+    def misses(self) -> bool:
+        """Whether what was found explains much less of roll or pitch than rotors that only lag."""
+        return self.missed is not None and bool(np.isfinite(self.missed[:2]).any())
 
 
 @record
@@ -396,7 +408,7 @@ class VehicleRecord(ModelRecord):
         off = self.responses is not None and self.responses.off
         told = self.tells_turning and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
-            told = told and self.tells_yaw
+            told = told and self.tells_yaw and not self.loop.misses
             return capped(self._by_playback, against, loop=self.loop.shown, lacks=off, told=told)
         lacks = off or self.instruments.lacks
         seen = lacks or (self.responses is not None and self.responses.judged)
@@ -490,6 +502,7 @@ class VehicleRecord(ModelRecord):
             "trades": [list(row.values()) for row in rows_of(self.trade)],
             "loop": {
                 "shown": self.loop.shown,
+                "found_explains_less": self.loop.misses,
                 **{name: getattr(self.loop, name).tolist() for name in ("low", "high", "explained")},
             },
             "instruments": None if self.instruments is None else self.instruments.summary,

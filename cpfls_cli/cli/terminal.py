@@ -99,6 +99,7 @@ def _show_notes(outcome: Outcome, common: Common) -> None:
 def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     """Write an answer, the commands that go on with it, and what more of it there is."""
     from cpfls_cli.report.content import Text
+    from cpfls_cli.report.outcome import command_line
     from cpfls_cli.report.terminal import folded_words, terminal_lines
 
     width = _columns()
@@ -107,7 +108,7 @@ def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     if outcome.next:
         yield "next:"
         # No line break of ours in it, so that it can be pasted.
-        yield from (f"  {visible(shlex.join(map(str, command)))}" for command in outcome.next)
+        yield from (f"  {visible(command_line(command))}" for command in outcome.next)
     more = () if whole else folded_words(outcome.blocks)
     if more:
         yield from terminal_lines([Text(f"more with -v: {'; '.join(more)}")], width)

@@ -59,7 +59,9 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     sentences = (*ended, *map(contradicted, wrong), *doubted, *twice)
     said = (Text(each, "warning", always=True) for each in sentences)
     told = summary(proposal, stated, output) | {"contradictions": wrong, "doubted_guesses": doubted}
-    return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal, logs)))
+    # A config that asks for something is refused by every command until it is filled in.
+    followed = tuple(_next(job, proposal, logs)) if whole else ()
+    return Outcome(told, (*said, *answer(proposal, stated, output)), next=followed)
 
 
 def _next(job: Job, proposal: Proposal, given: Sequence[Path]) -> Iterator[Command]:

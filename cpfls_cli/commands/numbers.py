@@ -14,7 +14,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import log_formats
 from cpfls_cli.flights.models import is_vehicle, with_found_numbers
 from cpfls_cli.pages.model import cautions_of
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.trajectory.consistency import coarsest_excited
 from cpfls_cli.words import joined
@@ -78,12 +78,21 @@ def why_no_body_found(job: Job, found: Path) -> str:
 
 
 def to_fly(job: Job, output: Path | None = None) -> Command:
-    """Give the command that plans flights that tell more, `mission.h5` where no output is named."""
+    """Give the command that plans flights that tell more, or what to fly by hand where the autopilot flies no file.
+
+    Parameters
+    ----------
+    output : Path or None
+        For the plan; None for `mission.h5`.
+    """
+    formats = log_formats(job.inputs)
+    if formats and formats <= FLOWN_BY_HAND:
+        return f"fly {BY_HAND}"
     planned = job.study.trajectory
     words = [job.config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
     coarsest = coarsest_excited(planned.excite)
     # A config of coarser paths is refused an excitation.
     finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()
     # Its autopilot sweeps by itself, from numbers in a file.
-    form = ("--format", "ardupilot") if log_formats(job.inputs) == {_ARDUPILOT} else ()
+    form = ("--format", "ardupilot") if formats == {_ARDUPILOT} else ()
     return (*words[:-1], *finer, *form, words[-1], output or job.beside("mission.h5"))

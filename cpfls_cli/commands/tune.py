@@ -34,7 +34,7 @@ from cpfls_cli.pages.vehicle_model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Outcome, command_line, nothing_written
 from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
 from cpfls_cli.tuning.noise import LEAST, Line, Noise, noise_of
@@ -215,7 +215,7 @@ def _missing(job: Job, record: VehicleRecord) -> str:
     judged = record.held_out is not None or record.instruments is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
-    planned = " ".join(map(str, to_fly(job)))
+    planned = command_line(to_fly(job))
     slow = next(slow_words(record), "")
     if slow:
         return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"

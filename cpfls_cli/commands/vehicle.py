@@ -166,7 +166,7 @@ def _what_can_come(
     along = [flight.playback for flight in own]
     if settings.anyway or not shows_loop_anyhow(job.study.vehicle, along, told_hz):
         return settings, ()
-    said = too_slow(told_hz, [flight.system for flight in own])
+    said = too_slow(told_hz)
     logging.getLogger("cpfls_cli").warning(said)
     return replace(settings, leave_out=blocks_of(job.study.vehicle), history_s=0.0), (said,)
 
@@ -223,7 +223,7 @@ def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job, fa
 def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> tuple[VehicleResponse, ...]:
     """Estimate frequency responses beside those of the model; none where the flights tell of the loop alone."""
     own = [flight for flight in flights if not flight.group]
-    if vehicle.constants is None and vehicle.loop.shows_loop:
+    if vehicle.constants is None and vehicle.loop.unexplained:
         return ()
     try:
         return vehicle_responses(vehicle.model, own, vehicle.instruments.beside)

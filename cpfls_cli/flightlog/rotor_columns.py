@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
 from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.logging_rates import log_faster
+from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
@@ -157,7 +157,9 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
                 f"{command.columns.columns[0]} and the columns with it: {counts[1]} commands, {counts[0]} rotors"
             )
             command = None
-    warnings = [warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess, system)]
+    warnings = [
+        warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess, system, parameters)
+    ]
     if speed is None and command is None:
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = command is not None and command.columns.unit == "1"
@@ -197,15 +199,15 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     command = RotorGuess(guess, logged_hz(time), "Crazyflie")
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(
-        speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command, "Crazyflie"))
+        speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command, "Crazyflie", {}))
     )
 
 
-def _too_slow(guess: RotorGuess, system: str) -> Iterator[str]:
+def _too_slow(guess: RotorGuess, system: str, parameters: Parameters) -> Iterator[str]:
     if guess.rate_hz < _SLOW_HZ:
         yield (
             f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
-            f" respond within some 50 ms; log them at 100 Hz or more ({log_faster(system)})"
+            f" respond within some 50 ms; {log_faster('them', FAST_HZ, system, parameters=parameters)}"
         )
 
 

@@ -71,6 +71,8 @@ class ReadFlight:
         Stamp of the log's own clock at time 0, s; NaN where there is none.
     stated : mapping of str to str
         What the log says of its vehicle, as `stated_vehicle`; empty where nothing is known of it.
+    system : str
+        What wrote the log, such as ``PX4``, with its version where it is known; empty where the log does not say.
     """
 
     name: str
@@ -81,11 +83,7 @@ class ReadFlight:
     updated_hz: Mapping[str, float] = field(default_factory=dict)
     begins: float = nan
     stated: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def system(self) -> str:
-        """What wrote the log, such as ``PX4``; empty where it does not say."""
-        return self.stated.get(WRITTEN_BY, "")
+    system: str = ""
 
 
 class ReadAlone(NamedTuple):
@@ -134,7 +132,9 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     updated = {} if record.quality is None else record.quality.updated_hz
     units = units_of(path, record.origin, study)
     stated = {} if record.stated is None else record.stated.facts
-    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins, stated=stated)
+    system = stated.get(WRITTEN_BY, "") if record.autopilot is None else record.autopilot.system
+    own = ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins)
+    return replace(own, stated=stated, system=system)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -148,14 +148,15 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
         begins = first.report.first_stamp_s + first.report.span_s[0]
-        stated = first.report.stated
-        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins, stated)
+        known = (first.report.stated, first.report.system)
+        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins, *known)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     begins = first.report.first_stamp_s
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins, first.report.stated)
+    known = (first.report.stated, first.report.system)
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins, *known)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:

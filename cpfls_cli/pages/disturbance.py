@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
     """Say how large the gusts of the flights are and how long they last, as far as that is known."""
     if record.disturbance is None:
-        if record.loop.shown and record.instruments is None:
+        if (record.loop.shown or record.loop.misses) and record.instruments is None:
             yield Text(
                 "Gusts: their sizes are not known, because the body is not: what its torque leaves unexplained says "
                 "nothing about them."

@@ -13,7 +13,7 @@ from typing import Any, Final
 from cpfls_cli.config.load import ASK, how_to_fill_in
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
 from cpfls_cli.flightlog.layouts import USUAL
-from cpfls_cli.flightlog.logging_rates import log_faster
+from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
@@ -186,17 +186,17 @@ def _rotors_in_words(proposal: Proposal) -> str:
     if proposal.states_torque:
         return "the log states a torque and no rotors"
     if not proposal.has_rotors:
-        system = proposal.logs[0].system
         surfaces = [name for name in proposal.first.unused if _SURFACE.search(name.lower())]
         if len(surfaces) > 1:
             return (
                 f"no column is recognised as a rotor's, and {joined(surfaces)} are by their names surfaces of an"
                 " airplane, or sticks: only vehicles that rotors carry are modelled"
             )
+        system, parameters = proposal.logs[0].system, proposal.logs[0].parameters
         return (
             "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are, name"
             " them in import.signals (rotor_speed or rotor_command)"
-            + (f"; else log them ({log_faster(system)})" if system else "")
+            + (f"; else {log_faster('them', FAST_HZ, system, parameters=parameters)}" if system else "")
         )
     own = (guess.other_columns for guess in proposal.signals if guess.signal in ROTORS)
     more = next((f", or more {rival.reason}" for rival in own if rival is not None), "")

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
 """Plans what tells the vehicle from the loop, and a missing effect from gusts."""
+BY_HAND = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
+"""The same without a mission."""
+FLOWN_BY_HAND = frozenset({"bbl", "bfl"})
+"""Formats of logs whose autopilot flies no mission file."""
 
 NOT_SPLIT = (
     "No two of these flights repeat a path, so the gap cannot be split into what comes again (an effect that the model "

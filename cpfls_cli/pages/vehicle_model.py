@@ -38,7 +38,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.replay import (
     beside_past,
     beside_rivals,
@@ -49,6 +49,7 @@ from cpfls_cli.pages.replay import (
 )
 from cpfls_cli.pages.source import Source
 from cpfls_cli.pages.trust import model_words
+from cpfls_cli.playback.loop import ANY
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
@@ -103,9 +104,6 @@ _OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was fo
 _LIVELY_RAD_S = 1.0
 """Body rate, root mean square, above which larger turns show no more of the vehicle."""
 
-_FLOWN_BY_HAND = {"bbl", "bfl"}
-"""Formats of logs whose autopilot flies no mission file."""
-
 _LEAST_HZ = 1 / coarsest_excited(ExciteSettings())
 """At which rotors have to be logged for what a flight is asked to show."""
 
@@ -154,6 +152,8 @@ def _as_vehicle(record: VehicleRecord) -> str:
         return "its constants are those of vehicle and autopilot together"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
+    if record.loop.misses and record.instruments is None:
+        return "what was found does not explain these flights"
     constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
     lacks = ["an effect is missing besides its constants"] if record.trust == Trust.LACKING else []
     if constants:
@@ -183,10 +183,12 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
         yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
-    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED):
+    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED, Trust.DO_NOT_USE):
         yield from slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
+    elif record.loop.misses and record.instruments is None:
+        yield _missed_words(record.loop)
     heavy = too_heavy(record)
     if heavy:
         yield f"Inertia and drag factor: {heavy}."
@@ -354,26 +356,25 @@ def _share_words(share: Array, error: Array) -> str:
 
 
 def slow_words(record: VehicleRecord) -> Iterator[str]:
-    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster."""
+    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster, and how."""
     if record.rotors_told is not None and round(record.rotors_told) < round(_LEAST_HZ):
-        yield f"{_slowly_logged(record.rotors_told, record.logged_by or ())} Flights logged so say no more."
+        faster = log_faster("rotors and body rates", _LEAST_HZ, *(record.logged_by or ()))
+        yield f"{_slowly_logged(record.rotors_told)} Flights logged so say no more; first {faster}."
 
 
-def _slowly_logged(told_hz: float, systems: Sequence[str]) -> str:
-    """Say how slowly rotors are logged, and what to set in the autopilots."""
+def _slowly_logged(told_hz: float) -> str:
     return (
         f"The rotors are logged {number(told_hz, 2)} times a second, which shows no motion above "
-        f"{number(told_hz / 2, 2)} Hz. Log rotors and body rates at {_LEAST_HZ:g} Hz or more first: "
-        f"{log_faster(*systems)}."
+        f"{number(told_hz / 2, 2)} Hz."
     )
 
 
-def too_slow(told_hz: float, systems: Sequence[str]) -> str:
-    """Say of rotors logged so slowly that no body can be found what is computed then."""
+def too_slow(told_hz: float) -> str:
+    """Say of rotors logged so slowly that no body can be found what is computed then; the answer says what to set."""
     return (
-        f"{_slowly_logged(told_hz, systems)} Inertia, drag factor, lag and effects cannot be found in these flights; "
-        "only the constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway "
-        "searches all the same."
+        f"{_slowly_logged(told_hz)} Inertia, drag factor, lag and effects cannot be found in these flights; only the "
+        "constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway searches "
+        "all the same."
     )
 
 
@@ -381,11 +382,8 @@ def loop_words(record: VehicleRecord) -> str:
     """Say how far the loop may have misled the fit, and what to fly."""
     loop = record.loop
     shares = joined(_of_bands(loop, index, axis) for index, axis in enumerate(("roll", "pitch")))
-    times = joined(
-        f"{name} {number(float(low), 2)} to {number(float(high), 2)} times"
-        for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
-        if np.isfinite(low)
-    )
+    ends = zip(INERTIA_PARAMETERS[:2], loop.low.tolist(), loop.high.tolist(), strict=False)
+    times = joined(f"{name} {_times(low, high)}" for name, low, high in ends if np.isfinite(low))
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
         f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found."
@@ -393,23 +391,44 @@ def loop_words(record: VehicleRecord) -> str:
     )
 
 
+def _times(low: float, high: float) -> str:
+    """Give the factors that bounds allow; those at the limit of what is told may lie beyond it."""
+    least, most = number(low, 2), number(high, 2)
+    if least != most:
+        return f"{least} to {most} times"
+    beyond = "at most " if low <= 1 / ANY else "at least " if high >= ANY else ""
+    return f"{beyond}{most} times"
+
+
+def _missed_words(loop: LoopGroup) -> str:
+    """Say that rotors that only lag explain more of the flights than what was found, and what to do."""
+    assert loop.missed is not None, "where more is missed"
+    turns = list(enumerate(("roll", "pitch")))
+    missed = joined(f"{_share(share)} of {axis}" for (_, axis), share in zip(turns, loop.missed, strict=False))
+    better = joined(_of_bands(loop, index, axis) for index, axis in turns)
+    return (
+        f"What was found does not explain these flights: its torque explains {missed} acceleration, that of the rotors "
+        f"with nothing but a lag {better}. Its numbers are not the vehicle's: state what is known of the vehicle, or "
+        "leave blocks out (playback.leave_out)."
+    )
+
+
+def _share(share: float) -> str:
+    return whole_percent(float(np.clip(share, 0.0, 1.0))) if np.isfinite(share) else "nothing known"
+
+
 def _of_bands(loop: LoopGroup, index: int, axis: str) -> str:
     """Say what torque explains about an axis where it explains least, and where most."""
     least, whole = loop.explained[index], f"{axis} acceleration"
     if loop.by_band is None or loop.band_hz is None or not np.isfinite(least):
-        return (
-            f"{whole_percent(float(least))} of the {whole}" if np.isfinite(least) else f"nothing known of the {whole}"
-        )
+        return f"{_share(least)} of the {whole}"
     shares = loop.by_band[:, index]
     known = np.flatnonzero(np.isfinite(shares))
     worst = int(known[np.argmin(np.abs(shares[known] - least))])
     best = int(known[np.argmax(levelled(shares[known]))])
-    words = [
-        f"{whole_percent(float(np.clip(shares[band], 0.0, 1.0)))} from {number(float(loop.band_hz[band, 0]), 2)} to "
-        f"{number(float(loop.band_hz[band, 1]), 2)} Hz"
-        for band in dict.fromkeys((worst, best))
-    ]
-    return f"{words[0]} of the {whole}{f' ({words[1]})' if len(words) > 1 else ''}"
+    hz = [f"from {number(low, 2)} to {number(high, 2)} Hz" for low, high in loop.band_hz.tolist()]
+    most = f" ({_share(shares[best])} {hz[best]})" if best != worst else ""
+    return f"{_share(shares[worst])} of the {whole} {hz[worst]}{most}"
 
 
 def _turns_to_fly(record: VehicleRecord) -> str:
@@ -417,11 +436,10 @@ def _turns_to_fly(record: VehicleRecord) -> str:
     turning = record.loop.turning
     lively = turning is not None and bool((turning[:2] > _LIVELY_RAD_S).all())
     how = "with quick turns about one axis at a time" if lively else "with larger and faster turns"
-    by_hand = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
     formats = {file.format.lower() for role, file in record.origin.inputs.items() if not role.startswith("config")}
-    if formats and formats <= _FLOWN_BY_HAND:
-        return f"{how}: {by_hand}."
-    return f"{how}, the same path several times ({by_hand}; or as a mission): {WHAT_TO_FLY}"
+    if formats and formats <= FLOWN_BY_HAND:
+        return f"{how}: {BY_HAND}."
+    return f"{how}, the same path several times ({BY_HAND}; or as a mission): {WHAT_TO_FLY}"
 
 
 def warnings(record: VehicleRecord) -> list[str]:

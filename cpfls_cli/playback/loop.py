@@ -21,6 +21,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable
+from cpfls_cli.rounding import largest, less
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
@@ -38,9 +39,11 @@ _LAGS = (0.0, 0.01, 0.02, 0.05, 0.1)
 _OVERLAP = 0.75
 _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
-_ANY = 10.0
+ANY = 10.0
 """Factor either way from which on a body can be any."""
 _TINY = np.finfo(float).tiny
+_LEAVES_LESS = 0.5
+"""Of what a model leaves unexplained: one without its effects that leaves less shows that it is wrong."""
 _MOST_NOISE = 0.1
 """Of the power of a band that may be noise of the sensors: with more, what is left is the noise's error."""
 
@@ -48,7 +51,7 @@ _MOST_NOISE = 0.1
 class LoopBounds(NamedTuple):
     """Bounds on moments of inertia, in those of a model, from how its torque and the rotation go together.
 
-    Other fields are described at `LoopGroup`.
+    Other fields are described at `LoopGroup`; what is explained may be of a better model than that of the bounds.
 
     Attributes
     ----------
@@ -62,11 +65,27 @@ class LoopBounds(NamedTuple):
     band_hz: Array = np.zeros((0, 2))
     by_band: Array = np.zeros((0, 3))
     turning: Array = np.full(3, np.nan)
+    missed: Array = np.full(3, np.nan)
 
     @property
     def shows_loop(self) -> bool:
         """Whether so much of roll or pitch is left unexplained that numbers may be those of the loop."""
-        return bool((self.explained[:2] < EXPLAINED).any())
+        return bool((self.explained[:2] < EXPLAINED).any()) and not self.misses
+
+    @property
+    def misses(self) -> bool:
+        """Whether a model explains much less of roll or pitch than rotors that only lag."""
+        return bool(np.isfinite(self.missed[:2]).any())
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether numbers may be none of the vehicle's: those of the loop, or of a model that explains no flight."""
+        return self.shows_loop or self.misses
+
+    @property
+    def least(self) -> float:
+        """What is explained about roll or pitch, the less of the two; infinite where neither is known."""
+        return float(np.nanmin([*self.explained[:2], np.inf]))
 
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
@@ -99,6 +118,23 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     return found._replace(turning=np.sqrt((rates**2).mean(axis=0)))
 
 
+def loop_beside_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> LoopBounds:
+    """Bound as `loop_bounds` does, and judge flights by what explains them best: a model, or rotors that only lag.
+
+    A model that was found and is wrong explains little of flights that show the vehicle well.
+    """
+    found = loop_bounds(model, flights)
+    if not found.shows_loop:
+        return found
+    known = np.isfinite(found.by_band[:, :2])
+    plain = [bounds for bounds in _plain_bounds(vehicle, flights) if np.isfinite(bounds.by_band[:, :2])[known].all()]
+    best = largest([found, *plain], lambda bounds: bounds.least)
+    better = found._replace(explained=best.explained, by_band=best.by_band)
+    left = 1 - found.explained[:2]
+    far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
+    return better._replace(missed=found.explained) if far.any() or not best.shows_loop else better
+
+
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], told_hz: float) -> bool:
     """Tell before any search whether no body can be found, because the rotors are logged too slowly.
 
@@ -112,8 +148,12 @@ def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight
     """
     if told_hz >= 2 * _FASTEST_HZ:
         return False
-    lagging = (VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=lag)) for lag in _LAGS)
-    return all(loop_bounds(model, flights).shows_loop for model in lagging)
+    return all(bounds.shows_loop for bounds in _plain_bounds(vehicle, flights))
+
+
+def _plain_bounds(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Iterator[LoopBounds]:
+    for lag in _LAGS:
+        yield loop_bounds(VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=lag)), flights)
 
 
 class BalancedTorque(NamedTuple):
@@ -150,7 +190,7 @@ def bounds_between(stretches: Sequence[BalancedTorque]) -> LoopBounds:
         low, high = np.fmin(low, lighter * np.exp(-half[0])), np.fmax(high, heavier * np.exp(half[1]))
         explained = np.fmin(explained, by_band[index])
     bands_hz = 1 / np.array([(long_s, short_s) for short_s, long_s in (*_BANDS, _FASTER)])
-    return LoopBounds(np.maximum(low, 1 / _ANY), np.minimum(high, _ANY), explained, bands_hz, by_band)
+    return LoopBounds(np.maximum(low, 1 / ANY), np.minimum(high, ANY), explained, bands_hz, by_band)
 
 
 def _factors(sums: Array) -> Array:
@@ -163,8 +203,8 @@ def _factors(sums: Array) -> Array:
     torque, turning = np.maximum(torque - noise_of_torque, _TINY), np.maximum(turning - noise_of_turning, _TINY)
     both = np.maximum(both, _TINY)
     # A divisor that small would make a factor beyond any, or beyond all numbers.
-    factors = [both / np.maximum(turning, both / _ANY), torque / np.maximum(both, torque / _ANY)]
-    return np.maximum(factors, 1 / _ANY)
+    factors = [both / np.maximum(turning, both / ANY), torque / np.maximum(both, torque / ANY)]
+    return np.maximum(factors, 1 / ANY)
 
 
 def _balanced(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> BalancedTorque:

@@ -21,7 +21,7 @@ from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
-from cpfls_cli.playback.loop import LoopBounds, loop_bounds
+from cpfls_cli.playback.loop import LoopBounds, loop_beside_plain
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -171,12 +171,12 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
-    loop, given = loop_bounds(fitted.model, own), instruments(own)
+    loop, given = loop_beside_plain(fitted.model, begun, own), instruments(own)
     constants = find_constants(begun, own, given, settings.leave_out)
-    if loop.shows_loop and (constants is None or not constants.tells):
+    if loop.unexplained and (constants is None or not constants.tells):
         constants = constants_of_past(begun, own, given, settings.leave_out) or constants
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
-    if constants is not None and not (loop.shows_loop or constants.contradict(fitted.model.body.inertia)):
+    if constants is not None and not (loop.unexplained or constants.contradict(fitted.model.body.inertia)):
         constants = None
     if constants is not None and constants.tells:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
@@ -187,7 +187,7 @@ def find_vehicle(
     if forecast is None:
         numbers = tuple(beside_loop(numbers, loop))
     gusts: FoundGusts | None = None
-    if forecast is not None or not loop.shows_loop:
+    if forecast is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, told=forecast is not None)
     return FoundVehicle(
@@ -364,8 +364,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
     """Widen the intervals of inertia and drag factor by what the loop leaves open.
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
-    the flights show the loop nothing is determined but what carries the weight, for every effect answers with it: the
-    thrust factor, where no law of the rotors found beside it carries a part of the weight.
+    the flights show the loop, or are not explained, nothing is determined but what carries the weight, for every effect
+    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight.
 
     Parameters
     ----------
@@ -380,7 +380,7 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else True
-        told = known and (number.name in carries or not loop.shows_loop)
+        told = known and (number.name in carries or not loop.unexplained)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and told)
 
 

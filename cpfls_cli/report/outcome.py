@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,12 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.job import Job
 
 Command = Sequence[str | Path]
-"""Words of a command line."""
+"""Words of a command line; a string is what a person does by hand."""
+
+
+def command_line(command: Command) -> str:
+    """Write a command so that it can be pasted, and what is done by hand as it is."""
+    return command if isinstance(command, str) else shlex.join(map(str, command))
 
 
 @dataclass(frozen=True)

@@ -171,10 +171,13 @@ def test_only_a_vehicle_that_was_found_has_numbers_to_take(refuse, command, flig
 @pytest.mark.parametrize("form", FORMS)
 def test_every_export_says_it_at_its_top(cpfls, vehicle, tmp_path, form):
     output = tmp_path / f"uav_model{FORMS[form].ending}"
-    result = cpfls("export", vehicle, "-o", output, "--format", form, "--json")
+    words = ("export", vehicle, "-o", output, "--format", form)
+    refused = cpfls(*words)
+    assert (refused.exit_code, "impossible numbers" in refused.stderr, output.exists()) == (2, True, False)
+    result = cpfls(*words, "--anyway", "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["cautions"][0] == HEADLINE
-    shown = cpfls("export", vehicle, "-o", output, "--format", form, "--force").stdout
+    shown = cpfls(*words, "--anyway", "--force").stdout
     for path in [output, *output.parent.glob("*.h")]:
         text = path.read_text()
         if form == "json":

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.playback.loop import loop_bounds
+from cpfls_cli.playback.loop import loop_beside_plain, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
 
 TRUTHS = {"45 g": SMALL, "1.5 kg": LARGE}
@@ -78,3 +79,19 @@ def test_a_torque_that_fades_by_itself_explains_no_answered_gust(flights, bounds
     fading = replace(model, response=replace(model.response, slow_roll_pitch=-1.5, slow_s=0.45))
     for found, expected in zip(loop_bounds(fading, flights[key]), bounds[key], strict=True):
         np.testing.assert_array_equal(found, expected)
+
+
+def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds):
+    """In still air the rotors alone explain what a model with a wrong lag does not; in gusts nothing explains more."""
+    wrong = VehicleModel(vehicle=SMALL.vehicle, response=RotorResponse(lag_s=0.8))
+    still = flights["45 g", CALM, 12.0]
+    assert loop_bounds(wrong, still).shows_loop
+    found = loop_beside_plain(wrong, SMALL.vehicle, still)
+    assert (found.misses, found.shows_loop, found.unexplained) == (True, False, True)
+    assert found.explained[:2].min() > 0.95
+    np.testing.assert_array_equal(found.missed, loop_bounds(wrong, still).explained)
+    for bandwidth in BANDWIDTHS[:2]:
+        key = ("45 g", GUSTS, bandwidth)
+        gusty = loop_beside_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])
+        assert (gusty.misses, gusty.shows_loop) == (False, True)
+        assert gusty.least >= bounds[key].least

@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.store import read_artifact, read_record, write_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.errors import InputError
@@ -40,6 +40,28 @@ def test_the_round_trip_is_exact(model, tmp_path):
     assert [(one.name, one.shape) for one in again.effects] == [(one.name, one.shape) for one in model.effects]
     assert np.array_equal(again.table.weights, model.table.weights)
     assert all(np.array_equal(new, old) for new, old in zip(again.table.airflow, model.table.airflow, strict=True))
+
+
+def test_instruments_have_bands_of_their_own(tmp_path):
+    record, path = record_of(MODELS["plain"]), tmp_path / "vehicle.h5"
+    loop = replace(record.loop, band_hz=np.ones((4, 2)), by_band=np.ones((4, 3)), missed=np.full(3, 0.1))
+    three, five = np.full(3, 0.9), np.ones(5)
+    told = InstrumentsGroup(
+        kind="past",
+        setpoint=(),
+        first=np.zeros(0, dtype=np.int64),
+        second=np.zeros(0, dtype=np.int64),
+        likeness=np.zeros(0),
+        low=five,
+        high=2 * five,
+        explained=np.ones((5, 3)),
+        total=three,
+        error=three,
+        used=five > 0,
+    )
+    write_record(path, replace(record, loop=loop, instruments=told))
+    again = read_record(path, VehicleRecord)
+    assert (len(again.loop.by_band), len(again.instruments.low), again.loop.misses) == (4, 5, True)
 
 
 def test_an_effect_that_nobody_knows_is_refused():

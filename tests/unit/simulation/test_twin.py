@@ -130,7 +130,7 @@ def test_rates_are_flown_where_no_attitude_is_asked_for(flight):
     assert asked.setpoints[0].attitude is None
     # The mixer lifts all rotors where one would have to push.
     assert np.median(asked.setpoints[0].thrust) == pytest.approx(HOVER, rel=0.1)
-    with pytest.raises(InputError, match="map setpoint_attitude"):
+    with pytest.raises(InputError, match="map them as setpoint_attitude"):
         asked_of(changed(flight), LOOP, CROSS, share=True)
 
 
