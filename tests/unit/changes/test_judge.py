@@ -339,9 +339,9 @@ def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_tha
     """In a quiet hover a flight tells ratios badly, which is no sign of a gyroscope that is mirrored."""
     rng = np.random.default_rng(19)
     before, (today,) = flights(4, rng), flights(1, rng)
-    usual = float(np.exp(np.mean([flight.values["follow yaw"] for flight in before])))
-    left = {name: value for name, value in today.values.items() if name != "follow yaw"}
-    for share, expected in ((0.7, ()), (0.3, ("follow yaw",)), (-0.1, ("follow yaw",))):
-        unsure = replace(today, values=left, unsure={"follow yaw": share * usual})
+    usual = float(np.exp(np.mean([flight.values["late yaw"] for flight in before])))
+    left = {name: value for name, value in today.values.items() if name != "late yaw"}
+    for share, expected in ((0.7, ()), (0.3, ("late yaw",)), (-0.1, ("late yaw",))):
+        unsure = replace(today, values=left, unsure={"late yaw": share * usual})
         told = changed([unsure], before, QUAD, rng)
-        assert (told.missing, told.undetermined) == (("follow yaw",), expected)
+        assert (told.missing, told.undetermined) == (("late yaw",), expected)
