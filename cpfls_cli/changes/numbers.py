@@ -507,7 +507,9 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
-    drives = _asked(signals, flies)[:, :2]
+    assert signals.thrust is not None, "rotor speeds are there"
+    # Beside the vehicle's own mass, for a load's is a share of that.
+    drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     block = contiguous(len(left), _BLOCKS)

@@ -673,7 +673,7 @@ def changed(
         bool,
         typer.Option(
             "--fail-on-change",
-            help="End with exit code 1 where something has changed, for scripts; with one or two reference flights 0 "
+            help="End with exit code 1 where something has changed, for scripts; with two reference flights 0 "
             "says only that nothing is beyond what is usual of vehicles. Where it cannot be told the exit code is 3, "
             "with or without this.",
         ),

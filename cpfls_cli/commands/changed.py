@@ -184,16 +184,22 @@ def _flights(
         of_other_vehicles([(by_role[role], stated[by_role[role]]) for role in sorted(given)], anyway=anyway)
     for side in ("today", "since"):
         if not any(role.startswith(side) for role in flights):
+<<<<<<< HEAD
             role, why = next((role, why) for role, why in refused.items() if role.startswith(side))
             raise InputError(_lacking(given[role], str(why), anyway=anyway))
+=======
+            first = next(role for role in refused if role.startswith(side))
+            raise InputError(_lacking(given[first], str(refused[first]), anyway=anyway))
+>>>>>>> fd
     return flights, [f"{LEFT_OUT}{error}" for error in refused.values()]
 
 
 def _lacking(path: Path, why: str, *, anyway: bool) -> str:
     """Say in one line which columns of the config a log lacks, if that is all, and what helps."""
-    found = [_NO_COLUMN.search(line) for line in why.splitlines()]
+    # What the log holds instead is a line of its own.
+    found = [_NO_COLUMN.search(line) for line in why.splitlines() if "import.signals: " not in line]
     lacks = [(each["signal"], each["column"]) for each in found if each is not None]
-    if anyway or len(lacks) < len(found):
+    if anyway or not lacks or len(lacks) < len(found):
         return why
     signals, more = joined(dict.fromkeys(signal for signal, _ in lacks)), len(lacks) - 1
     return (

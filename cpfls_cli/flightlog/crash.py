@@ -208,7 +208,11 @@ def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
     asked = np.linalg.norm(averaged(unlike - np.median(unlike[flies], axis=0), signs.period, _REST_S), axis=1)
     turns = averaged(signs.slow, signs.period, _REST_S)
     hardly = turns < min(_HARDLY_RAD_S, _OF_RATE * float(np.median(turns[flies])))
-    return np.asarray((asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly)
+    stuck = (asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly
+    if signs.height is not None:
+        # High above where it was lowest it hovers with rotors that have become unlike.
+        stuck &= signs.height < float(np.quantile(signs.height, 0.02)) + _DROP_M
+    return np.asarray(stuck)
 
 
 def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd | None:

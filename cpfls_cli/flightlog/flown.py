@@ -50,6 +50,9 @@ _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
 """Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
 of the height that is estimated for it."""
 
+_UNMOVED_M = 0.01
+"""Range of heights that no hover keeps to."""
+
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 """Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
 
@@ -270,7 +273,9 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     height = signs.height
     rises = 0.0 if height is None else float(np.ptp(height[active]))
     if signs.turning is None or signs.slow is None:
-        return height is not None and rises <= _STILL_M
+        leans = _leans(signs, active)
+        level = leans is not None and leans < _LEANS_RAD
+        return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))

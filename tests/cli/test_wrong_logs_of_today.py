@@ -91,6 +91,48 @@ def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, num
     assert "reversed, or nothing, and in no reference flight" in " ".join(result.stdout.split())
 
 
+def test_a_gyroscope_that_never_moves_today_is_a_change(cpfls, by_torque):
+    """Without attitude nothing else shows that it is dead."""
+    dead = flight_table(11)
+    dead[:, 1:4] = 0.0
+    save(by_torque / "dead.csv", dead, HEADER)
+    result = changed(cpfls, by_torque, "dead.csv")
+    assert result.exit_code == 1, result.output
+    assert "vibration gyroscope x" in json.loads((by_torque / "out" / "changed.json").read_text())["reversed"]
+    assert "a gyroscope that is mirrored or dead" in " ".join(result.stdout.split())
+
+
+def test_a_log_with_other_columns_is_said_in_a_line_and_compared_without_them_if_asked(cpfls, logs):
+    write_csv(logs / "other.csv", flat_log(TODAY, position=None, velocity=None))
+    refused = changed(cpfls, logs, "other.csv")
+    assert refused.exit_code == 2
+    (line,) = [line for line in refused.stderr.splitlines() if "error" in line]
+    assert "other.csv: has other columns than the config reads for position and velocity: no x and 5 more" in line
+    assert "give --anyway to compare without them" in line
+    assert changed(cpfls, logs, "other.csv", "--anyway").exit_code == 0
+
+
+def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, tmp_path):
+    for seed in (1, 2, 3, 4):
+        (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed), MOT_POLE_COUNT=14))
+    other = ulog_of_flight(TODAY, without="vehicle_local_position", MOT_POLE_COUNT=12)
+    (tmp_path / "other.ulg").write_bytes(other)
+    (tmp_path / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
+    (tmp_path / "before4.ulg").write_bytes(ulog_of_flight(flight(seed=4), MOT_POLE_COUNT=14, PWM_MIN=1000))
+    logs = [tmp_path / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
+    made = cpfls("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
+    assert made.exit_code == 0, made.output
+    assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in changed(cpfls, tmp_path, "other.ulg").stderr
+    words = ("changed", tmp_path / "study.yaml", tmp_path / "scaled.ulg", "--since", *logs, "-o", tmp_path / "out")
+    result = cpfls(*words, "--force")
+    said = " ".join(result.stdout.split())
+    assert not said.startswith("NO CHANGE:")
+    assert (
+        "The logs of before4.ulg and scaled.ulg state PWM_MIN 1000 and 1100: make sure that it is one vehicle." in said
+    )
+    assert "Commands of scaled.ulg are shares of another range" in said
+
+
 def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
     for seed in (1, 2, 3, 4):
         (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed)))

@@ -333,3 +333,15 @@ def test_a_ratio_that_is_reversed_today_is_a_change_and_one_that_is_missing_is_n
     assert (missing.changed, missing.missing, missing.reversed) == (False, ("late yaw",), ())
     turned = changed([replace(today, values=left, reversed=("late yaw",))], before, QUAD, rng)
     assert (turned.changed, turned.missing, turned.reversed) == (True, (), ("late yaw",))
+
+
+def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_than_to_the_reference():
+    """In a quiet hover a flight tells ratios badly, which is no sign of a gyroscope that is mirrored."""
+    rng = np.random.default_rng(19)
+    before, (today,) = flights(4, rng), flights(1, rng)
+    usual = float(np.exp(np.mean([flight.values["late yaw"] for flight in before])))
+    left = {name: value for name, value in today.values.items() if name != "late yaw"}
+    for share, expected in ((0.7, ()), (0.3, ("late yaw",)), (-0.1, ("late yaw",))):
+        unsure = replace(today, values=left, unsure={"late yaw": share * usual})
+        told = changed([unsure], before, QUAD, rng)
+        assert (told.missing, told.undetermined) == (("late yaw",), expected)

@@ -148,3 +148,21 @@ def test_a_hop_is_no_flight():
     found = flown(hop, ())
     assert not found.flies
     assert found.reasons[0].startswith("flies for only ")
+
+
+def test_a_hover_without_gyroscope_that_leans_is_a_flight(own):
+    hovers = type(own)(**vars(own))
+    hovers.position = 0.05 * np.sin(own.time)[:, None] + 0 * own.position
+    signs = Signs(
+        time=own.time,
+        rotors=rotor_shares(own.speed, shares=False),
+        height=hovers.position[:, 2],
+        upright=upright_of(own.angles, None, "wxyz"),
+    )
+    assert find_flown(signs).flies
+
+
+def test_a_rotor_that_weakens_high_up_rests_on_nothing(own):
+    calm = ended.then(own, 12.0, roll=own.angles[-1, 0], rotors=(1.3, 0.9, 0.9, 0.9))
+    calm.position[:, 2] *= np.minimum(calm.time / 5.0, 1.0)
+    assert "rests" not in flown(calm, ("height", "upright")).ended

@@ -1,13 +1,18 @@
 """What logs state of their vehicles, and in what two of them differ."""
 
-from cpfls_cli.flightlog.stated_vehicle import stated_vehicle, vehicles_apart
+from cpfls_cli.flightlog.stated_vehicle import autopilots_apart, ranges_apart, stated_vehicle, vehicles_apart
 
 COPTER = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MAX": 2000.0}
 
 
 def test_autopilot_frame_and_rotors_count_and_no_version_or_tuning():
     first = stated_vehicle("ArduCopter 3.6.8", COPTER)
-    assert first == {"written by": "ArduCopter", "FRAME_CLASS": "1", "FRAME_TYPE": "1"}
+    assert first == {
+        "written by": "ArduCopter",
+        "version": "3.6.8",
+        **dict.fromkeys(COPTER, "1"),
+        "MOT_PWM_MAX": "2000",
+    }
     assert not vehicles_apart(first, stated_vehicle("ArduCopter 4.3.1", COPTER | {"MOT_PWM_MAX": 1900.0}))
     assert vehicles_apart(first, stated_vehicle("ArduCopter 4.3.1", COPTER | {"FRAME_CLASS": 2.0})) == [
         "FRAME_CLASS 1 and 2"
@@ -21,3 +26,34 @@ def test_autopilot_frame_and_rotors_count_and_no_version_or_tuning():
 def test_what_states_nothing_is_not_apart():
     """Of a simulated flight nothing is known."""
     assert not vehicles_apart({}, stated_vehicle("PX4 1.14.0", {}))
+
+
+RACER = {"Craft name": "Kestrel", "Board information": "ACME F405", "motorOutput": "48,2047", "motor_poles": 14.0}
+
+
+def test_a_craft_has_a_name_and_poles_and_may_get_another_board():
+    first = stated_vehicle("Betaflight 4.5.0 (abc) STM32F405", RACER)
+    named = stated_vehicle("Betaflight 4.5.0 (abc) STM32F405", RACER | {"Craft name": "Merlin"})
+    assert vehicles_apart(first, named) == ["Craft name Kestrel and Merlin"]
+    assert vehicles_apart(first, stated_vehicle("Betaflight 4.5.0", RACER | {"motor_poles": 12.0}))
+    # A name that nobody gave says nothing.
+    new = RACER | {"Craft name": "", "Board information": "ACME F722", "motorOutput": "158,2047"}
+    rebuilt = stated_vehicle("Betaflight 4.5.0 (abc) STM32F405", new)
+    assert vehicles_apart(first, rebuilt) == []
+    assert autopilots_apart(first, rebuilt) == [
+        "Board information ACME F405 and ACME F722",
+        "motorOutput 48,2047 and 158,2047",
+    ]
+    assert ranges_apart(first, rebuilt)
+
+
+def test_an_old_frame_is_a_frame_type_and_throttle_is_an_output_where_nothing_else_is():
+    old = stated_vehicle("ArduCopter 3.4.4", {"FRAME": 1.0, "RC3_MIN": 1100.0, "RC3_MAX": 1900.0})
+    new = stated_vehicle("ArduCopter 3.6.8", {**COPTER, "MOT_PWM_MAX": 0.0, "RC3_MIN": 1101.0, "RC3_MAX": 1900.0})
+    assert vehicles_apart(old, new) == []
+    assert autopilots_apart(old, new) == ["version 3.4.4 and 3.6.8"]
+    assert not ranges_apart(old, new)
+    assert ranges_apart(old, new | {"RC3_MIN": "1130"})
+    assert "FRAME_TYPE 1 and 0" in vehicles_apart(old, new | {"FRAME_TYPE": "0"})
+    assert "RC3_MIN" not in stated_vehicle("PX4 1.14.0", {"RC3_MIN": 1100.0})
+    assert "RC3_MIN" not in stated_vehicle("ArduCopter 3.6.8", {**COPTER, "RC3_MIN": 1100.0})
