@@ -184,13 +184,8 @@ def _flights(
         of_other_vehicles([(by_role[role], stated[by_role[role]]) for role in sorted(given)], anyway=anyway)
     for side in ("today", "since"):
         if not any(role.startswith(side) for role in flights):
-<<<<<<< HEAD
-            role, why = next((role, why) for role, why in refused.items() if role.startswith(side))
-            raise InputError(_lacking(given[role], str(why), anyway=anyway))
-=======
             first = next(role for role in refused if role.startswith(side))
             raise InputError(_lacking(given[first], str(refused[first]), anyway=anyway))
->>>>>>> fd
     return flights, [f"{LEFT_OUT}{error}" for error in refused.values()]
 
 
