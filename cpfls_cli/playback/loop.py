@@ -183,7 +183,7 @@ def bounds_between(stretches: Sequence[BalancedTorque]) -> LoopBounds:
         total = sums.sum(axis=0)
         seen = (total[:, 3:] < _MOST_NOISE * total[:, [0, 2]]).all(axis=1)
         lighter, heavier = np.where(seen, _factors(total), np.nan)
-        by_band[index] = lighter / heavier
+        by_band[index] = np.where(seen, _explained(total), np.nan)
         if band == _FASTER:
             continue
         half = half_width(jackknife_error(np.log(_factors(total - sums))), len(sums))
@@ -198,13 +198,23 @@ def _factors(sums: Array) -> Array:
 
     A torque that goes against the rotation leaves any body.
     """
-    torque, both, turning, noise_of_torque, noise_of_turning = np.moveaxis(sums, -1, 0)
-    # Blocks without motion hold noise alone, and less of it than is taken off.
-    torque, turning = np.maximum(torque - noise_of_torque, _TINY), np.maximum(turning - noise_of_turning, _TINY)
+    torque, both, turning = _without_noise(sums)
     both = np.maximum(both, _TINY)
     # A divisor that small would make a factor beyond any, or beyond all numbers.
     factors = [both / np.maximum(turning, both / ANY), torque / np.maximum(both, torque / ANY)]
     return np.maximum(factors, 1 / ANY)
+
+
+def _explained(sums: Array) -> Array:
+    """Compute the share of the rotation that a torque explains, of any size: their squared correlation."""
+    torque, both, turning = _without_noise(sums)
+    return np.asarray(np.minimum((np.maximum(both, 0.0) / np.sqrt(torque) / np.sqrt(turning)) ** 2, 1.0))
+
+
+def _without_noise(sums: Array) -> tuple[Array, Array, Array]:
+    torque, both, turning, noise_of_torque, noise_of_turning = np.moveaxis(sums, -1, 0)
+    # Blocks without motion hold noise alone, and less of it than is taken off.
+    return np.maximum(torque - noise_of_torque, _TINY), both, np.maximum(turning - noise_of_turning, _TINY)
 
 
 def _balanced(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> BalancedTorque:

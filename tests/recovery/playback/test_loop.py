@@ -95,3 +95,13 @@ def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds
         gusty = loop_beside_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])
         assert (gusty.misses, gusty.shows_loop) == (False, True)
         assert gusty.least >= bounds[key].least
+
+
+def test_what_torque_explains_is_of_no_size(flights):
+    """A vehicle a hundred times too heavy or light explains as much; bounds alone end at factors of ten."""
+    flown, vehicle = flights["45 g", GUSTS, 12.0], TRUTHS["45 g"].vehicle
+    right = loop_bounds(VehicleModel(vehicle=vehicle), flown)
+    for factor in (0.01, 100.0):
+        inertia = tuple(factor * moment for moment in vehicle.inertia_kg_m2)
+        found = loop_bounds(VehicleModel(vehicle=replace(vehicle, inertia_kg_m2=inertia)), flown)
+        np.testing.assert_allclose(found.explained[:2], right.explained[:2], rtol=0.02)
