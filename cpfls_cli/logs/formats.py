@@ -263,7 +263,13 @@ def _is_header(line: bytes) -> bool:
     """Tell whether a line is text with a separator of columns in it."""
     text = line.rstrip(b"\r\n")
     printable = all(byte >= 0x20 or byte == 0x09 for byte in text)
-    return line.endswith(b"\n") and printable and any(separator in text for separator in b",;\t")
+    # What begins with a remark may be any text.
+    return (
+        line.endswith(b"\n")
+        and printable
+        and not text.startswith((b"#", b"%", b"//"))
+        and any(separator in text for separator in b",;\t")
+    )
 
 
 def _require_packages(path: Path, form: LogFormat) -> None:
