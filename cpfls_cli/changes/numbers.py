@@ -178,6 +178,8 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyros
         )
     flies = in_flight(signals)
     duration = float(flies.sum() * signals.period)
+    if not flies.any():
+        raise InputError(f"{name}: {'; '.join(flown(signals).cut)}")
     if duration < _SHORTEST_S:
         raise InputError(
             f"{name}: flies for {duration:.2g} s of {len(signals) * signals.period:.3g} s, and {_SHORTEST_S:g} s are"

@@ -133,7 +133,7 @@ def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
     assert "note: left out: short.csv: flies for " in notes
     assert "not compared, for not all flights tell it: vibration gyroscope x" in notes
     # A flight that is not compared is said first, not behind "more notes".
-    assert "note: left out: short.csv: flies for 2 s of 2 s" in changed(slow, short).stderr.splitlines()[0]
+    assert "note: left out: short.csv: flies for only 2 s" in changed(slow, short).stderr.splitlines()[0]
     notes = changed(speeds, options=["-v"]).stderr
     assert "speeds of rotors in speeds.csv, commands in before1.csv, " in notes
     dead = save(tmp_path / "dead.csv", flight_table(34), HEADER.replace("volts", "no"))
