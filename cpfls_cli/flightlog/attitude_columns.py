@@ -18,6 +18,9 @@ _DEGREES = 180 / np.pi
 _LARGEST_ANGLE, _LARGEST_TILT = 6.6, 1.7
 """Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn."""
 
+_NEAR: Final = 0.2
+"""Part of a turn, rad, that an angle moves between two samples where it jumps by a full turn."""
+
 BODY_OF: Final = {"FLU": "FLU", "ENU": "FLU", "FRD": "FRD", "NED": "FRD"}
 """Body axes of logs whose other axes are these."""
 
@@ -115,6 +118,9 @@ def _angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple
         return "deg", f"{called(named)}, which would be rad, but reaches {tilt:.3g}, so these are degrees", "data", ()
     if named.unit is not None:
         return named.unit, f"{called(named)}, which is in {named.unit}", "named", ()
+    jumps = np.abs(np.diff(values, axis=0))
+    if largest.max() < _LARGEST_ANGLE and (np.abs(jumps - 2 * np.pi) < _NEAR).any():
+        return "rad", f"{called(named)}; jumps by a full turn in rad", "data", ()
     if tilt > _LARGEST_TILT or turn > 20 * _LARGEST_ANGLE:
         return "deg", f"{called(named)}; reaches {max(tilt, turn):.3g}, so these are degrees", "data", ()
     rival = Rival("unit: deg", f"a flight that never leans more than {tilt:.2g} degrees would look the same")

@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.airframe import airframe_from_motion
-from cpfls_cli.flightlog.attitude_columns import doubt_reading
+from cpfls_cli.flightlog.attitude_columns import _angle_unit, doubt_reading
 from cpfls_cli.flightlog.log_table import LogTable
+from cpfls_cli.flightlog.names import column_groups, named_signals
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognised import Seen
 from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion
@@ -328,3 +329,13 @@ def test_six_rotors_of_a_hexarotor_in_hover_are_all_rotors():
     pulses = 1500.0 + 60.0 * (OWN.angles @ mixed[:, 1:].T) + 2.0 * rng.standard_normal((len(OWN.time), 6))
     speed = named(pulses, *(f"actuator_outputs[{index}]" for index in range(6)))
     assert proposed(speed=speed).rotors == 6
+
+
+def test_angles_that_jump_by_a_full_turn_are_in_rad():
+    """Who rolls over leans beyond a quarter turn, which else tells degrees."""
+    (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
+    time = np.linspace(0, 10, 1001)
+    rolls = np.column_stack([np.angle(np.exp(1j * 3 * time)), 0.2 * np.sin(time), 0.1 * time])
+    assert _angle_unit(angles, rolls)[0] == "rad"
+    assert _angle_unit(angles, np.degrees(rolls))[0] == "deg"
+    assert _angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
