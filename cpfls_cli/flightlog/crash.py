@@ -230,8 +230,8 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
     # What falls since its rotors stopped hits the ground later.
     lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
-    # Who ends the log in a flip has lost nothing.
-    if lost and (after < len(signs.time) or len(hits) or _ignores_rotors(signs, part, int(troubled[0]))):
+    # Who flips and lands, or ends the log in a flip, has lost nothing.
+    if lost and (len(hits) or lies_then or stops or _ignores_rotors(signs, part, int(troubled[0]))):
         return _crash(signs, troubled, hits, first + np.flatnonzero(trouble.strained), after)
     if rests_then:
         return EarlyEnd(after, f"from {signs.time[after]:.1f} s on it rests on something, with its rotors on")

@@ -166,3 +166,9 @@ def test_a_rotor_that_weakens_high_up_rests_on_nothing(own):
     calm = ended.then(own, 12.0, roll=own.angles[-1, 0], rotors=(1.3, 0.9, 0.9, 0.9))
     calm.position[:, 2] *= np.minimum(calm.time / 5.0, 1.0)
     assert "rests" not in flown(calm, ("height", "upright")).ended
+
+
+@pytest.mark.parametrize("known", [("force",), ("upright",), ()])
+def test_a_flip_before_landing_is_no_crash(own, known):
+    landed = ended.then(ended.joined(own, ended.flips(flight(7.0))), 5.0, roll=0.0)
+    assert flown(landed, known).ended == ""
