@@ -20,7 +20,7 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.changes.causes import causes
 from cpfls_cli.changes.judge import NAMED, Change, changed
 from cpfls_cli.changes.numbers import KINDS, FlightNumbers
-from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST, common_numbers
+from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST
 from cpfls_cli.commands import report
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.stated_vehicle import autopilots_apart, ranges_apart, vehicles_apart
@@ -264,8 +264,11 @@ def _warnings(
     known = [numbers_of_flight(own) for own in flights]
     lost = [name for name in dict.fromkeys(name for own in known for name in own.values) if name not in names]
     if lost:
-        few = sorted({own.name for own in known if not set(common_numbers(known)) >= set(own.values)})
-        yield f"not compared, for not all flights tell it: {joined(lost)} (only {joined(few)})"
+        by_flights: dict[str, list[str]] = {}
+        for each in lost:
+            by_flights.setdefault(joined(own.name for own in known if each not in own.values), []).append(each)
+        listed = "; ".join(f"{joined(each)} (not {without})" for without, each in by_flights.items())
+        yield f"not compared, for not all flights tell it: {listed}"
 
 
 def _flown_unlike(change: Change, today: Sequence[FlightNumbers], before: Sequence[FlightNumbers]) -> Iterator[str]:

@@ -440,7 +440,9 @@ def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
 
 
 def _apart(light: Load, heavy: Load, measured: bool) -> bool:
-    return heavy.size > _ALIKE[measured and light.sensed and heavy.sensed] * light.size
+    # A battery of so much less carries so much less at equal commands, where the autopilot does not make up for it.
+    emptier = light.voltage / heavy.voltage if not measured and light.voltage > heavy.voltage else 1.0
+    return heavy.size > _ALIKE[measured and light.sensed and heavy.sensed] * emptier**2 * light.size
 
 
 def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:

@@ -74,11 +74,14 @@ class Load(NamedTuple):
         Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
     steady : bool
         Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
+    voltage : float
+        Of the battery in flight, V; NaN where the log does not hold it.
     """
 
     size: float
     sensed: bool
     steady: bool
+    voltage: float = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -359,7 +359,9 @@ def _load(seen: Seen, speeds: Array) -> Load | None:
     seconds = max(1, round(seen.rate_hz))
     means = power[known][: int(known.sum()) // seconds * seconds].reshape(-1, seconds).mean(axis=1)
     steady = len(means) > 1 and float(means.std()) < _STEADY * float(means.mean())
-    return Load(float(power[known].sum()) / whole, sensed, steady)
+    voltage = seen.guesses.get("voltage")
+    volts = float("nan") if voltage is None else float(np.median(seen.mapped(voltage)))
+    return Load(float(power[known].sum()) / whole, sensed, steady, volts)
 
 
 def _doubt_columns(seen: Seen) -> None:

@@ -451,6 +451,20 @@ def test_how_two_pilots_fly_is_no_mass(proposed, tmp_path, own):
     assert "1.h5" in learns
 
 
+@pytest.mark.parametrize(("volts", "heavier"), [(16.0, True), (14.5, False)])
+def test_an_emptier_battery_is_no_mass(proposed, tmp_path, own, volts, heavier):
+    """A fifth more of command at a tenth less of voltage is the same thrust."""
+    logs = []
+    for number, battery in enumerate((16.0, volts)):
+        other = flight(seconds=20.0, seed=3 + number)
+        values = 0.6 / own.speed.mean() * (1.19 if number else 1.0) ** 0.5 * other.speed
+        commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
+        more = {"voltage": {"battery_voltage": battery - 0.001 * other.time}}
+        logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, speed=commands, **more)))
+    result, _, _ = proposed(*logs, "--mass", "0.037", "--arm", "0.05")
+    assert ("it weighs" in result.stderr) is heavier
+
+
 def test_a_file_that_is_given_twice_is_counted_once_and_said(proposed, tmp_path, own):
     first = write_csv(tmp_path / "one.csv", flat_log(own))
     copy = write_csv(tmp_path / "copy.csv", flat_log(own))
