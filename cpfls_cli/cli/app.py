@@ -394,7 +394,7 @@ def init(
             "--thrust-factor",
             metavar="N_S2",
             min=1e-12,
-            help="Thrust of a rotor over its squared speed in rad/s, N s^2, where a data sheet tells it.",
+            help="Thrust of a rotor over its squared speed in rad/s, N s^2, where a data sheet gives it.",
         ),
     ] = None,
     drag_factor: Annotated[
@@ -674,7 +674,7 @@ def changed(
         typer.Option(
             "--fail-on-change",
             help="End with exit code 1 where something has changed, for scripts; with two reference flights 0 "
-            "says only that nothing is beyond what is usual of vehicles. Where it cannot be told the exit code is 3, "
+            "says only that nothing is beyond what is usual of vehicles. Where that is unknown the exit code is 3, "
             "with or without this.",
         ),
     ] = False,

@@ -13,7 +13,7 @@ from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
-from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
+from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
@@ -67,9 +67,6 @@ _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
 _STEADY: Final = 0.15
 """Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
 specific force of a lean of 30 degrees is 15 % above gravity."""
-
-_SHORTEST_HOVER_S: Final = 2.0
-"""Of a VTOL, below which nothing of it can be recognised."""
 
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _SHOWN = 4
@@ -235,7 +232,7 @@ def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
     time = log.grid - log.grid[0]
     first, after = max(hovers, key=lambda own: own[1] - own[0], default=(0, 1))
     begin, end = float(time[first]), float(time[after - 1])
-    if end - begin < _SHORTEST_HOVER_S:
+    if end - begin < SHORTEST_FLIGHT_S:
         raise InputError(f"a log of {what}, and it hovers for {end - begin:.3g} s of this one at a time")
     if not forward[part].any():
         return replace(flown, reasons=(*flown.reasons, f"{what}, and it hovers throughout"))

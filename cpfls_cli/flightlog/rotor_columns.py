@@ -415,7 +415,7 @@ def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int
     if stands.any():
         level = np.median(driven[stands], axis=0)
         odd |= {
-            moving[index]: "it stands away from its least while the motors stand: no motor"
+            moving[index]: "it keeps above its lowest value while the motors are off: no motor"
             for index, share in enumerate(level)
             if share > _AWAY and moving[index] not in odd
         }

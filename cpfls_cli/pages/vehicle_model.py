@@ -373,7 +373,7 @@ def too_slow(told_hz: float) -> str:
     """Say of rotors logged so slowly that no body can be found what is computed then; the answer says what to set."""
     return (
         f"{_slowly_logged(told_hz)} Inertia, drag factor, lag and effects cannot be found in these flights; only the "
-        "constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway searches "
+        "constants that the config leaves open are fitted, of which the thrust factor may be found. --anyway searches "
         "all the same."
     )
 
