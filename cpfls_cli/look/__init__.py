@@ -1,0 +1,1 @@
+"""What one ordinary log tells of a multirotor: no mass, no inertia, no second flight."""
