@@ -5,11 +5,11 @@ Numerics return results. This module knows no file: `store` writes and reads res
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
 from types import NoneType
-from typing import Any, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -64,28 +64,78 @@ def result(cls: type[T]) -> type[T]:
 
 
 class Described(NamedTuple):
-    """A field of a result: its name, its type without None, what it is, and its default."""
+    """A field of a result.
+
+    Attributes
+    ----------
+    kind : type
+        Without the None of an optional one.
+    about : About or None
+        None for a part: a result, a mapping from names to results, or a table of them.
+    default : object
+        `MISSING` where every file must hold it.
+    optional : bool
+        Whether it may be None.
+    """
 
     name: str
     kind: Any
     about: About | None
     default: Any
+    optional: bool
 
     @property
-    def rows(self) -> Any:
-        """Class of the rows of a table; None where it is none."""
-        inner = get_args(self.kind)[:1]
-        return inner[0] if get_origin(self.kind) is tuple and is_dataclass(inner[0]) else None
+    def named(self) -> bool:
+        """Whether it maps names to results."""
+        origin = get_origin(self.kind)
+        return self.about is None and isinstance(origin, type) and issubclass(origin, Mapping)
+
+    @property
+    def table(self) -> bool:
+        """Whether it is a tuple of results, one a row."""
+        return self.about is None and get_origin(self.kind) is tuple
+
+    @property
+    def inner(self) -> Any:
+        """Class of the results in a part."""
+        return get_args(self.kind)[1] if self.named else get_args(self.kind)[0] if self.table else self.kind
+
+    @property
+    def scalar(self) -> type:
+        """Type of a value, or of each of many: bool, int, float or str."""
+        return _scalar(self.kind)
+
+    @property
+    def many(self) -> bool:
+        """Whether it is a tuple of values."""
+        return self.about is not None and get_origin(self.kind) is tuple
+
+
+def _scalar(kind: Any) -> type:
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return type(inner[0])
+    if origin is tuple:
+        return _scalar(inner[0])
+    if origin is np.ndarray:
+        return _scalar(get_args(inner[1])[0])
+    kinds = {bool: (bool, np.bool_), int: (int, np.integer), str: (str, np.str_), float: (float, np.floating)}
+    return next(own for own, alike in kinds.items() if issubclass(kind, alike))
+
+
+def described_fields(cls: Any) -> tuple[Described, ...]:
+    """List the fields of a result that are written, in their order."""
+    return _described(cls)
 
 
 @cache
-def described_fields(cls: Any) -> tuple[Described, ...]:
-    """List the fields of a result that are written."""
+def _described(cls: Any) -> tuple[Described, ...]:
     hints = get_type_hints(cls)
+    written = [each for each in fields(cls) if "about" in each.metadata]
+    kinds = [(each, hints[each.name]) for each in written]
     return tuple(
-        Described(each.name, _without_none(hints[each.name]), each.metadata["about"], each.default)
-        for each in fields(cls)
-        if "about" in each.metadata
+        Described(each.name, _without_none(kind), each.metadata["about"], each.default, NoneType in get_args(kind))
+        for each, kind in kinds
     )
 
 
@@ -95,14 +145,9 @@ def _without_none(hint: Any) -> Any:
 
 def plain(given: Any) -> Any:
     """Write a result as JSON knows it: brief fields, and properties in its ``SHOWN``; what is not finite is null."""
-    if is_dataclass(given):
-        shown = {name: getattr(given, name) for name in getattr(given, "SHOWN", ())}
-        fields_ = {
-            each.name: getattr(given, each.name)
-            for each in described_fields(type(given))
-            if each.about is None or each.about.brief
-        }
-        return {name: plain(each) for name, each in {**shown, **fields_}.items()}
+    if is_dataclass(given) and not isinstance(given, type):
+        own = [each.name for each in described_fields(type(given)) if each.about is None or each.about.brief]
+        return {name: plain(getattr(given, name)) for name in (*getattr(given, "SHOWN", ()), *own)}
     if isinstance(given, Mapping):
         return {name: plain(each) for name, each in given.items()}
     if isinstance(given, tuple | list | np.ndarray):
@@ -111,19 +156,18 @@ def plain(given: Any) -> Any:
     return None if isinstance(given, float) and not np.isfinite(given) else given
 
 
-def column(rows: tuple[Any, ...], name: str) -> list[Any]:
+def column(rows: Iterable[Any], name: str) -> list[Any]:
     """List one field of the rows of a table."""
     return [getattr(row, name) for row in rows]
 
 
 def datasets(cls: Any, prefix: str = "") -> Iterator[tuple[str, Described]]:
-    """List the datasets of a result by path, for documentation."""
+    """List the values of a result by path, for documentation."""
     for own in described_fields(cls):
         if own.about:
             yield f"{prefix}{own.name}", own
         else:
-            inner = own.rows or (get_args(own.kind)[1] if get_origin(own.kind) is dict else own.kind)
-            yield from datasets(inner, f"{prefix}{own.name}/")
+            yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}")
 
 
 @result

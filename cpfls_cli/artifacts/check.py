@@ -173,8 +173,8 @@ class Stored(NamedTuple):
 
 
 @contextmanager
-def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
-    """Open an artifact: the one gate through which anything of it is read.
+def opened_file(path: Path) -> Iterator[h5py.File]:
+    """Open a file that ends in its seal: the one gate through which anything of it is read.
 
     HDF5 trusts what it parses, and damage there may keep it busy for ever; so it opens nothing whose seal does not fit.
     """
@@ -185,14 +185,22 @@ def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
         with file:
             with patient(path):
                 _refuse_links(file)
-                stored = stored_of(path, file)
-            if wanted and not any(each.includes(stored.spec) for each in wanted):
-                asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
-                made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
-                raise InputError(f"{path}: is a {stored.spec.name}{made}; this command needs a {asked}")
-            yield stored
+            yield file
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         raise InputError(f"{path}: damaged: {one_line(error)}") from None
+
+
+@contextmanager
+def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
+    """Open an artifact of one of these formats, or of any."""
+    with opened_file(path) as file:
+        with patient(path):
+            stored = stored_of(path, file)
+        if wanted and not any(each.includes(stored.spec) for each in wanted):
+            asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
+            made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
+            raise InputError(f"{path}: is a {stored.spec.name}{made}; this command needs a {asked}")
+        yield stored
 
 
 def stored_of(path: Path, file: h5py.File) -> Stored:
@@ -201,7 +209,7 @@ def stored_of(path: Path, file: h5py.File) -> Stored:
     # Most formats know many datasets that a file need not hold; to look for each took longer than to read the others.
     names: set[bytes] = set()
     file.id.links.visit(names.add)
-    data = {d.path: own for d in spec.datasets if d.path.encode() in names and (own := _dataset(file, d.path))}
+    data = {d.path: own for d in spec.datasets if d.path.encode() in names and (own := dataset_of(file, d.path))}
     return Stored(spec, _read_header(file), data)
 
 
@@ -243,7 +251,8 @@ _MOST_PACKED = 1100
 """Bytes that gzip makes of one, at most: 1032 where all are equal."""
 
 
-def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
+def dataset_of(file: h5py.File, path: str) -> h5py.Dataset | None:
+    """Look up a dataset that lies in the file, as large as it says; None where there is something else."""
     # By the library below: a dataset looked up and asked by its object takes three times as long.
     found = h5py.h5o.open(file.id, path.encode())
     if not isinstance(found, h5py.h5d.DatasetID):

@@ -113,7 +113,26 @@ def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
         check_output(path, job.force or replaceable, job.inputs)
 
 
-def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+class Taking(Protocol):
+    """What takes note of the files that it reads."""
+
+    @property
+    def reads(self) -> Callable[[Path], None]:
+        """Takes note of every input file."""
+        ...
+
+    @property
+    def inputs(self) -> list[Path]:
+        """What was taken so far."""
+        ...
+
+    @property
+    def cautions(self) -> dict[str, None]:
+        """What speaks against what the inputs hold."""
+        ...
+
+
+def take_inputs(job: Taking, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
     """Check inputs, and take note of what they hold."""
     for path in inputs.values():
         _check_input(path)

@@ -13,7 +13,6 @@ import typer
 
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import (
-    Commands,
     Common,
     ConfigArgument,
     OutputOption,
@@ -40,6 +39,7 @@ from cpfls_cli.cli.path_options import (
     ToTellOption,
     WaypointsOption,
 )
+from cpfls_cli.cli.stages import AllCommands
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="cpfls",
-    cls=Commands,
+    cls=AllCommands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

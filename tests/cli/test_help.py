@@ -10,6 +10,7 @@ from cpfls_cli import __version__
 from cpfls_cli.cli.app import app
 
 COMMANDS = (
+    "look",
     "trajectory",
     "simulate",
     "init",

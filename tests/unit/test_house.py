@@ -188,9 +188,10 @@ def test_tests_import_from_shared_builders_alone():
 
 # A module lives for two users or for more than about 80 lines of code. These are one thing of many of a kind, each
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to, a form of the report.
-ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/")
+ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
 SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
+    "cli/stages.py": "commands of stages; those of `cli/app.py` become some, one after the other",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "pages/flight_numbers.py": "the page of an artifact",

@@ -1,0 +1,372 @@
+"""What a person reads of a result: one template in Markdown, shown on a terminal, as HTML and as Markdown.
+
+Beside what Markdown has, a template knows
+
+- folds, ``::: Title`` to ``:::``, which a terminal opens with -v and a page by a click; with ``{open}`` behind it the
+  page shows them open;
+- figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
+- notes, ``> text``, which a terminal prints on standard error;
+- tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
+- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page.
+
+Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markdown_it import MarkdownIt
+from markdown_it.rules_core import StateCore
+from markdown_it.tree import SyntaxTreeNode
+from markupsafe import Markup
+
+from cpfls_cli.errors import visible
+from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Table, Text, Tone
+from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
+from cpfls_cli.result import column
+from cpfls_cli.version import __version__
+from cpfls_cli.words import joined
+
+Figures = Mapping[str, Callable[[], str]]
+"""Figures by the name that a template shows them under: each gives HTML, or nothing where there is nothing to show."""
+
+TEMPLATES = Path(__file__).with_name("templates")
+TONES = ("good", "note", "warning", "unsure")
+_MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
+_FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
+_HEADING = re.compile(r"(#{1,3}) (.+)")
+_SPECIAL = re.compile(r"[\\`*_{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
+_LONG = 36
+"""Characters from which the words of a cell are a sentence, which a terminal breaks."""
+_NEAR = 0.1
+"""Share of its half width by which an interval may be off the middle and is still written with one number."""
+
+
+def escaped(value: Any) -> Markup:
+    """Write a value so that Markdown shows it as it is: on one line, its controls visible."""
+    if isinstance(value, Markup):
+        return value
+    text = UNKNOWN if value is None else visible(" ".join(str(value).split()))
+    return Markup(_SPECIAL.sub(lambda found: f"{found[0][:-1]}\\{found[0][-1]}", text))
+
+
+def code(text: object) -> Markup:
+    """Write text as code: what is typed, names of files and parameters."""
+    shown = visible(" ".join(str(text).split()))
+    fence = "`" * (1 + max(map(len, re.findall("`+", shown)), default=0))
+    pad = " " if shown.startswith("`") or shown.endswith("`") else ""
+    return Markup(f"{fence}{pad}{shown}{pad}{fence}")
+
+
+def toned(value: Any, tone: Tone) -> Markup:
+    """Write a value that stands out."""
+    return Markup(f"{escaped(value)} {{{tone}}}" if tone in TONES else escaped(value))
+
+
+def interval(estimate: Any, unit: str = "", factor: float = 1.0) -> str:
+    """Write an estimate with its 95 % interval, as ``163 ± 37``; by both ends where it is not in their middle."""
+    if estimate is None or not np.isfinite(estimate.value):
+        return UNKNOWN
+    value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
+    shown = [printed(each) for each in with_interval(value, low, high)]
+    behind = f" {unit}" if unit else ""
+    half = 0.5 * (high - low)
+    if not np.isfinite(half) or half <= 0:
+        return shown[0] + behind
+    if abs(high - value - half) > _NEAR * half or "×" in shown[0]:
+        return f"{shown[0]} [{shown[1]}, {shown[2]}]{behind}"
+    # Rounded as the value is.
+    decimals = len(shown[0].partition(".")[2])
+    return f"{shown[0]} ± {half:.{decimals}f}{behind}"
+
+
+def plural(count: int, word: str, words: str = "") -> str:
+    """Write a count with its word."""
+    return f"{count} {word if count == 1 else words or word + 's'}"
+
+
+def duration(seconds: float) -> str:
+    """Write a time: ``4.2 s``, ``42 s`` or ``3 min 20 s``."""
+    if not np.isfinite(seconds):
+        return UNKNOWN
+    if seconds < 99.5:
+        return f"{seconds:.1f} s" if seconds < 9.95 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if rest else f"{minutes} min"
+
+
+def table(header: Sequence[Any], rows: Iterable[Sequence[Any]], left: Iterable[int] = (0,)) -> Markup:
+    """Write a table; columns are aligned right but for those that are named, numbers have four digits."""
+    words = set(left)
+    rules = [Markup(":--" if index in words else "--:") for index in range(len(header))]
+    lines = (" | ".join(map(_cell, row)) for row in (header, rules, *rows))
+    return Markup("\n".join(f"| {line} |" for line in lines))
+
+
+def _cell(value: Any) -> str:
+    return re.sub(r"(?<!\\)\|", r"\|", escaped(number(value) if isinstance(value, float) else value))
+
+
+_FILTERS: Mapping[str, Callable[..., Any]] = {
+    "change": change,
+    "code": code,
+    "duration": duration,
+    "interval": interval,
+    "joined": lambda words, last="and": Markup(joined(map(escaped, words), last)),
+    "number": lambda value, digits=4: UNKNOWN if value is None else number(value, digits),
+    "percent": whole_percent,
+    "plural": plural,
+    "sentence": lambda text: sentence(text) if not isinstance(text, Markup) else Markup(sentence(text)),
+    "share": percent,
+    "toned": toned,
+}
+
+
+@cache
+def _environment(folder: Path) -> Environment:
+    made = Environment(
+        loader=FileSystemLoader([folder, TEMPLATES]),
+        # What macros give is not escaped again; everything else that is shown is data.
+        autoescape=True,
+        finalize=escaped,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters.update(_FILTERS)
+    made.globals.update(np=np, table=table, zip=zip, column=column)
+    return made
+
+
+def words(template: str, given: Any, *, folder: Path = TEMPLATES, **more: Any) -> str:
+    """Word a result by its template, in which it is ``r``."""
+    return _environment(folder).get_template(f"{template}.md.j2").render(r=given, **more)
+
+
+@dataclass
+class Node:
+    """A part of a page: ``words`` in Markdown, a ``heading``, a ``fold`` or a ``figure``, with its marks."""
+
+    kind: str
+    text: str = ""
+    level: int = 0
+    name: str = ""
+    marks: tuple[str, ...] = ()
+    inner: list[Node] = field(default_factory=list)
+
+
+def tree(text: str) -> list[Node]:
+    """Take a page apart into headings, folds, figures and what is plain Markdown between them."""
+    page: list[Node] = []
+    open_nodes, verbatim = [page], False
+    for line in text.splitlines():
+        into = open_nodes[-1]
+        verbatim ^= line.startswith("```")
+        if not verbatim and line == ":::" and len(open_nodes) > 1:
+            open_nodes.pop()
+        elif not verbatim and line.startswith("::: "):
+            into.append(_marked(line.removeprefix("::: "), Node("fold")))
+            open_nodes.append(into[-1].inner)
+        elif not verbatim and (heading := _HEADING.fullmatch(line)):
+            into.append(_marked(heading[2], Node("heading", level=len(heading[1]))))
+        elif not verbatim and (figure := _FIGURE.fullmatch(line)):
+            into.append(Node("figure", figure[1], name=figure[2]))
+        else:
+            if not into or into[-1].kind != "words":
+                into.append(Node("words"))
+            into[-1].text += line + "\n"
+    return page
+
+
+def _marked(text: str, node: Node) -> Node:
+    found = _MARKS.search(text)
+    node.text, node.marks = text[: found.start()] if found else text, tuple(found[1].split()) if found else ()
+    return node
+
+
+@cache
+def _markdown() -> MarkdownIt:
+    made = MarkdownIt("commonmark", {"html": False}).enable("table")
+    # Before escaped characters become text, so that no data can be a mark.
+    made.core.ruler.after("inline", "marks", _take_marks)
+    return made
+
+
+def _take_marks(state: StateCore) -> None:
+    """Make marks behind a cell or a paragraph the class of it, and first cells the headers of their rows."""
+    for before, token in zip(state.tokens, state.tokens[1:], strict=False):
+        last = token.children[-1] if token.children else None
+        if last is not None and last.type == "text" and (found := _MARKS.search(last.content)):
+            last.content = last.content[: found.start()]
+            before.attrSet("class", found[1])
+        if token.type == "th_open":
+            token.attrSet("scope", "col")
+        elif before.type == "tr_open" and token.type == "td_open":
+            token.attrSet("scope", "row")
+            token.tag = "th"
+            next(each for each in state.tokens[state.tokens.index(token) :] if each.type == "td_close").tag = "th"
+
+
+def blocks(text: str) -> list[Block]:
+    """Give what a terminal shows of a page; figures are left out, and headings of nothing."""
+    made = list(_blocks(tree(text)))
+    shown = [(block, after) for block, after in zip(made, [*made[1:], None], strict=True)]
+    empty = (Heading, Folded, type(None))
+    return [
+        block
+        for block, after in shown
+        if block is made[0] or not (isinstance(block, Heading) and isinstance(after, empty))
+    ]
+
+
+def _blocks(nodes: Iterable[Node]) -> Iterator[Block]:
+    for node in nodes:
+        if node.kind == "heading":
+            yield Heading(_plain_line(node.text))
+        elif node.kind == "fold":
+            yield Folded(_plain_line(node.text), list(_blocks(node.inner)))
+        elif node.kind == "words":
+            for each in SyntaxTreeNode(_markdown().parse(node.text)).children:
+                yield from _blocks_of(each)
+
+
+def _plain_line(text: str) -> str:
+    return _plain(SyntaxTreeNode(_markdown().parseInline(text)))
+
+
+def _plain(node: SyntaxTreeNode) -> str:
+    """Give the text of a node as a terminal prints it."""
+    written = {"text": "{}", "code_inline": "`{}`", "softbreak": " ", "hardbreak": " "}
+    return "".join(written[each.type].format(each.content) for each in node.walk() if each.type in written)
+
+
+def _blocks_of(node: SyntaxTreeNode) -> Iterator[Block]:
+    if node.type == "paragraph":
+        yield Text(_plain(node))
+    elif node.type == "blockquote":
+        yield from (Text(_plain(each), "warning") for each in node.children)
+    elif node.type in {"bullet_list", "ordered_list"}:
+        yield from _items(node)
+    elif node.type == "table":
+        yield _table(node)
+    elif node.type in {"fence", "code_block"}:
+        yield Listing("", node.content)
+
+
+def _items(node: SyntaxTreeNode) -> Iterator[Block]:
+    """Give items as lines; those of the form ``**Term**: text`` as terms with their values."""
+    facts: list[tuple[str, str]] = []
+    for index, item in enumerate(node.children):
+        said = " ".join(map(_plain, item.children))
+        first = next(
+            (
+                each
+                for each in item.walk()
+                if each.type in {"strong", "code_inline", "text"} and (each.children or each.content)
+            ),
+            None,
+        )
+        if first is not None and first.type == "strong":
+            term = _plain(first)
+            facts.append((term, said.removeprefix(term).removeprefix(":").strip()))
+            continue
+        yield from [Facts(facts)] if facts else []
+        facts = []
+        yield Text(f"{'-' if node.type == 'bullet_list' else f'{index + 1}.'} {said}")
+    yield from [Facts(facts)] if facts else []
+
+
+def _table(node: SyntaxTreeNode) -> Table:
+    header, *rows = [row.children for part in node.children for row in part.children]
+    cells = [[Cell(_plain(each), cast(Tone, each.attrs.get("class", "plain"))) for each in row] for row in rows]
+    left = frozenset(at for at, each in enumerate(header) if "left" in str(each.attrs.get("style", "left")))
+    long = frozenset(at for at in left if any(len(row[at].text) > _LONG for row in cells))
+    return Table("", "", [_plain(each) for each in header], cells, left, long)
+
+
+def markdown(text: str) -> str:
+    """Write a page as Markdown that every reader of Markdown knows; figures by their captions."""
+    return "".join(_markdown_of(tree(text)))
+
+
+def _markdown_of(nodes: Iterable[Node]) -> Iterator[str]:
+    for node in nodes:
+        if node.kind == "words":
+            yield _MARKS.sub("", node.text)
+        elif node.kind == "figure":
+            yield f"*Figure: {node.text}*\n"
+        else:
+            yield f"{'#' * (node.level or 3)} {node.text}\n"
+            yield from _markdown_of(node.inner)
+
+
+def html(title: str, text: str, figures: Figures) -> str:
+    """Write a page that needs nothing else, neither network nor scripts."""
+    nodes = tree(text)
+    answer = next((node for node in nodes if node.kind == "heading" and node.level == 1), None)
+    rest = [node for node in nodes if node is not answer]
+    first = next((at for at, node in enumerate(rest) if node.kind == "heading"), len(rest))
+    made = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    return made.get_template("page.html").render(
+        title=visible(title),
+        tone=" ".join(answer.marks) if answer else "",
+        answer=Markup(_line(answer.text if answer else title)),
+        intro=Markup("".join(_html(rest[:first], figures))),
+        body=Markup("".join(_sections(rest[first:], figures))),
+        version=__version__,
+    )
+
+
+def _line(text: str) -> str:
+    return cast(str, _markdown().renderInline(text))
+
+
+def _sections(nodes: Sequence[Node], figures: Figures) -> Iterator[str]:
+    """Write sections, each with its cards side by side where there is room."""
+    begins = [at for at, node in enumerate(nodes) if node.kind == "heading" and node.level == 2]
+    for begin, end in zip([0, *begins], [*begins, len(nodes)], strict=True):
+        own = nodes[begin:end]
+        if not own:
+            continue
+        yield "<section>"
+        if own[0].kind == "heading" and own[0].level == 2:
+            yield f"<h2{_class(own[0])}>{_line(own[0].text)}</h2>"
+            own = own[1:]
+        cards = [at for at, node in enumerate(own) if node.kind == "heading" or "open" in node.marks]
+        yield from _html(own[: cards[0] if cards else len(own)], figures)
+        yield '<div class="cards">' if cards else ""
+        for start, stop in zip(cards, [*cards[1:], len(own)], strict=True):
+            yield f'<article class="{" ".join(("card", *own[start].marks))}"><h3>{_line(own[start].text)}</h3>'
+            yield from _html([*own[start].inner, *own[start + 1 : stop]], figures)
+            yield "</article>"
+        yield f"{'</div>' if cards else ''}</section>"
+
+
+def _html(nodes: Iterable[Node], figures: Figures) -> Iterator[str]:
+    for node in nodes:
+        if node.kind == "words":
+            made = cast(str, _markdown().render(node.text))
+            # No text can be a tag: what is wide can be scrolled, with a keyboard too.
+            yield made.replace("<table>", '<div class="table" tabindex="0"><table>').replace(
+                "</table>", "</table></div>"
+            )
+        elif node.kind == "heading":
+            yield f"<h4{_class(node)}>{_line(node.text)}</h4>"
+        elif node.kind == "fold":
+            yield f"<details><summary>{_line(node.text)}</summary>"
+            yield from _html(node.inner, figures)
+            yield "</details>"
+        elif drawn := figures[node.name]():
+            yield f'<figure id="{node.name}">{drawn}<figcaption>{_line(node.text)}</figcaption></figure>'
+
+
+def _class(node: Node) -> str:
+    return f' class="{" ".join(node.marks)}"' if node.marks else ""

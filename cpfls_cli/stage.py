@@ -1,0 +1,203 @@
+"""A stage is one typed function: its parameters are the command line, its result the file, its template the answer.
+
+A module of `stages` holds one, made by the decorator `stage`; `templates` holds what a person reads of its result. The
+command line finds both by the name of the module (`cli/stages.py`).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cpfls_cli import page, store
+from cpfls_cli.artifacts.job import Progress, take_inputs
+from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, write_text
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.errors import InputError, visible
+from cpfls_cli.report.content import Text
+from cpfls_cli.report.outcome import Command, Outcome, caution_texts
+from cpfls_cli.result import plain
+
+_INDEX = "index"
+"""File of the page over several results, and the end of the name of its template."""
+
+
+@dataclass
+class _Taken:
+    """Inputs of one result by role, and what speaks against it."""
+
+    reads: Callable[[Path], None]
+    inputs: list[Path]
+    files: dict[str, InputFile] = field(default_factory=dict)
+    cautions: dict[str, None] = field(default_factory=dict)
+
+
+@dataclass
+class Run:
+    """One run of a stage.
+
+    Attributes
+    ----------
+    output : Path or None
+        File or folder that is written; None where the answer is only printed.
+    dry_run : bool
+        The stage checks its inputs, and gives None in place of a result.
+    progress, reads : callable
+        Take note of work done, and of every file that is read.
+    study, config : Study, Path, or None
+        Of a stage with a study.
+    next : list of Command
+        To go on with.
+    """
+
+    output: Path | None = None
+    force: bool = False
+    dry_run: bool = False
+    progress: Progress = lambda *_: None
+    reads: Callable[[Path], None] = lambda _: None
+    study: Study | None = None
+    config: Path | None = None
+    next: list[Command] = field(default_factory=list)
+    inputs: list[Path] = field(default_factory=list)
+    _taken: dict[str, _Taken] = field(default_factory=dict)
+
+    def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
+        """Check inputs, and take note of what they hold: those of all results, or of the one of this name."""
+        own = self._of(of)
+        own.files.update(take_inputs(own, roles))
+        return own.files
+
+    def caution(self, text: str, of: str = "") -> None:
+        """Take note of what speaks against all results, or the one of this name."""
+        self._of(of).cautions[visible(text)] = None
+
+    def cautions(self, *of: str) -> tuple[str, ...]:
+        """List what speaks against results of these names, and against all."""
+        return tuple(dict.fromkeys(each for name in ("", *of) for each in self._of(name).cautions))
+
+    def origin(self, of: str = "") -> store.Origin:
+        """Tell where a result comes from."""
+        return store.Origin(
+            inputs={**self._of("").files, **self._of(of).files},
+            seed=self.study.seed if self.study else None,
+            config=resolved_yaml(self.study) if self.study else "",
+            cautions=self.cautions(of),
+        )
+
+    def _of(self, name: str) -> _Taken:
+        return self._taken.setdefault(name, _Taken(self.reads, self.inputs))
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A function with everything that makes it a command.
+
+    Attributes
+    ----------
+    function : callable
+        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder, results by
+        name, with a page each; or None in a dry run.
+    kind : type
+        Class of the result.
+    figures : mapping from str to callable
+        HTML of each figure of the template, made of the result.
+    folder : bool
+        Whether its output is a folder, and may be left out: the answer is only printed then.
+    study : bool
+        Whether it takes a config.
+    """
+
+    function: Callable[..., Any]
+    kind: Any
+    figures: Mapping[str, Callable[[Any], str]]
+    folder: bool
+    study: bool
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        """Compute, and write nothing."""
+        return self.function(*given, **named)
+
+    @property
+    def name(self) -> str:
+        """Of the command."""
+        return str(self.kind.FORMAT).removeprefix("cpfls/")
+
+    def text(self, given: Any, ending: str = "") -> str:
+        """Word a result, or all results by name where the ending says so."""
+        module = sys.modules[self.function.__module__]
+        folder = Path(str(module.__file__)).parents[1] / "templates"
+        return page.words(self.name.replace("-", "_") + ending, given, folder=folder)
+
+    def page(self, title: str, given: Any) -> str:
+        """Write the page of a result."""
+        figures = {name: lambda draw=draw: draw(given) for name, draw in self.figures.items()}
+        return page.html(title, self.text(given), figures)
+
+    def run(self, run: Run, **given: Any) -> Outcome:
+        """Check the output, compute, write, and say what there is to say."""
+        if run.output is not None:
+            self._check(run, run.output)
+        found = self.function(run, **given)
+        if found is None:
+            where = f"{run.output}: would be written; " if run.output else ""
+            return Outcome({"dry_run": True}, (Text(f"{where}all inputs are good"),))
+        results = dict(found) if self.folder else {"": found}
+        if run.output is not None:
+            self._write(run, run.output, results)
+        several = len(results) > 1
+        texts = [*([self.text(results, f"_{_INDEX}")] if several else []), *map(self.text, results.values())]
+        cautions = run.cautions(*results)
+        summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
+        return Outcome(
+            {**summary, **({"cautions": list(cautions)} if cautions else {})},
+            (*(block for text in texts for block in page.blocks(text)), *caution_texts(cautions)),
+            next=tuple(run.next),
+            written=run.output,
+        )
+
+    def _check(self, run: Run, output: Path) -> None:
+        if not self.folder:
+            check_output(output, run.force, run.inputs)
+            return
+        if output.suffix in {".html", ".h5", ".md", ".json"}:
+            raise InputError(
+                f"{output}: -o names a folder, which gets a page for each log: -o {output.with_suffix('')}"
+            )
+        check_folder(output, run.force, ())
+
+    def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
+        if not self.folder:
+            store.write(output, results[""], run.origin())
+            return
+        several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
+        with filled_folder(output, [*several, *(name + end for name in results for end in (".h5", ".html"))]) as folder:
+            for name, each in results.items():
+                store.write(folder / f"{name}.h5", each, run.origin(name))
+                write_text(folder / f"{name}.html", self.page(name, each))
+            for name, every in several.items():
+                write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
+
+
+def stage(
+    kind: Any,
+    *,
+    figures: Mapping[str, Callable[[Any], str]] | None = None,
+    folder: bool = False,
+    study: bool = False,
+) -> Callable[[Callable[..., Any]], Stage]:
+    """Make a function a stage."""
+    return lambda function: Stage(function, kind, figures or {}, folder, study)
+
+
+def unique_names(paths: Iterable[Path]) -> dict[str, Path]:
+    """Give each file a name of its own, that of the file without its ending."""
+    named: dict[str, Path] = {}
+    for path in paths:
+        stem = path.name.partition(".")[0] or path.name
+        taken = sum(1 for name in named if name == stem or name.rpartition("-")[0] == stem)
+        named[f"{stem}-{taken + 1}" if taken else stem] = path
+    return named

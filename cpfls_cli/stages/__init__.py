@@ -1,0 +1,1 @@
+"""Stages: one function each, which is a command with its result, its figures and its template."""

@@ -1,0 +1,294 @@
+"""Results in HDF5 files that describe themselves: written whole or not at all, checked when written and when read.
+
+A field of a result is a dataset, a part is a group. A table is a group with one dataset for each field of its rows, as
+long as the table; what some rows lack, or hold several of, lies in a group of its own with the ``row`` of each line.
+"""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import MISSING, dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+from cpfls_cli.artifacts.check import dataset_of, opened_file
+from cpfls_cli.artifacts.output import sealed_output
+from cpfls_cli.artifacts.patience import patient
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, InputFile
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.result import AXES, About, Described, described_fields
+from cpfls_cli.version import __version__
+from cpfls_cli.words import some
+
+T = TypeVar("T")
+
+_PACKED_BYTES = 1 << 16
+"""Size from which a dataset is compressed."""
+_ROW = About("row of the table that each line belongs to", ("line",), least=0)
+_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
+_HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
+"""Kinds of arrays that hold values of a type."""
+
+Lengths = MutableMapping[str, tuple[int, str]]
+"""Length of each axis, and the dataset that it is known from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Where a result comes from.
+
+    Attributes
+    ----------
+    inputs : mapping of str to InputFile
+        By role.
+    seed : int or None
+        None where nothing is drawn.
+    config : str
+        The resolved study; empty where there is none.
+    cautions : tuple of str
+        What speaks against what it rests on.
+    """
+
+    inputs: Mapping[str, InputFile] = field(default_factory=dict)
+    seed: int | None = None
+    config: str = ""
+    cautions: tuple[str, ...] = ()
+    version: str = __version__
+
+
+def write(path: Path, given: Any, origin: Origin) -> None:
+    """Write a result, whose class names its ``FORMAT``; one that breaks its own description is refused."""
+    if wrong := findings(given):
+        raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
+    with sealed_output(path) as output, h5py.File(output, "w") as file:
+        file.attrs["format"] = type(given).FORMAT
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        file.attrs["cpfls_version"] = origin.version
+        file.attrs["cautions"] = "\n".join(origin.cautions)
+        if origin.seed is not None:
+            file.attrs["seed"] = origin.seed
+        if origin.config:
+            file[CONFIG] = np.bytes_(origin.config.encode())
+        for role, source in sorted(origin.inputs.items()):
+            file.create_group(f"{INPUTS}/{role}").attrs.update(vars(source))
+        _write(file, given)
+        output.require_written()
+
+
+def _write(group: h5py.Group, given: Any) -> None:
+    for own in described_fields(type(given)):
+        value = getattr(given, own.name)
+        if value is None:
+            continue
+        if own.about:
+            _write_values(group, own.name, value, own, own.about)
+        elif own.table:
+            _write_table(group.create_group(own.name), own.inner, value)
+        else:
+            inner = group.create_group(own.name, track_order=own.named)
+            for name, each in value.items() if own.named else [("", value)]:
+                _write(inner.create_group(name) if name else inner, each)
+
+
+def _write_table(group: h5py.Group, kind: type, rows: Sequence[Any]) -> None:
+    group.attrs["rows"] = len(rows)
+    axis = group.name.rpartition("/")[2]
+    for own in described_fields(kind):
+        values = [getattr(row, own.name) for row in rows]
+        if _in_lines(own):
+            lines = [_lines(own, value) for value in values]
+            inner, values = group.create_group(own.name), [line for each in lines for line in each]
+            row = np.repeat(np.arange(len(rows)), [len(each) for each in lines])
+            _write_values(inner, "row", row, Described("row", int, _ROW, MISSING, False), _ROW)
+            if own.about:
+                about = own.about._replace(axes=("line", *own.about.axes[own.many :]))
+                _write_values(inner, "values", values, own, about)
+            else:
+                _write_table(inner, own.inner, values)
+        elif own.about:
+            _write_values(group, own.name, values, own, own.about._replace(axes=(axis, *own.about.axes)))
+        else:
+            _write_table(group.create_group(own.name), own.inner, values)
+
+
+def _in_lines(own: Described) -> bool:
+    """Tell whether rows of a table may lack it or hold several."""
+    return own.optional or own.table or own.many
+
+
+def _lines(own: Described, value: Any) -> Sequence[Any]:
+    return () if value is None else value if own.table or own.many else (value,)
+
+
+def _write_values(group: h5py.Group, name: str, value: Any, own: Described, about: About) -> None:
+    array = np.asarray(value, _NUMPY[own.scalar])
+    if array.dtype.kind == "U":
+        # Text of fixed length: that of variable length lies in a heap whose bytes are not reproducible.
+        array = np.char.encode(array, "utf-8")
+    packed = {"compression": "gzip", "shuffle": True} if array.nbytes >= _PACKED_BYTES else {}
+    dataset = group.create_dataset(name, data=array.astype(np.uint8) if array.dtype == bool else array, **packed)
+    unit = "text" if array.dtype.kind == "S" else about.unit
+    dataset.attrs.update(units=unit, frame=about.frame, description=about.text)
+    for axis, label in enumerate(about.axes[: array.ndim]):
+        dataset.dims[axis].label = label
+
+
+def read(path: Path, kind: type[T]) -> tuple[T, Origin]:
+    """Read a result and where it comes from; one that breaks its description is refused, with all that does."""
+    given, origin, wrong = examine(path, kind)
+    if wrong:
+        raise InputError("\n".join(f"{path}: {each}" for each in wrong))
+    return given, origin
+
+
+def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
+    """Read a result, where it comes from, and everything in it that its description does not allow."""
+    with opened_file(path) as file, patient(path):
+        wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
+        if held != wanted:
+            raise InputError(f"{path}: is a {held}; this command needs a {wanted}")
+        origin, missing = _origin(file), list[str]()
+        given = _read(kind, file, missing)
+    if missing:
+        raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
+    return given, origin, findings(given)
+
+
+def format_of(path: Path) -> str:
+    """Tell the format of a file that ends in its seal."""
+    with opened_file(path) as file:
+        return str(file.attrs.get("format"))
+
+
+def _origin(file: h5py.File) -> Origin:
+    inputs = {
+        role: InputFile(*(str(own.attrs[key]) for key in ("name", "sha256", "format")))
+        for role, own in file.get(INPUTS, {}).items()
+    }
+    return Origin(
+        inputs=inputs,
+        seed=int(file.attrs["seed"]) if "seed" in file.attrs else None,
+        config=bytes(file[CONFIG][()]).decode() if CONFIG in file else "",
+        cautions=tuple(str(file.attrs["cautions"]).splitlines()),
+        version=str(file.attrs["cpfls_version"]),
+    )
+
+
+def _read(kind: Any, group: h5py.Group, missing: list[str]) -> Any:
+    given: dict[str, Any] = {}
+    for own in described_fields(kind):
+        if own.name not in group:
+            given |= _absent(own, group, missing)
+        elif own.about:
+            given[own.name] = _value(own, _values(group, own.name, own))
+        elif own.table:
+            given[own.name] = _read_table(own.inner, group[own.name], missing)
+        elif own.named:
+            given[own.name] = {name: _read(own.inner, each, missing) for name, each in group[own.name].items()}
+        else:
+            given[own.name] = _read(own.inner, group[own.name], missing)
+    return kind(**given)
+
+
+def _absent(own: Described, group: h5py.Group, missing: list[str]) -> dict[str, Any]:
+    """Take note of what a file lacks and must not; the result is made without it, to find what else is missing."""
+    if own.default is not MISSING:
+        return {}
+    if not own.optional:
+        missing.append(f"{group.name}/{own.name}".replace("//", "/"))
+    return {own.name: None}
+
+
+def _read_table(kind: Any, group: h5py.Group, missing: list[str]) -> tuple[Any, ...]:
+    rows = int(group.attrs["rows"])
+    columns: dict[str, Sequence[Any]] = {}
+    for own in described_fields(kind):
+        if own.name not in group:
+            columns |= {name: [value] * rows for name, value in _absent(own, group, missing).items()}
+        elif _in_lines(own):
+            columns[own.name] = _read_lines(own, group[own.name], rows, missing)
+        elif own.about:
+            columns[own.name] = [_value(own, each) for each in _values(group, own.name, own)]
+        else:
+            columns[own.name] = _read_table(own.inner, group[own.name], missing)
+    wrong = [name for name, values in columns.items() if len(values) != rows]
+    if wrong:
+        raise ValueError(f"{group.name} has {rows} rows, but {some(wrong, 3)} has not")
+    return tuple(kind(**{name: values[row] for name, values in columns.items()}) for row in range(rows))
+
+
+def _read_lines(own: Described, group: h5py.Group, rows: int, missing: list[str]) -> list[Any]:
+    lines: Sequence[Any] = (
+        [_value(own, each, single=own.many) for each in _values(group, "values", own)]
+        if own.about
+        else _read_table(own.inner, group, missing)
+    )
+    by_row: list[list[Any]] = [[] for _ in range(rows)]
+    for row, line in zip(group["row"][()].tolist(), lines, strict=True):
+        by_row[row].append(line)
+    if own.table or own.many:
+        return [tuple(each) for each in by_row]
+    return [each[0] if each else None for each in by_row]
+
+
+def _values(group: h5py.Group, name: str, own: Described) -> np.ndarray[Any, Any]:
+    dataset = dataset_of(group.file, f"{group.name}/{name}")
+    if dataset is None or dataset.dtype.kind not in _HELD[own.scalar]:
+        raise ValueError(f"{group.name}/{name} holds no {own.scalar.__name__}")
+    array = np.asarray(dataset[()])
+    return np.char.decode(array, "utf-8") if array.dtype.kind == "S" else array.astype(_NUMPY[own.scalar])
+
+
+def _value(own: Described, array: Any, *, single: bool = False) -> Any:
+    if own.many and not single:
+        return tuple(np.asarray(array).tolist())
+    return np.asarray(array) if own.about and own.about.axes and not single else own.scalar(array)
+
+
+def findings(given: Any) -> list[str]:
+    """Find everything in a result that its description does not allow, a sentence each with the path."""
+    return list(_findings(given, "", {}))
+
+
+def _findings(given: Any, prefix: str, lengths: Lengths, *, row: bool = False) -> Iterator[str]:
+    """Look at values first: the axes of a result have their lengths in its parts too."""
+    for own in sorted(described_fields(type(given)), key=lambda each: each.about is None):
+        path, value = f"{prefix}{own.name}", getattr(given, own.name)
+        if value is None:
+            yield from () if own.optional else (f"{path}: is missing",)
+        elif own.about:
+            # What rows of a table hold is as long in each of them, but for tuples.
+            yield from _wrong(path, value, own, own.about, ChainMap({}, lengths) if row and own.many else lengths)
+        elif own.table:
+            shared: Lengths = ChainMap({}, lengths)
+            for index, each in enumerate(value):
+                yield from _findings(each, f"{path}/{index}/", shared, row=True)
+        else:
+            for name, each in value.items() if own.named else [("", value)]:
+                if own.named and (not name or "/" in name or name == "."):
+                    yield f"{path}: {name!r} cannot be the name of a part"
+                inner = lengths if row else ChainMap({}, lengths)
+                yield from _findings(each, f"{path}/{name}{'/' if name else ''}", inner, row=row)
+
+
+def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths) -> Iterator[str]:
+    array = np.asarray(value, *([_NUMPY[own.scalar]] if np.size(value) == 0 else []))
+    if array.dtype.kind not in _HELD[own.scalar]:
+        yield f"{path}: holds {array.dtype}, expected {own.scalar.__name__}"
+        return
+    if array.ndim != len(about.axes):
+        yield f"{path}: has {array.ndim} axes, expected {len(about.axes)} {about.axes}"
+        return
+    for label, length in zip(about.axes, array.shape, strict=True):
+        fixed = int(label) if label.isdigit() else AXES.get(label)
+        known, where = (fixed, "its description") if fixed else lengths.setdefault(label, (length, path))
+        if length != known:
+            yield f"{path}: {length} along '{label}', but {known} by {where}"
+    if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
+        yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
+    if array.dtype.kind in "iuf" and np.any(array < about.least):
+        yield f"{path}: is below {about.least:g}"
