@@ -101,7 +101,7 @@ class Recognition:
     winged : bool
         Whether it is of a VTOL and flies on the wing for a part, which is cut.
     counted_from_s : float
-        Stamp of the log's clock, s, that the stretches of `flown` are counted from.
+        Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float

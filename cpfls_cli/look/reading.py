@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
@@ -62,26 +62,26 @@ def read_flight(
     units: Mapping[str, str],
     parameters: Parameters,
     system: str,
-    begins: Mapping[str, float] | None = None,
-    warnings: Sequence[str] = (),
+    recognition: Recognition | None = None,
 ) -> LogFlight:
     """Read the signals of a log as its reader gives it.
 
     Parameters
     ----------
-    topics, units, parameters, system, begins, warnings
+    topics, units, parameters, system
         As `LogContents` has them.
+    recognition : Recognition or None
+        What `recognise` takes the log for, where that is known.
 
     Raises
     ------
     InputError
         If the log holds no flight of a multirotor, or no body rates: what it is, and what would tell.
     """
-    del begins, warnings
-    with about(name, InputError):
-        recognition = recognise(topics, units, parameters, system)
-    log = LookedLog(topics, units, system)
-    return _Reader(name, log, recognition, parameters).flight()
+    if recognition is None:
+        with about(name, InputError):
+            recognition = recognise(topics, units, parameters, system)
+    return _Reader(name, LookedLog(topics, units, system), recognition, parameters).flight()
 
 
 class _Reader:
@@ -285,12 +285,10 @@ class _Reader:
         return self.signal("acceleration") if senses else None
 
     def _flown(self, clock: Array) -> BoolArray:
-        flown, origin = self.recognition.flown, self.log.table.origin
+        flown = self.recognition.flown
         if not flown.stretches_s or (flown.span_s is None and len(flown.stretches_s) < 2):
             return np.ones(len(clock), dtype=bool)
-        off = self.recognition.counted_from_s - origin
-        spans = np.array(flown.stretches_s) + off
-        return _within(clock, spans, 0.0)
+        return _within(clock, np.array(flown.stretches_s) + self.recognition.counted_from_s, 0.0)
 
     def _on_rotors(self, clock: Array) -> BoolArray:
         forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
