@@ -122,10 +122,18 @@ class Signs:
 
 
 class EarlyEnd(NamedTuple):
-    """What ended a flight before its time, and its first sample."""
+    """What ended a flight before its time, and its first sample.
+
+    Attributes
+    ----------
+    moments : tuple of (str, float)
+        What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``, ``impact``, ``rests with its
+        rotors on``, ``rotors stop in the air``.
+    """
 
     first: int
     what: str
+    moments: tuple[tuple[str, float], ...] = ()
 
 
 def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal["wxyz", "xyzw"]) -> Array | None:
@@ -234,11 +242,15 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
     if lost and (len(hits) or lies_then or stops or _ignores_rotors(signs, part, int(troubled[0]))):
         return _crash(signs, troubled, hits, first + np.flatnonzero(trouble.strained), after)
     if rests_then:
-        return EarlyEnd(after, f"from {signs.time[after]:.1f} s on it rests on something, with its rotors on")
+        at = float(signs.time[after])
+        what = f"from {at:.1f} s on it rests on something, with its rotors on"
+        return EarlyEnd(after, what, (("rests with its rotors on", at),))
     if stops:
         hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
         onto = "" if hit is None else f", impact at {signs.time[hit]:.1f} s"
-        return EarlyEnd(after, f"the rotors stop in the air at {signs.time[after]:.1f} s{onto}")
+        moments = [("rotors stop in the air", float(signs.time[after]))]
+        moments += [] if hit is None else [("impact", float(signs.time[hit]))]
+        return EarlyEnd(after, f"the rotors stop in the air at {signs.time[after]:.1f} s{onto}", tuple(moments))
     return None
 
 
@@ -252,12 +264,15 @@ def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray,
     for fall, hit in _falls(signs):
         if fall < origin and abs(hit - origin) * signs.period < _AT_ONCE_S / 2:
             what = f"it falls freely from {signs.time[fall]:.1f} s on, impact at {signs.time[hit]:.1f} s"
-            return EarlyEnd(min(fall, after), what)
+            moments = (("free fall", float(signs.time[fall])), ("impact", float(signs.time[hit])))
+            return EarlyEnd(min(fall, after), what, moments)
     if at_once and origin == begin:
-        return EarlyEnd(min(begin, after), f"impact at {signs.time[begin]:.1f} s")
+        at = float(signs.time[begin])
+        return EarlyEnd(min(begin, after), f"impact at {at:.1f} s", (("impact", at),))
     what = f"loss of control at {signs.time[origin]:.1f} s"
     what += f", impact at {signs.time[struck[0]]:.1f} s" if len(struck) else ""
-    return EarlyEnd(min(origin, after), what)
+    struck_at = [("impact", float(signs.time[struck[0]]))] if len(struck) else []
+    return EarlyEnd(min(origin, after), what, (("loss of control", float(signs.time[origin])), *struck_at))
 
 
 def _last_burst(samples: IntArray, period: float) -> int:

@@ -90,6 +90,8 @@ class FlownPart:
         Begin and end of each stretch that flies, in order.
     ended, used : str
         How flight ended before its time, and what is used; empty where nothing ended it.
+    moments : tuple of (str, float)
+        What ended flights before their time, of all stretches, as `EarlyEnd` has it.
     """
 
     span_s: tuple[float, float] | None
@@ -98,6 +100,7 @@ class FlownPart:
     stretches_s: tuple[tuple[float, float], ...] = ()
     ended: str = ""
     used: str = ""
+    moments: tuple[tuple[str, float], ...] = ()
 
     def within(self, ended: str, looked_at: tuple[float, float]) -> Self:
         """Say that a part, from and to s, was looked at alone, since sources of the log ended there."""
@@ -348,7 +351,8 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     index, why = max(early, key=lambda each: each[0] == chosen, default=(chosen, None))
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
     span = None if whole else (round(begin, 2), round(end, 2))
-    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used)
+    moments = tuple(moment for _, each in early if each is not None for moment in each.moments)
+    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
 
 
 def _clear_of_ground(time: Array, first: int, after: int, *, early: bool) -> tuple[float, float]:

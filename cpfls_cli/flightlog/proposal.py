@@ -188,7 +188,7 @@ def propose(
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
     if mass_kg is not None and arm_m is not None:
         signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
-    airframe, doubts = _airframe(logs)
+    airframe, doubts = airframe_of(logs)
     if airframe is not None and arm_m is not None:
         if airframe.in_metres and not scale_to_arm:
             _require_same_arm(logs[0].name, airframe, arm_m)
@@ -458,7 +458,7 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
     return [] if own is None else [one for group in groups if group is not own for _, one in group]
 
 
-def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
+def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
     with about(logs[0].name, InputError):
         own = (stated_airframe(one.parameters, one.recognition.rotors) for one in logs)

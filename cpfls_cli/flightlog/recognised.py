@@ -100,6 +100,8 @@ class Recognition:
         All columns that are mapped to nothing, stamps left out.
     winged : bool
         Whether it is of a VTOL and flies on the wing for a part, which is cut.
+    counted_from_s : float
+        Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -130,6 +132,7 @@ class Recognition:
     warnings: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     winged: bool = False
+    counted_from_s: float = 0.0
 
     def signal(self, name: SignalName) -> Guess | None:
         """Give the guess for a signal; None where it is not recognised."""

@@ -425,6 +425,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
         warnings=tuple(seen.warnings),
         unused=_unused(log, (*signals, *asked), time_column),
+        counted_from_s=float(log.grid[0]) - log.origin,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
+from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, SLOW, Fields, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
 from cpfls_cli.logs.records import bytes_of, date
 
@@ -20,7 +20,7 @@ _DEGREES = 180 / pi
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read the main fields of the longest flight in a file, on one clock, ``time``; frames are read as a whole."""
+    """Read the fields of the longest flight in a file on one clock, ``time``, what changes slowly held in between."""
     del wanted
     content = bytes_of(path)
     begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
@@ -29,8 +29,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     try:
         flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
         longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
-        header, rows, broken = flights[longest]
+        header, rows, slow, broken = flights[longest]
         columns, units = _scaled_columns(header, rows)
+        columns |= {name: held for name, held in _slow_columns(header, slow, len(rows)).items() if name not in columns}
     except KeyError as error:
         raise InputError(f"{path}: a broken blackbox log: its header lacks the line {error}") from None
     except (ValueError, OverflowError) as error:
@@ -56,8 +57,8 @@ def _flown_at(header: Mapping[str, str]) -> float:
     return date(begins.replace(tzinfo=begins.tzinfo or UTC).timestamp())
 
 
-def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
-    """Read one flight: the lines of its header, values by frame and main field, and how many frames are broken."""
+def _flight(content: bytes) -> tuple[dict[str, str], IntArray, IntArray, int]:
+    """Read one flight: the lines of its header, values by frame of main and of slow fields, and count broken frames."""
     header, begin = {}, 0
     while content.startswith(b"H ", begin) and (end := content.find(b"\n", begin)) > 0:
         key, _, value = content[begin + 2 : end].decode("latin-1").partition(":")
@@ -76,10 +77,24 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     )
     data = np.frombuffer(content, dtype=np.uint8)
     # How many frames there are is known only once they were read.
-    number, broken = decode(data, begin, fields, constants, np.empty((0, fields.counts[MAIN]), dtype=np.int64))
-    rows = np.empty((number, fields.counts[MAIN]), dtype=np.int64)
-    decode(data, begin, fields, constants, rows)
-    return header, rows, broken
+    widths = (fields.counts[MAIN], 1 + fields.counts[SLOW])
+    number, broken, changes = decode(data, begin, fields, constants, *_tables((0, 0), widths))
+    rows, slow = _tables((number, changes), widths)
+    decode(data, begin, fields, constants, rows, slow)
+    return header, rows, slow, broken
+
+
+def _tables(lengths: tuple[int, int], widths: tuple[int, int]) -> tuple[IntArray, IntArray]:
+    return np.empty((lengths[0], widths[0]), dtype=np.int64), np.empty((lengths[1], widths[1]), dtype=np.int64)
+
+
+def _slow_columns(header: Mapping[str, str], slow: IntArray, rows: int) -> dict[str, Array]:
+    """Give what is logged as it changes, such as modes, at each main frame."""
+    if not len(slow):
+        return {}
+    latest = np.maximum(np.searchsorted(slow[:, 0], np.arange(rows), side="right") - 1, 0)
+    names = header["Field S name"].split(",")
+    return {name: slow[latest, 1 + place].astype(float) for place, name in enumerate(names)}
 
 
 def _integers(header: Mapping[str, str], key: str, otherwise: str | None = None) -> list[int]:

@@ -16,6 +16,7 @@ Bytes = np.ndarray
 KINDS = "IPGHS"
 """Kinds of frames with fields: main, those between, GPS, home, slow."""
 MAIN = 0
+SLOW = KINDS.index("S")
 ROLLOVER = 1 << 32
 """Stamps have 32 bits, microseconds."""
 _SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE = 0, 1, 3, 6, 7, 8, 9, 10
@@ -253,8 +254,10 @@ def _kind(marker: int) -> int:
 
 
 @compiled
-def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: IntArray) -> tuple[int, int]:
-    """Read the main frames of a flight.
+def decode(
+    data: Bytes, place: int, fields: Fields, constants: IntArray, rows: IntArray, slow: IntArray
+) -> tuple[int, int, int]:
+    """Read the main frames of a flight, and those of what changes slowly.
 
     Parameters
     ----------
@@ -264,6 +267,8 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
         Least throttle, least motor output, reference of the battery, and the field of the first motor.
     rows : array of int, shape (frame, field)
         Filled as far as it goes; an empty one counts the frames.
+    slow : array of int, shape (frame, 1 + field)
+        The same of slow frames: the number of the main frame that comes next, and the fields.
 
     Returns
     -------
@@ -271,11 +276,13 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
         Main frames.
     broken : int
         Frames that are none, or that jump in time.
+    changes : int
+        Slow frames.
     """
     row = np.zeros(fields.encoding.shape[1], dtype=np.int64)
     before = np.zeros((2, len(row)), dtype=np.int64)
     values = np.zeros(8, dtype=np.int64)
-    number, broken, last, in_step, resumed = 0, 0, np.int64(0), False, True
+    number, broken, changes, last, in_step, resumed = 0, 0, 0, np.int64(0), False, True
     while place < len(data):
         kind = _kind(data[place])
         event = -1
@@ -294,6 +301,11 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
             continue
         place = end
         resumed = resumed or event == _RESUMED
+        if kind == SLOW:
+            if changes < len(slow):
+                slow[changes, 0] = number
+                slow[changes, 1:] = row[: slow.shape[1] - 1]
+            changes += 1
         if kind != MAIN and (kind != _BETWEEN or not in_step):
             continue
         step = (row[_TIME] - last) & (ROLLOVER - 1)
@@ -309,4 +321,4 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
         if number < len(rows):
             rows[number] = row[: rows.shape[1]]
         number += 1
-    return number, broken
+    return number, broken, changes

@@ -14,7 +14,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.foreign import SDLOG2
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, LogContents
-from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
+from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, table
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
@@ -100,7 +100,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         parameters.setdefault(_text(name), float(value))
     broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
     begins = {"": float(origin)}
-    return LogContents(topics, units, parameters, _system(tables), broken if lost else (), flown_at, begins)
+    said = [
+        (round(float(at) / _STAMPS[stamp] - float(origin), 6), "", plain(_text(own)))
+        for stamp in _STAMPS
+        for at, own in _rows(tables, "MSG", **{stamp: "iu", "Message": "S"})
+    ]
+    lost_bytes = broken if lost else ()
+    return LogContents(topics, units, parameters, _system(tables), lost_bytes, flown_at, begins, tuple(said))
 
 
 def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:

@@ -54,6 +54,8 @@ class LogContents:
     begins : dict from column to float
         Stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there; an empty
         name is that of all stamps.
+    messages : tuple of (float, str, str)
+        What the autopilot told its pilot: when, s, how bad, empty where that is not said, and the text.
     """
 
     topics: dict[str, dict[str, "Array"]]
@@ -63,6 +65,7 @@ class LogContents:
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
     begins: dict[str, float] = field(default_factory=dict)
+    messages: tuple[tuple[float, str, str], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Binary records of several kinds, mixed in one file, as tables of numbers."""
 
+import re
 from collections.abc import Sequence
 from math import nan
 from pathlib import Path
@@ -32,6 +33,11 @@ def numbers(values: np.ndarray) -> Array:
     """Convert numbers of any type; what a broken log takes for one may be no number."""
     with np.errstate(invalid="ignore"):
         return np.asarray(values, dtype=float)
+
+
+def plain(text: str) -> str:
+    """Give a message to the pilot without the escapes that colour it and without control characters."""
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]+", " ", re.sub(r"\x1b\[[0-9;]*m", "", text)).strip()
 
 
 def date(second: float) -> float:

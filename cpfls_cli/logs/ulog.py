@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
-from cpfls_cli.logs.records import date, numbers, seconds
+from cpfls_cli.logs.records import date, numbers, plain, seconds
 
 _PER_SECOND = 10**6
 _RECEIVERS = ("vehicle_gps_position", "sensor_gps")
@@ -41,7 +41,17 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     # As the log begins; in a broken one some parameters are no numbers.
     known = log.initial_parameters.items()
     parameters: dict[str, float | str] = {name: float(own) for name, own in known if isinstance(own, int | float)}
-    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics), begins)
+    said = tuple(
+        (
+            float(seconds(np.array([each.timestamp], dtype=np.uint64), origin, _PER_SECOND)[0]),
+            each.log_level_str(),
+            plain(each.message),
+        )
+        for each in log.logged_messages
+    )
+    return LogContents(
+        topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics), begins, said
+    )
 
 
 def _parsed(path: Path) -> Any:

@@ -1,0 +1,170 @@
+"""What acts on a vehicle about its axes: its rotors by their places, or what its rate loop puts out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
+from cpfls_cli.autopilots.parameters import Autopilot
+from cpfls_cli.flightlog.airframe import Airframe
+from cpfls_cli.flightlog.layouts import Parameters
+from cpfls_cli.flightlog.recognised import Guess
+from cpfls_cli.look.columns import FRD, LookedLog, along_each
+from cpfls_cli.look.flight import Samples
+
+_OF_OUTPUT, _FAST_HZ, _SLOWEST_HZ = 0.7, 40.0, 4.0
+"""Times as fast as the output of the rate loop that rotors have to be logged to be taken before it, and Hz; and Hz
+below which a command says nothing of motion."""
+
+_FOLLOWS: Final = 0.6
+"""Correlation from which on one signal is another one's, but for its sign and size."""
+
+_OLD_FULL, _FULL = 4500.0, 1.5
+"""Full command of ArduCopter before 3.4, and the largest of the versions since."""
+
+
+@dataclass(frozen=True)
+class Rotors:
+    """Commands of rotors as a log holds them, and where they are.
+
+    Attributes
+    ----------
+    samples : Samples or None
+        Shape (sample, rotor), shares of full.
+    """
+
+    samples: Samples | None
+    guess: Guess | None
+    airframe: Airframe | None
+
+    @property
+    def source(self) -> str:
+        """``logged``, ``rebuilt`` of what goes into a mixer, or empty where there are none."""
+        if self.samples is None or self.guess is None:
+            return ""
+        return "logged" if self.guess.columns.mixer is None else "rebuilt"
+
+    def layout(self) -> tuple[Array, Array] | None:
+        """Give places, shape (rotor, 2), forward and right as shares of the arm, and spins; None where not known."""
+        rotors = () if self.airframe is None else self.airframe.rotors
+        if not rotors or (self.samples is not None and self.samples.values.shape[1] != len(rotors)):
+            return None
+        places = np.array([rotor.direction for rotor in rotors]) * [1.0, -1.0]
+        return places / float(np.hypot(*places.T).max()), np.array([rotor.spin for rotor in rotors], dtype=float)
+
+
+class Driving(NamedTuple):
+    """What acts on a vehicle.
+
+    Attributes
+    ----------
+    command : Samples or None
+        Shape (sample, 3): about roll, pitch and yaw, shares of the full command.
+    source : str
+        Where that is known from.
+    places, spins : array or None
+        As `LogFlight` has them.
+    """
+
+    command: Samples | None
+    source: str
+    places: Array | None
+    spins: Array | None
+
+
+def find_driving(log: LookedLog, rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) -> Driving:
+    """Find what acts about each axis: rotors that are logged fast, or else what the rate loop puts out.
+
+    Rotors come first since they hold what limits make of the output.
+    """
+    output, (places, spins) = _output(log, autopilot), rotors.layout() or (None, None)
+    own = None
+    if rotors.samples is not None and places is not None and spins is not None:
+        own = _by_rotors(rotors, places, spins, autopilot, parameters)
+    if own is not None and spins is not None and output is not None and along_each(own, output)[0][2] < -_FOLLOWS:
+        # All propellers turn the other way than is usual.
+        spins, own = -spins, own._replace(values=own.values * [1.0, 1.0, -1.0])
+    fast = own is not None and own.rate_hz >= (_SLOWEST_HZ if output is None else _fast_beside(output))
+    if own is not None and fast and (output is None or rotors.source == "logged"):
+        return Driving(own, f"{rotors.source} rotors, {own.source}", places, spins)
+    source = "" if output is None else f"output of the rate loop, {output.source}"
+    return Driving(output, source, places, spins)
+
+
+def _fast_beside(output: Samples) -> float:
+    return max(_OF_OUTPUT * output.rate_hz, _FAST_HZ)
+
+
+def _output(log: LookedLog, autopilot: Autopilot | None) -> Samples | None:
+    if autopilot is not None and autopilot.name == "betaflight":
+        return _sum_of_terms(log)
+    found = next(log.found("output"), None)
+    if found is not None and found.source.startswith("RATE.") and float(np.abs(found.values).max()) > _FULL:
+        found = found._replace(values=found.values / _OLD_FULL)
+    return found if found is not None and float(np.ptp(found.values)) > 0 else None
+
+
+def _sum_of_terms(log: LookedLog) -> Samples | None:
+    """Add the terms of a PID of Betaflight, in thousandths; a log holds those that its gains need."""
+    total: Samples | None = None
+    for term in "PIDFS":
+        for axis in range(3):
+            part = log.samples((f"axis{term}[{axis}]",))
+            if part is not None:
+                total = total or Samples(part.time, np.zeros((len(part.time), 3)), "axisP, I, D, F")
+                total.values[:, axis] += part.values[:, 0] * FRD[axis] / 1000
+    return total
+
+
+def _by_rotors(
+    rotors: Rotors, places: Array, spins: Array, autopilot: Autopilot | None, parameters: Parameters
+) -> Samples | None:
+    columns = mixer_columns(places, spins, autopilot.mixer if autopilot else MixerRule("peak", 1.0, 1.0))
+    if columns is None or rotors.samples is None:
+        return None
+    thrust = _curve(rotors, autopilot, parameters).thrust(rotors.samples.values)
+    return rotors.samples._replace(values=(thrust @ np.linalg.pinv(columns).T)[:, 1:])
+
+
+def _curve(rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) -> ThrustCurve:
+    """Give what the autopilot takes thrust to be of the signal that is logged."""
+    known = autopilot.in_log(parameters) if autopilot else {}
+    # PX4 bends what it sends to motors, behind this topic.
+    straight = rotors.guess is not None and rotors.guess.columns.columns[0].startswith("actuator_motors")
+    if autopilot is None or not known or straight:
+        return ThrustCurve()
+    return autopilot.law(autopilot.of_log(known)).curve
+
+
+def mixer_columns(places: Array, spins: Array, rule: MixerRule) -> Array | None:
+    """Build the mixer of an autopilot, shape (rotor, 4): share of full thrust for thrust, roll, pitch and yaw.
+
+    Parameters
+    ----------
+    places : array, shape (rotor, 2)
+        Forward and right.
+    spins : array, shape (rotor,)
+
+    Returns
+    -------
+    array or None
+        None where the rotors do not control all four.
+    """
+    rows = np.array([np.ones(len(spins)), -places[:, 1], places[:, 0], spins])
+    if np.linalg.matrix_rank(rows, tol=1e-6) < 4:
+        return None
+    columns = np.linalg.pinv(rows)
+    columns[np.abs(columns) < 1e-9] = 0.0
+    columns[:, 0] /= columns[:, 0].mean()
+    peaks = np.abs(columns).max(axis=0)
+    tilts = peaks[1:3]
+    if rule.by == "power":
+        used = (columns[:, 1:3] != 0).sum(axis=0)
+        tilts = np.full(2, np.sqrt((columns[:, 1:3] ** 2).sum(axis=0) / (used / 2)).max())
+    columns[:, 1:3] *= rule.tilt / tilts
+    columns[:, 3] *= rule.yaw / peaks[3]
+    return np.asarray(columns)

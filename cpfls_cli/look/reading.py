@@ -1,0 +1,385 @@
+"""Any log of a multirotor as a `LogFlight`: what the import recognises, and what only `look` asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, Literal
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.autopilots.parameters import Autopilot, version_of
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.errors import InputError, about
+from cpfls_cli.flightlog.airframe import Airframe
+from cpfls_cli.flightlog.conversion import (
+    BodyFrame,
+    WorldFrame,
+    as_mapped,
+    attitude_from_quaternion,
+    attitude_to_enu_flu,
+)
+from cpfls_cli.flightlog.layouts import Parameters
+from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
+from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
+from cpfls_cli.flightlog.recognised import Guess, Recognition
+from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.repair import unwrap_angles
+from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.flightlog.topics import Topics, column_names
+from cpfls_cli.flightlog.vehicle_kind import forward_flight
+from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
+from cpfls_cli.look.driving import Rotors, find_driving
+from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.units import known_unit
+
+_DEGREES: Final = 180 / np.pi
+_MOST_HZ: Final = 1000.0
+_GAP_STEPS, _GAP_S, _AROUND_S = 2.5, 0.01, 0.01
+"""Steps and s without a sample from which on there is a gap, and s on both of its sides that are not used."""
+
+_P_SCALE: Final = 0.032029
+"""Of Betaflight from 3 on: share of a thousand that a P of 1 gives for an error of 1 deg/s."""
+
+_CLOSE, _SAME_SIZE = 0.9, 0.1
+"""Correlation from which on two signals are of one motion, and by which their sizes may differ."""
+
+_FOLLOWS: Final = 0.6
+"""Correlation from which on one signal is another one's, but for its sign and size."""
+
+_DEBUG_GYRO: Final = 6
+"""Of Betaflight's debug_mode: what the gyroscope reads before filters, in deg/s."""
+
+_LARGEST_V: Final = 100.0
+_BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration")
+_OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
+"""Of ArduCopter before 3.4."""
+
+
+def read_flight(
+    name: str,
+    topics: Topics,
+    units: Mapping[str, str],
+    parameters: Parameters,
+    system: str,
+    recognition: Recognition | None = None,
+) -> LogFlight:
+    """Read the signals of a log as its reader gives it.
+
+    Parameters
+    ----------
+    topics, units, parameters, system
+        As `LogContents` has them.
+    recognition : Recognition or None
+        What `recognise` takes the log for, where that is known.
+
+    Raises
+    ------
+    InputError
+        If the log holds no flight of a multirotor, or no body rates: what it is, and what would tell.
+    """
+    if recognition is None:
+        with about(name, InputError):
+            recognition = recognise(topics, units, parameters, system)
+    return _Reader(name, LookedLog(topics, units, system), recognition, parameters).flight()
+
+
+class _Reader:
+    """One log, and what it was taken for."""
+
+    def __init__(self, name: str, log: LookedLog, recognition: Recognition, parameters: Parameters) -> None:
+        self.name, self.log, self.recognition, self.parameters = name, log, recognition, parameters
+        self.system = log.system
+        wrote = (own for own in AUTOPILOTS.values() if self.system and own.firmware.wrote(self.system))
+        self.autopilot = next(wrote, None)
+
+    def flight(self) -> LogFlight:
+        """Gather all signals on one clock."""
+        gyroscope = self._gyroscope()
+        rate = self._rate(gyroscope)
+        rotors = Rotors(self.signal("rotor_command"), self.recognition.signal("rotor_command"), self._airframe())
+        driving = find_driving(self.log, rotors, self.autopilot, self.parameters)
+        attitude, asked = self._attitudes()
+        setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
+        if driving.command is None and not any((rotors.samples, setpoint, asked, sticks)):
+            raise InputError(self._nothing_asked())
+        clock = _clock(self.name, rate, driving.command)
+        voltage, current = self._battery()
+        height, climb = self._heights()
+        force, gaps = self._force(), _gaps(rate, driving.command)
+        on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
+        whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
+        flown = self._flown(clock)
+        thrust = rotors.samples or next(self.log.found("thrust"), None)
+        return LogFlight(
+            name=self.name,
+            autopilot=self.autopilot.name if self.autopilot else "",
+            system=self.system,
+            parameters=self.parameters,
+            rate_hz=1 / float(clock[1] - clock[0]),
+            time=clock,
+            body_rate=on,
+            command=command,
+            command_source=driving.source,
+            rate_setpoint=on_clock(setpoint, clock, 3),
+            stick=on_clock(sticks, clock, 3),
+            attitude_setpoint=on_clock(asked, clock, 3),
+            attitude=on_clock(attitude, clock, 3),
+            collective=on_clock(thrust and _mean(thrust), clock, 1)[:, 0],
+            voltage=on_clock(voltage, clock, 1)[:, 0],
+            current=on_clock(current, clock, 1)[:, 0],
+            height=on_clock(height, clock, 1)[:, 0],
+            climb_rate=on_clock(climb, clock, 1)[:, 0],
+            specific_force=on_clock(force, clock, 3),
+            flown=flown,
+            usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
+            rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
+            rotors_source=rotors.source,
+            rotor_speed=self.signal("rotor_speed"),
+            places=driving.places,
+            spins=driving.spins,
+            gyroscope=gyroscope,
+            gyroscope_unfiltered=self._unfiltered(gyroscope, rate),
+            accelerometer=force,
+            gaps_s=gaps,
+            gains=_gains(self.autopilot, self.parameters),
+        )
+
+    def _airframe(self) -> Airframe | None:
+        columns = frozenset(column_names(self.log.table.topics))
+        known = KnownLog(self.name, self.recognition, self.parameters, self.system, columns)
+        return airframe_of([known])[0] if self.recognition.rotors else None
+
+    def _nothing_asked(self) -> str:
+        faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
+        return f"{self.name}: holds motion, but neither rotors nor anything that was asked of them: {faster}"
+
+    def signal(self, name: SignalName) -> Samples | None:
+        """Give what is recognised, in SI, that of the body in axes forward, right, down; None where it is not."""
+        guess = next((own for own in self.recognition.signals if own.signal == name), None)
+        return None if guess is None else self._mapped(guess)
+
+    def _mapped(self, guess: Guess) -> Samples | None:
+        samples = self.log.samples(guess.columns.columns)
+        if samples is None:
+            return None
+        values = known_unit(guess.columns.unit).factor * as_mapped(samples.values, guess.columns)
+        if guess.signal in _BODY and self.recognition.choice("body_frame") != "FRD":
+            values = values[:, :3] * FRD
+        return samples._replace(values=np.asarray(values))
+
+    # The gyroscope and its filters.
+
+    def _gyroscope(self) -> Samples:
+        found = self.signal("body_rate")
+        if found is None:
+            faster = log_faster("body rates", FAST_HZ, self.system, parameters=self.parameters)
+            held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
+            raise InputError(f"{self.name}: a log without a gyroscope (it holds {held}): {faster}")
+        return found
+
+    def _rate(self, gyroscope: Samples) -> Samples:
+        """Take the rate that the control law works with: that behind filters, where it comes at least as fast as it."""
+        found = next(self.log.found("rate"), None)
+        if found is None or found.source == gyroscope.source:
+            return gyroscope
+        if found.source.startswith("RATE."):
+            # Old ones are in other units; the gyroscope of the same name is behind the same filters.
+            return gyroscope if gyroscope.rate_hz >= found.rate_hz else self._in_unit_of(found, gyroscope)
+        return found
+
+    def _in_unit_of(self, samples: Samples, gyroscope: Samples) -> Samples:
+        return samples._replace(values=_unit_by(samples, gyroscope) * samples.values)
+
+    def _unfiltered(self, gyroscope: Samples, rate: Samples) -> Samples | None:
+        found = [_fifo(self.log), *self.log.found("raw")]
+        if self.parameters.get("debug_mode") == _DEBUG_GYRO:
+            debug = self.log.samples(tuple(f"debug[{axis}]" for axis in range(3)))
+            found.append(None if debug is None else debug._replace(values=debug.values * FRD / _DEGREES))
+        same = [own for own in found if own is not None and own.source != rate.source and _same_motion(own, gyroscope)]
+        return max(same, key=lambda own: own.rate_hz, default=None)
+
+    # What was asked.
+
+    def _rate_setpoint(self, gyroscope: Samples) -> Samples | None:
+        found = self.signal("setpoint_body_rate")
+        if found is not None:
+            return found
+        found = next(self.log.found("setpoint"), None)
+        if found is not None:
+            return self._in_unit_of(found, gyroscope) if found.source.startswith("RATE.") else found
+        return self._setpoint_of_p_term(gyroscope)
+
+    def _setpoint_of_p_term(self, gyroscope: Samples) -> Samples | None:
+        """Rebuild the setpoint of Betaflight 3, which is not logged, from the error that P acts on."""
+        version = version_of(self.system)
+        term = self.log.samples(tuple(f"axisP[{axis}]" for axis in range(3)))
+        rows = self.autopilot.in_log(self.parameters) if self.autopilot else {}
+        gains = [rows.get(f"p_{axis}", 0.0) for axis in ("roll", "pitch", "yaw")]
+        throttle = self.log.samples(("rcCommand[3]",))
+        if term is None or version is None or version < (3, 0) or min(gains) <= 0 or throttle is None:
+            return None
+        cut = float(self.parameters.get("tpa_rate", self.parameters.get("dynThrPID", 0)) or 0) / 100
+        begin = float(self.parameters.get("tpa_breakpoint", 1650) or 1650)
+        weaker = 1 - cut * np.clip((throttle.values - begin) / max(2000 - begin, 1.0), 0, 1)
+        weaker = np.column_stack([weaker, weaker, np.ones_like(weaker)])
+        error = term.values / (_P_SCALE * np.array(gains) * np.maximum(weaker, 0.1)) * FRD / _DEGREES
+        return Samples(term.time, error + gyroscope.values, "rebuilt from axisP and gyroADC")
+
+    def _sticks(self) -> Samples | None:
+        found = self.signal("sticks")
+        # Of PX4 forward is positive, which lowers the nose.
+        sign = [1.0, -1.0, 1.0] if self.system.startswith("PX4") else [1.0, 1.0, 1.0]
+        return None if found is None else found._replace(values=found.values[:, :3] * sign)
+
+    def _battery(self) -> tuple[Samples | None, Samples | None]:
+        """Give voltage and current; old logs have hundredths of both."""
+        voltage = self.signal("voltage") or next(self.log.found("voltage"), None)
+        current = next(self.log.found("current"), None)
+        if voltage is not None and float(np.median(voltage.values)) > _LARGEST_V:
+            voltage = voltage._replace(values=voltage.values / 100)
+            current = None if current is None else current._replace(values=current.values / 100)
+        # What is not measured is -1 or stays 0.
+        measured = current is not None and float(current.values.max()) > 0
+        return voltage, current if measured else None
+
+    # Where it is.
+
+    def _attitudes(self) -> tuple[Samples | None, Samples | None]:
+        attitude = self._as_angles(self.recognition.signal("quaternion") or self.recognition.signal("attitude"))
+        return attitude, self._as_angles(self.recognition.signal("setpoint_attitude"))
+
+    def _as_angles(self, guess: Guess | None) -> Samples | None:
+        """Give roll, pitch and yaw of a body forward, right, down in a world north, east, down."""
+        own = None if guess is None else self._mapped(guess)
+        if own is None or guess is None:
+            return None
+        values = own.values
+        quaternion = values.shape[1] == 4
+        rows = np.abs(values).sum(axis=1) > 0 if quaternion else np.ones(len(values), dtype=bool)
+        order: Literal["wxyz", "xyzw"] = "xyzw" if self.recognition.choice("quaternion_order") == "xyzw" else "wxyz"
+        body: BodyFrame = "FRD" if self.recognition.choice("body_frame") == "FRD" else "FLU"
+        world: WorldFrame = "NED" if self.recognition.choice("world_frame") == "NED" else "ENU"
+        if rows.sum() < 2:
+            return None
+        angles = attitude_from_quaternion(values[rows], order) if quaternion else values
+        angles = attitude_to_enu_flu(angles, body, world) * [1.0, -1.0, -1.0] + [0.0, 0.0, np.pi / 2]
+        angles[:, [0, 2]] = np.column_stack([unwrap_angles(angles[:, axis]) for axis in (0, 2)])
+        return Samples(own.time[rows], angles, own.source)
+
+    def _heights(self) -> tuple[Samples | None, Samples | None]:
+        """Give height and its rate, upward."""
+        up = -1.0 if self.recognition.choice("world_frame") == "NED" else 1.0
+        place, velocity = self.signal("position"), self.signal("velocity")
+        height = next(self.log.found("height"), None)
+        if place is not None:
+            height = place._replace(values=up * place.values[:, 2:])
+        if height is not None:
+            height = height._replace(values=height.values - height.values[0])
+        if velocity is not None:
+            return height, velocity._replace(values=up * velocity.values[:, 2:])
+        return height, None
+
+    def _force(self) -> Samples | None:
+        senses = self.recognition.choice("acceleration_frame") == "body-specific-force"
+        return self.signal("acceleration") if senses else None
+
+    def _flown(self, clock: Array) -> BoolArray:
+        flown = self.recognition.flown
+        if not flown.stretches_s or (flown.span_s is None and len(flown.stretches_s) < 2):
+            return np.ones(len(clock), dtype=bool)
+        return _within(clock, np.array(flown.stretches_s) + self.recognition.counted_from_s, 0.0)
+
+    def _on_rotors(self, clock: Array) -> BoolArray:
+        forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
+        return np.ones(len(clock), dtype=bool) if forward is None else ~forward
+
+
+# Clocks.
+
+
+def _clock(name: str, rate: Samples, command: Samples | None) -> Array:
+    both = [rate] if command is None else [rate, command]
+    hz = min(_MOST_HZ, 2 * min(own.rate_hz for own in both))
+    begin, end = max(own.time[0] for own in both), min(own.time[-1] for own in both)
+    if end - begin < 2 / hz:
+        raise InputError(f"{name}: body rates and commands are not logged at the same time")
+    return np.arange(begin, end, 1 / hz)
+
+
+def _gaps(*signals: Samples | None) -> Array:
+    """List where a signal lacks samples, begin and end, in order and joined where they overlap."""
+    found: list[tuple[float, float]] = []
+    for own in (each for each in signals if each is not None):
+        steps = np.diff(own.time)
+        lost = np.flatnonzero(steps > max(_GAP_STEPS * float(np.median(steps)), _GAP_S))
+        found += zip(own.time[lost].tolist(), own.time[lost + 1].tolist(), strict=True)
+    joined: list[list[float]] = []
+    for begin, end in sorted(found):
+        if joined and begin <= joined[-1][1]:
+            joined[-1][1] = max(end, joined[-1][1])
+        else:
+            joined.append([begin, end])
+    return np.array(joined, dtype=float).reshape(-1, 2)
+
+
+def _within(clock: Array, spans: Array, around_s: float) -> BoolArray:
+    inside = np.zeros(len(clock), dtype=bool)
+    for begin, end in spans:
+        inside[np.searchsorted(clock, begin - around_s) : np.searchsorted(clock, end + around_s, "right")] = True
+    return inside
+
+
+# One signal held against another.
+
+
+def _unit_by(samples: Samples, gyroscope: Samples) -> float:
+    """Give 1, or 0.01 where a rate is logged in hundredths of its unit, by its size beside the gyroscope."""
+    along, factor = along_each(samples, gyroscope)
+    close = np.abs(factor[along > _FOLLOWS])
+    return 0.01 if len(close) and float(np.median(close)) < 0.1 else 1.0
+
+
+def _same_motion(samples: Samples, gyroscope: Samples) -> bool:
+    """Tell whether a signal is of the motion of the gyroscope, in one unit and in the same axes."""
+    along, factor = along_each(samples, gyroscope)
+    close = along > _CLOSE
+    return bool(close.any() and (np.abs(factor[close] - 1) < _SAME_SIZE).all())
+
+
+def _mean(rotors: Samples) -> Samples:
+    return rotors._replace(values=rotors.values.mean(axis=1, keepdims=True))
+
+
+def _fifo(log: LookedLog) -> Samples | None:
+    """Lay out the samples that PX4 logs in packets, each on its own time."""
+    fields = log.table.topics.get("sensor_gyro_fifo", {})
+    if not {"dt", "scale", "samples", "x[0]", "y[0]", "z[0]"} <= set(fields):
+        return None
+    count = int(np.median(fields["samples"]))
+    rows = fields["samples"] == count
+    back = np.arange(count)[None] - (count - 1)
+    time = fields["timestamp"][rows, None] + 1e-6 * fields["dt"][rows, None] * back
+    each = [np.column_stack([fields[f"{axis}[{k}]"][rows] for k in range(count)]) for axis in "xyz"]
+    values = np.stack([fields["scale"][rows, None] * own for own in each], axis=-1)
+    order = np.argsort(time.ravel(), kind="stable")
+    return Samples(time.ravel()[order], values.reshape(-1, 3)[order], "sensor_gyro_fifo.x, y, z")
+
+
+def _gains(autopilot: Autopilot | None, parameters: Parameters) -> dict[str, Array]:
+    """Give the gains of the rate loop by roll, pitch and yaw, as the parameters have them."""
+    if autopilot is None:
+        return {}
+    rows = autopilot.in_log(parameters)
+    found: dict[str, Array] = {}
+    for role in ("p", "i", "d", "ff", "k"):
+        named = [autopilot.by_role(f"{axis}.{role}") for axis in ("roll", "pitch", "yaw")]
+        values = [rows.get(each.name, np.nan) if each else np.nan for each in named]
+        if np.isfinite(values).any():
+            found[role] = np.array(values)
+    if not found and "RATE_RLL_P" in parameters:
+        found = {
+            role: np.array([float(parameters.get(f"{axis}{role.upper()}", np.nan)) for axis in _OLD_GAINS])
+            for role in ("p", "i", "d")
+        }
+    return found

@@ -1,0 +1,465 @@
+"""What happens in a log, in order of time: what the autopilot states, and what the signals show beyond doubt."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, Literal
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.flightlog.names import is_of
+from cpfls_cli.flightlog.recognised import Recognition
+from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
+from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.result import about, result
+from cpfls_cli.units import STANDARD_GRAVITY
+
+Severity = Literal["note", "warning", "danger"]
+Message = tuple[float, str, str]
+
+_FULL_SCALES_RAD_S: Final = tuple(np.radians([250.0, 500.0, 1000.0, 2000.0, 4000.0]).tolist())
+_FULL_SCALES_G: Final = (2.0, 4.0, 8.0, 16.0, 24.0, 30.0, 32.0)
+_UNITS: Final = {"gyroscope": "rad/s", "accelerometer": "m/s²"}
+_OF_SCALE, _CLIPPED_ROWS = 0.02, 3
+"""Share by which a largest reading may differ from a full scale, and rows in which it stays there, to be clipped."""
+
+_ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
+"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one that
+make it one; and how long a rotor is there."""
+
+_UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.3, 0.17, 0.25, 0.15, 1.0
+"""How long it is on its back; shares of the voltage, from 4.2 to 3.5 V a cell, over s; and what is lost within s at the
+end of a log that stops in the air."""
+
+_NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
+"""By which the autopilot's word for take-off and landing is near that of the signals; by which a clock falls back that
+starts anew; and from which on a gap in flight, and a pause outside, is worth a line, s."""
+
+_AROUND_S, _AT_END_S, _POWERS_S, _LESS = 0.75, 0.1, 5.0, 0.7
+"""Of a flight that signals leave out near the ground, at the end of a log, and around a flight, s; and the share of what
+carries the vehicle below which nothing does."""
+
+_TRAILS_S: Final = 3.0
+"""After a flight, while a rotor at its limit still matters."""
+
+_MOST_OF_A_KIND: Final = 4
+"""Events of one kind that are listed one by one."""
+
+_NAV_STATES: Final = """
+    manual, altitude, position, mission, hold, return, position slow, , , , acro, , descend, termination, offboard,
+    stabilized, , take-off, land, follow, precision land, orbit, VTOL take-off
+"""
+_COPTER_MODES: Final = """
+    Stabilize, Acro, AltHold, Auto, Guided, Loiter, RTL, Circle, , Land, , Drift, , Sport, Flip, AutoTune, PosHold,
+    Brake, Throw, Avoid ADSB, Guided without GPS, Smart RTL, FlowHold, Follow, ZigZag, SystemId, Autorotate, Auto RTL,
+    Turtle
+"""
+"""Modes in the order of their numbers, from 0; empty where a number has none."""
+
+_LEVEL_MODES: Final = "acro, angle, horizon"
+_COPTER_EVENTS: Final[Mapping[int, tuple[str, str]]] = {
+    10: ("armed", "armed"),
+    11: ("armed", "disarmed"),
+    19: ("message", "GPS lost"),
+    21: ("mode", "flip begins"),
+    22: ("mode", "flip ends"),
+    30: ("message", "AutoTune begins"),
+    33: ("message", "AutoTune succeeds"),
+    34: ("message", "AutoTune fails"),
+    35: ("message", "AutoTune reaches a limit"),
+    60: ("reset", "estimated height is reset"),
+    62: ("reset", "estimated yaw is reset"),
+}
+_NOT_LANDED, _LANDED = 28, 18
+_COPTER_ERRORS: Final = {
+    2: "radio",
+    3: "compass",
+    5: "failsafe: radio",
+    6: "failsafe: battery",
+    7: "failsafe: GPS",
+    8: "failsafe: ground station",
+    9: "failsafe: fence",
+    10: "mode change refused",
+    11: "GPS glitch",
+    12: "crash check: the autopilot takes it for crashed",
+    15: "parachute",
+    16: "estimator check: variance too large",
+    17: "failsafe: estimator",
+    18: "barometer glitch",
+    19: "processor",
+    21: "failsafe: terrain",
+    23: "failsafe: terrain data",
+    24: "estimator changes its lane",
+    25: "thrust loss: more is asked of the rotors than they give",
+    26: "failsafe: sensors",
+    29: "failsafe: vibration",
+    30: "internal error",
+    31: "failsafe: dead reckoning",
+}
+_FAILSAFE_PHASES: Final = {1: "radio lost", 2: "landing", 3: "landed", 4: "radio awaited", 6: "rescue by GPS"}
+_BANNER: Final = re.compile(
+    r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New mission|Flight plan|GPS \d: (detected|probing)|u-blox|fmuv"
+    r"|\S+ [0-9A-F]{8} )"
+)
+_LOUD: Final = {"EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "EMERG", "CRIT", "ERR"}
+_MOMENTS: Final[Mapping[str, tuple[str, Severity]]] = {
+    "loss of control": ("loss of control", "danger"),
+    "free fall": ("falls freely", "danger"),
+    "impact": ("impact", "danger"),
+    "rests with its rotors on": ("rests on something with its rotors on", "warning"),
+    "rotors stop in the air": ("rotors stop in the air", "danger"),
+}
+
+
+@result
+class Event:
+    """Something that happens in a log."""
+
+    time_s: float = about("when it happens or begins, from the first stamp of the log", unit="s")
+    until_s: float = about("when it ends; missing for a moment", unit="s", gaps=True, default=np.nan)
+    kind: str = about("what kind of event")
+    text: str = about("what happens")
+    severity: str = about("note, warning or danger", default="note")
+
+
+def timeline(
+    flight: LogFlight,
+    topics: Topics,
+    recognition: Recognition,
+    messages: Sequence[Message] = (),
+) -> tuple[Event, ...]:
+    """List what happens in a log, in order; many of one kind are one.
+
+    Parameters
+    ----------
+    topics : mapping from topic to mapping from field to array
+        As the reader of the log gives them.
+    messages : sequence of (float, str, str)
+        What the autopilot told its pilot: s, how bad, text.
+    """
+    found = [
+        *_flights(flight, topics, recognition),
+        *_stated(flight.system, topics),
+        *_told(messages),
+        *_limits(flight),
+        *_losses(flight, topics),
+        *_on_its_back(flight),
+        *_battery(flight),
+    ]
+    return tuple(sorted(_merged(found), key=lambda event: (event.time_s, event.kind)))
+
+
+# Flights and how they end.
+
+
+def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Iterator[Event]:
+    lifts, lands = _land_detector(topics)
+    ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
+    last = float(flight.time[-1])
+    for first, after in runs(flight.flown):
+        begin, end = float(flight.time[first]), float(flight.time[after - 1])
+        yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
+        lifted, landed = _nearest(lifts, begin), _nearest(lands, end)
+        if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _powers(flight, first, -1)):
+            yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
+        if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
+            continue
+        if landed is not None or (last - end > _AROUND_S and _powers(flight, after - 1, 1)):
+            yield Event(time_s=end if landed is None else landed, kind="landing", text="lands")
+        elif last - end < _AT_END_S and _carries(flight):
+            text = f"the log ends in the air{_voltage_lost(flight)}"
+            yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
+    for what, at in ends:
+        words, severity = _MOMENTS[what]
+        yield Event(time_s=at, kind=what, text=words, severity=severity)
+
+
+def _carried_by(flight: LogFlight) -> float:
+    """Give the usual collective of flight; NaN where it is not known."""
+    flown = flight.collective[flight.flown & np.isfinite(flight.collective)]
+    return float(np.median(flown)) if len(flown) else np.nan
+
+
+def _powers(flight: LogFlight, row: int, way: int) -> bool:
+    """Tell whether rotors give much less before (-1) or after (1) a sample than in flight."""
+    rows = round(_POWERS_S * flight.rate_hz)
+    beside = flight.collective[max(0, row - rows) : row] if way < 0 else flight.collective[row : row + rows]
+    return bool(np.isfinite(beside).any()) and float(np.nanmin(beside)) < _LESS * _carried_by(flight)
+
+
+def _carries(flight: LogFlight) -> bool:
+    """Tell whether rotors carry the vehicle in the last samples."""
+    beside = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
+    return bool(np.isfinite(beside).any()) and float(np.nanmin(beside)) > _LESS * _carried_by(flight)
+
+
+def _nearest(stated: Sequence[float], at: float) -> float | None:
+    """Give the moment that the autopilot states near that of the signals; None where it states none."""
+    near = min(stated, key=lambda own: abs(own - at), default=np.inf)
+    return near if abs(near - at) < _NEAR_S else None
+
+
+def _land_detector(topics: Topics) -> tuple[list[float], list[float]]:
+    """List the moments of take-off and of landing that the autopilot states."""
+    time, landed = _field(topics, "vehicle_land_detected", "landed")
+    lifts = time[1:][(landed[1:] == 0) & (landed[:-1] == 1)].tolist()
+    lands = time[1:][(landed[1:] == 1) & (landed[:-1] == 0)].tolist()
+    when, number = _field(topics, "EV", "Id")
+    return lifts + when[number == _NOT_LANDED].tolist(), lands + when[number == _LANDED].tolist()
+
+
+def _voltage_lost(flight: LogFlight) -> str:
+    known = np.isfinite(flight.voltage)
+    late = known & (flight.time > flight.time[-1] - _SUDDEN_S)
+    if not late.any() or late.all():
+        return ""
+    before, last = float(np.median(flight.voltage[known & ~late])), float(flight.voltage[late][-1])
+    return f", its voltage falls to {last:.1f} V at once" if last < (1 - _SUDDEN) * before else ""
+
+
+# What the autopilot states.
+
+
+def _field(topics: Topics, topic: str, *names: str) -> tuple[Array, Array]:
+    """Give stamps and values of the first of some fields that a topic has; none where it has none."""
+    fields = topics.get(topic, {})
+    name = next((own for own in names if own in fields), None)
+    if name is None or STAMP not in fields or len(fields[name]) != len(fields[STAMP]):
+        return np.empty(0), np.empty(0)
+    return np.asarray(fields[STAMP], dtype=float), np.asarray(fields[name], dtype=float)
+
+
+def _changes(time: Array, values: Array) -> Iterator[tuple[float, float]]:
+    """Give each new value and when it comes, the first one too."""
+    fresh = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    yield from zip(time[fresh].tolist(), values[fresh].tolist(), strict=True)
+
+
+def _stated(system: str, topics: Topics) -> Iterator[Event]:
+    if is_of(system, PX4):
+        yield from _of_px4(topics)
+    elif is_of(system, ARDUPILOT):
+        yield from _of_ardupilot(topics)
+    elif is_of(system, BETAFLIGHT):
+        yield from _of_betaflight(topics)
+
+
+def _of_px4(topics: Topics) -> Iterator[Event]:
+    yield from _modes(_changes(*_field(topics, "vehicle_status", "nav_state")), _NAV_STATES)
+    yield from _arming(_changes(*_field(topics, "actuator_armed", "armed")))
+    for at, on in _changes(*_field(topics, "vehicle_status", "failsafe")):
+        if on:
+            yield Event(time_s=at, kind="failsafe", text="failsafe", severity="danger")
+
+
+def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event]:
+    known = [name.strip() for name in names.split(",")]
+    for at, value in changes:
+        number = int(value)
+        name = known[number] if 0 <= number < len(known) else ""
+        yield Event(time_s=at, kind="mode", text=f"mode {name or number}")
+
+
+def _arming(changes: Iterator[tuple[float, float]]) -> Iterator[Event]:
+    last = 0.0
+    for at, value in changes:
+        if value != last:
+            yield Event(time_s=at, kind="armed", text="armed" if value else "disarmed")
+        last = value
+
+
+def _of_ardupilot(topics: Topics) -> Iterator[Event]:
+    yield from _modes(_changes(*_field(topics, "MODE", "ModeNum", "Mode")), _COPTER_MODES)
+    time, numbers = _field(topics, "EV", "Id")
+    for at, number in zip(time.tolist(), numbers.tolist(), strict=True):
+        if int(number) in _COPTER_EVENTS:
+            kind, text = _COPTER_EVENTS[int(number)]
+            yield Event(time_s=at, kind=kind, text=text)
+    time, numbers = _field(topics, "ERR", "Subsys")
+    codes = _field(topics, "ERR", "ECode")[1]
+    for at, number, code in zip(time.tolist(), numbers.tolist(), codes.tolist(), strict=True):
+        text = _COPTER_ERRORS.get(int(number))
+        # Of 0 an error is over.
+        if text is not None and code:
+            kind = "failsafe" if text.startswith("failsafe") else "error"
+            yield Event(time_s=at, kind=kind, text=text, severity="danger" if kind == "failsafe" else "warning")
+
+
+def _of_betaflight(topics: Topics) -> Iterator[Event]:
+    fields = topics.get("", {})
+    time = np.asarray(fields.get("time", ()), dtype=float)
+    flags = np.asarray(fields.get("flightModeFlags", ()), dtype=float).astype(np.int64)
+    if len(flags) and len(flags) == len(time):
+        since = time - time[0]
+        yield from _arming(_changes(since, (flags & 1).astype(float)))
+        level = np.where(flags & 2, 1.0, np.where(flags & 4, 2.0, 0.0))
+        yield from _modes(_changes(since, level), _LEVEL_MODES)
+    phase = np.asarray(fields.get("failsafePhase", ()), dtype=float)
+    if len(phase) and len(phase) == len(time):
+        for at, value in _changes(time - time[0], phase):
+            if int(value) in _FAILSAFE_PHASES:
+                text = f"failsafe: {_FAILSAFE_PHASES[int(value)]}"
+                yield Event(time_s=at, kind="failsafe", text=text, severity="danger")
+
+
+def _told(messages: Sequence[Message]) -> Iterator[Event]:
+    """Take what is worth a look: where it is said how bad it is, warnings; else all but what is said at each start."""
+    for at, level, text in messages:
+        if level in _LOUD or (not level and not _BANNER.match(text)):
+            yield Event(time_s=at, kind="message", text=f"“{text}”", severity="warning" if level else "note")
+
+
+# What signals show.
+
+
+def _limits(flight: LogFlight) -> Iterator[Event]:
+    yield from _clipped(flight.gyroscope_unfiltered or flight.gyroscope, _FULL_SCALES_RAD_S, "gyroscope")
+    scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
+    if flight.accelerometer is not None:
+        yield from _clipped(flight.accelerometer, scales, "accelerometer")
+    if len(flight.rotors.time) and flight.rotors_source == "logged":
+        yield from _at_limit(flight)
+
+
+def _at_limit(flight: LogFlight) -> Iterator[Event]:
+    """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
+    time, values = flight.rotors.time, flight.rotors.values
+    most = float(np.nanmax(values))
+    inside = np.zeros(len(time), dtype=bool)
+    for first, after in runs(flight.flown):
+        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
+    full = (values >= most - _ROUNDED) & inside[:, None]
+    plateaus = sum(after - first >= 2 for column in full.T for first, after in runs(column))
+    if most < _FULL and plateaus < _FEWEST_PLATEAUS:
+        return
+    for rotor, column in enumerate(full.T):
+        held = list(_held(time, column, _LIMIT_S))
+        if held:
+            total, longest = sum(b - a for a, b in held), max(b - a for a, b in held)
+            times = "once" if len(held) == 1 else f"{len(held)} times"
+            more = "" if len(held) == 1 else f" in all, {longest:.2g} s at most"
+            text = f"M{rotor + 1} at its upper limit {times}, {total:.2g} s{more}"
+            yield Event(time_s=held[0][0], until_s=held[-1][1], kind="limit", text=text, severity="warning")
+
+
+def _held(time: Array, marked: BoolArray, least_s: float) -> Iterator[tuple[float, float]]:
+    """Give begin and end of what lasts so long."""
+    step = float(np.median(np.diff(time)))
+    for first, after in runs(marked):
+        if after - first >= 2 and time[after - 1] - time[first] + step >= least_s:
+            yield float(time[first]), float(time[after - 1])
+
+
+def _clipped(sensor: Samples, scales: Sequence[float], name: str) -> Iterator[Event]:
+    """Find where a sensor stays at the end of its range."""
+    for axis, label in enumerate("xyz"):
+        size = np.abs(sensor.values[:, axis])
+        most = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
+        if not any(abs(most / scale - 1) < _OF_SCALE for scale in scales):
+            continue
+        held = [(a, b) for a, b in runs(size >= most * (1 - 1e-6)) if b - a >= _CLIPPED_ROWS]
+        if held:
+            text = f"{name} {label} at the end of its range, {most:.3g} {_UNITS[name]}"
+            end = float(sensor.time[held[-1][1] - 1])
+            yield Event(
+                time_s=float(sensor.time[held[0][0]]), until_s=end, kind="clipping", text=text, severity="warning"
+            )
+
+
+def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
+    for begin, end in flight.gaps_s[(flight.gaps_s[:, 1] - flight.gaps_s[:, 0]) > _LONG_GAP_S].tolist():
+        rows = (flight.time >= begin) & (flight.time <= end)
+        if flight.flown[rows].any():
+            text = f"no samples for {end - begin:.2g} s"
+            yield Event(time_s=begin, until_s=end, kind="gap", text=text, severity="warning")
+        elif end - begin > _PAUSE_S:
+            yield Event(time_s=begin, until_s=end, kind="pause", text=f"nothing is logged for {end - begin:.0f} s")
+    for name in ("IMU", "sensor_combined", "vehicle_angular_velocity", "vehicle_attitude"):
+        time = np.asarray(topics.get(name, {}).get(STAMP, ()), dtype=float)
+        back = np.flatnonzero(np.diff(time) < -_RESTARTS_S)
+        if len(back):
+            text = f"the clock of the log falls back by {time[back[0]] - time[back[0] + 1]:.3g} s: it started anew"
+            yield Event(time_s=float(time[back[0]]), kind="restart", text=text, severity="warning")
+            return
+    yield from _counted(topics)
+
+
+def _counted(topics: Topics) -> Iterator[Event]:
+    """Read the counters of clipped readings that autopilots keep."""
+    of_px4 = [f"accel_clipping[{axis}]" for axis in range(3)]
+    for topic, names in (("VIBE", ["Clip0", "Clip1", "Clip2", "Clip"]), ("vehicle_imu_status", of_px4)):
+        counted = {name: _field(topics, topic, name) for name in names}
+        rises = {name: np.diff(count) for name, (_, count) in counted.items() if len(count) > 1}
+        rises = {name: own for name, own in rises.items() if (own > 0).any()}
+        if rises:
+            where = [(counted[name][0][:-1][own > 0], counted[name][0][1:][own > 0]) for name, own in rises.items()]
+            each = ", ".join(f"{name} {int(own[own > 0].sum())}" for name, own in rises.items())
+            begin, end = min(float(a[0]) for a, _ in where), max(float(b[-1]) for _, b in where)
+            text = f"accelerometers clip ({topic}: {each} times)"
+            yield Event(time_s=begin, until_s=end, kind="clipping", text=text, severity="warning")
+
+
+def _on_its_back(flight: LogFlight) -> Iterator[Event]:
+    up = np.cos(flight.attitude[:, 0]) * np.cos(flight.attitude[:, 1])
+    with np.errstate(invalid="ignore"):
+        for begin, end in _held(flight.time, (up < 0) & flight.flown, _UPSIDE_DOWN_S):
+            yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
+
+
+def _battery(flight: LogFlight) -> Iterator[Event]:
+    known = np.isfinite(flight.voltage) & flight.flown
+    if not known.any():
+        return
+    # A spike of the meter is no sag.
+    width = max(1, round(_SAG_S * flight.rate_hz))
+    volts = median_filter(flight.voltage[known][:: max(1, width // 5)], 5)
+    time = flight.time[known][:: max(1, width // 5)]
+    first, least = float(np.quantile(volts[: max(1, len(volts) // 20)], 0.9)), int(np.argmin(volts))
+    if volts[least] < (1 - _SAGS) * first:
+        text = f"the battery sags to {volts[least]:.1f} V, from {first:.1f} V"
+        yield Event(time_s=float(time[least]), kind="battery", text=text, severity="warning")
+
+
+# Many of one kind.
+
+
+def _merged(found: Sequence[Event]) -> Iterator[Event]:
+    for kind in dict.fromkeys(event.kind for event in found):
+        own = sorted((event for event in found if event.kind == kind), key=lambda event: event.time_s)
+        if kind == "message":
+            yield from _same_texts(own)
+        elif len(own) <= _MOST_OF_A_KIND or kind in _KEPT:
+            yield from own
+        else:
+            yield _as_one(own, _in_words(kind, own))
+
+
+def _same_texts(own: Sequence[Event]) -> Iterator[Event]:
+    for text in dict.fromkeys(event.text for event in own):
+        same = [event for event in own if event.text == text]
+        yield same[0] if len(same) == 1 else _as_one(same, f"{text}, {len(same)} times")
+
+
+def _as_one(many: Sequence[Event], text: str) -> Event:
+    until = max(event.until_s if np.isfinite(event.until_s) else event.time_s for event in many)
+    worst = max((event.severity for event in many), key=("note", "warning", "danger").index)
+    return Event(time_s=many[0].time_s, until_s=until, kind=many[0].kind, text=text, severity=worst)
+
+
+def _in_words(kind: str, many: Sequence[Event]) -> str:
+    if kind == "mode":
+        names = dict.fromkeys(event.text.removeprefix("mode ") for event in many)
+        return f"the mode changes {len(many) - 1} times: {', '.join(names)}"
+    if kind == "gap":
+        lengths = [event.until_s - event.time_s for event in many]
+        return f"{len(many)} gaps, {sum(lengths):.2g} s in all, {max(lengths):.2g} s at most"
+    return f"{many[0].text}, {len(many)} times"
+
+
+_KEPT: Final = frozenset(
+    ("flown", "take-off", "landing", "end", "impact", "loss of control", "free fall", "limit", "clipping", "armed")
+)
