@@ -16,6 +16,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve, inverse_mix
 
+Spread = Literal["none", "linear", "dynamic"]
 _ZERO = 1e-7
 """Share of a rotor below which it has no part in an axis."""
 _YAW_ROOM = 0.15
@@ -40,7 +41,7 @@ class Limits:
         Share of yaw that ArduPilot keeps (MOT_YAW_HEADROOM).
     throttle_mean : float
         Of ArduPilot, to which the mean thrust may be raised to keep turning: half of what hovers.
-    spread : {"none", "linear", "dynamic"}
+    spread : Spread
         How Betaflight lifts the mix between no and full throttle (mixer_type).
     """
 
@@ -48,7 +49,7 @@ class Limits:
     airmode: int = 0
     yaw_headroom: float = 0.2
     throttle_mean: float = 0.0
-    spread: Literal["none", "linear", "dynamic"] = "none"
+    spread: Spread = "none"
 
 
 @dataclass(frozen=True, kw_only=True)

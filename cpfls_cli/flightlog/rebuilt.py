@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.autopilots.allocation import Allocation, Limits, factor_mix, px4_mix
+from cpfls_cli.autopilots.allocation import Allocation, Limits, Spread, factor_mix, px4_mix
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError, InputError
@@ -25,12 +25,10 @@ from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
 from cpfls_cli.flightlog.log_table import LogTable, holding_values
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
 from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, RotorGuess, find_rotors, too_slow
-from cpfls_cli.flightlog.settings import SignalMap
-from cpfls_cli.flightlog.topics import STAMP, Topics, logged_hz
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
 from cpfls_cli.result import about, result
 
-TOPIC: Final = "rebuilt"
-"""Topic of the columns that are rebuilt."""
 _PX4_NEW: Final = tuple(f"vehicle_{name}_setpoint.xyz[{axis}]" for name in ("torque", "thrust") for axis in range(3))
 _PX4_OLD: Final = tuple(f"actuator_controls_0.control[{axis}]" for axis in range(4))
 _RATE: Final = ("RATE.ROut", "RATE.POut", "RATE.YOut", "RATE.AOut")
@@ -47,6 +45,7 @@ SOURCES: Final = (
 
 _LEAST_EXPLAINED, _MOST_LAG_S, _SCALES = 0.9, 0.02, (0.9, 1.1)
 """What rebuilt commands have to reach; see docs/import.md for the study."""
+_NOTHING: Final = "it lacks logged commands to compare with, what they are mixed from, or its frame"
 _FEWEST: Final = 30
 """Logged samples in flight that are compared."""
 _FLIES: Final = 0.35
@@ -88,7 +87,7 @@ class Rebuilt:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the derived columns."""
-        return tuple(f"{TOPIC}.rotor[{index}]" for index in range(self.commands.shape[1]))
+        return tuple(f"{REBUILT}.rotor[{index}]" for index in range(self.commands.shape[1]))
 
     @property
     def sentence(self) -> str:
@@ -141,6 +140,29 @@ def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebui
     return None if command is None else _rebuilt(log, command, parameters, system)
 
 
+def with_topic(
+    topics: Topics, parameters: Parameters, system: str, settings: ImportSettings
+) -> tuple[Topics, tuple[str, ...]]:
+    """Add the columns that a config asks for and that no log holds, and say how good they are.
+
+    Raises
+    ------
+    InputError
+        If they cannot be rebuilt, and no logged ones stand in for them.
+    """
+    rebuilt = rebuilt_rotors(topics, parameters, system)
+    command = settings.signals.get("rotor_command")
+    others = command is not None and any(choice.columns[0].partition(".")[0] in topics for choice in command.otherwise)
+    if rebuilt is not None and not rebuilt.refused and (rebuilt.faster or not others):
+        return {**topics, REBUILT: rebuilt.topic}, (rebuilt.sentence,)
+    if others:
+        return topics, ()
+    why = _NOTHING if rebuilt is None else rebuilt.refused
+    raise InputError(
+        f"{REBUILT}.rotor: cannot be rebuilt from this log ({why}); name the logged commands in import.signals"
+    )
+
+
 def with_rebuilt(
     log: LogTable, rotors: RotorColumns, parameters: Parameters, system: str
 ) -> tuple[LogTable, RotorColumns, Rebuilt | None]:
@@ -164,7 +186,7 @@ def with_rebuilt(
         )
         speed = None
     warnings = tuple(each for own in (speed, command) if own for each in too_slow(own, system, parameters))
-    more = log.with_topic(TOPIC, rebuilt.topic)
+    more = log.with_topic(REBUILT, rebuilt.topic)
     found = replace(rotors, speed=speed, command=command, left_out=left_out, warnings=warnings)
     return more, found, rebuilt
 
@@ -300,14 +322,14 @@ def _of_betaflight(log: LogTable, columns: SignalMap, parameters: Parameters) ->
     if len(yaw) == len(turning) and float(yaw @ turning[:, 2]) < 0:
         # Rotors that turn the other way round, which no header states.
         mix = mix * (1.0, 1.0, 1.0, -1.0)
-    spread = _SPREADS.get(str(parameters.get("mixer_type", "")), "none")
+    spread: Spread = _SPREADS.get(str(parameters.get("mixer_type", "")), "none")
     limits = Limits(by="betaflight", airmode=1, spread=spread)
     curve = ThrustCurve(0.01 * float(parameters.get("thrust_linear", 0.0)), series=own.series)
     allocation = Allocation(mix=mix, limits=limits, curve=curve)
     return _Mixed(time=time, thrust=thrust, turning=turning, allocation=allocation, source="axisP, axisI, axisD, axisF")
 
 
-_SPREADS: Final[Mapping[str, Literal["linear", "dynamic"]]] = {"LINEAR": "linear", "DYNAMIC": "dynamic"}
+_SPREADS: Final[Mapping[str, Spread]] = {"LINEAR": "linear", "DYNAMIC": "dynamic"}
 
 
 def _frame_mix(autopilot: str, parameters: Parameters, count: int, kind: str) -> Array:
