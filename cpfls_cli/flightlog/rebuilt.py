@@ -43,8 +43,15 @@ SOURCES: Final = (
 )
 """All columns that rebuilding reads."""
 
-_LEAST_EXPLAINED, _MOST_LAG_S, _SCALES = 0.9, 0.02, (0.9, 1.1)
-"""What rebuilt commands have to reach; see docs/import.md for the study."""
+_LEAST_EXPLAINED, _MOST_LAG_S, _SCALES, _MOST_OFFSET = 0.9, 0.02, (0.9, 1.1), 0.01
+"""What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean,
+share of full. docs/import.md has the study."""
+_SMALLEST, _ON_TIME_S, _AT_ONCE_S = 2e-3, 5e-3, 1e-3
+"""Root mean square of commands about an axis, share of full, below which the resolution of outputs hides them; lag up
+to which the logged ones are on time; and how far apart stamps are that are of one step of the autopilot, s."""
+_READ_BACK_S, _OFTEN_HZ = 0.08, 100.0
+"""Age that outputs may have that ArduPilot reads back from another processor, and the rate of what is mixed from which
+on the moment of each of them can be found."""
 _NOTHING: Final = "it lacks logged commands to compare with, what they are mixed from, or its frame"
 _FEWEST: Final = 30
 """Logged samples in flight that are compared."""
@@ -68,10 +75,12 @@ class Rebuilt:
     logged_hz: float = about("logged commands in a second", unit="Hz")
     samples: int = about("logged samples in flight that were compared")
     differences: float = about("share of what differs between the rotors that is explained", gaps=True)
+    by_axis: Array = about("the same of what turns about roll, pitch and yaw", "axis", gaps=True)
     common: float = about("share of the variance of the rotors' mean that is explained", gaps=True)
     lag: float = about("by which the logged ones come after the rebuilt ones", unit="s", gaps=True)
     scale: float = about("logged differences between rotors over rebuilt ones", gaps=True)
     error: float = about("root mean square of rebuilt less logged, share of full", gaps=True)
+    offset: float = about("root mean square of the error of the rotors' mean, share of full", gaps=True)
     refused: str = about("why they are not used; empty where they are good", default="")
 
     @property
@@ -109,6 +118,7 @@ class _Mixed:
     allocation: Allocation
     source: str
     battery: Array | float = 1.0
+    late_s: float = 0.0
 
 
 class _CannotRebuildError(Exception):
@@ -204,7 +214,7 @@ def _rebuilt(log: LogTable, command: RotorGuess, parameters: Parameters, system:
     if mixed is None or len(mixed.time) < _FEWEST:
         return None
     commands = mixed.allocation.commands(mixed.thrust, mixed.turning, mixed.battery)
-    compared = _compared(mixed.time, commands, slow, logged)
+    compared = _compared(mixed, commands, slow, logged)
     return Rebuilt(
         time=mixed.time,
         commands=commands,
@@ -213,7 +223,7 @@ def _rebuilt(log: LogTable, command: RotorGuess, parameters: Parameters, system:
         rate_hz=logged_hz(mixed.time),
         logged_hz=logged_hz(slow),
         **compared._asdict(),
-        refused=_refusal(compared),
+        refused=_refusal(compared, mixed.late_s),
     )
 
 
@@ -282,6 +292,7 @@ def _of_ardupilot(log: LogTable, columns: SignalMap, parameters: Parameters) -> 
         allocation=Allocation(mix=mix, limits=limits, curve=curve),
         source="RATE and the frame",
         battery=battery,
+        late_s=_READ_BACK_S if logged_hz(time) >= _OFTEN_HZ else 0.0,
     )
 
 
@@ -344,15 +355,27 @@ def _frame_mix(autopilot: str, parameters: Parameters, count: int, kind: str) ->
 class _Compared(NamedTuple):
     samples: int
     differences: float = np.nan
+    by_axis: Array = np.full(3, np.nan)
     common: float = np.nan
     lag: float = np.nan
     scale: float = np.nan
     error: float = np.nan
+    offset: float = np.nan
+
+    @property
+    def least(self) -> float:
+        """The least of the shares about axes about which it turns."""
+        return float(np.fmin.reduce(self.by_axis))
 
 
-def _compared(time: Array, commands: Array, slow: Array, logged: Array) -> _Compared:
-    """Hold rebuilt commands against logged ones in flight, at the stamps of these."""
-    reach = float(_SHIFTS_S[-1])
+def _compared(mixed: _Mixed, commands: Array, slow: Array, logged: Array) -> _Compared:
+    """Hold rebuilt commands against logged ones in flight, at the stamps of these.
+
+    Where each of the logged ones may be late by itself and they are not explained at their stamps, the best moment of
+    each is taken, one number for all rotors.
+    """
+    time, late_s, axes = mixed.time, mixed.late_s, np.asarray(np.linalg.pinv(mixed.allocation.mix), dtype=float)[1:]
+    reach = max(float(_SHIFTS_S[-1]), late_s)
     flies = _flying(logged) & (slow >= time[0] + reach) & (slow <= time[-1] - reach)
     at, own = slow[flies], logged[flies]
     if len(at) < _FEWEST:
@@ -361,18 +384,39 @@ def _compared(time: Array, commands: Array, slow: Array, logged: Array) -> _Comp
     def off(shift_s: float) -> Array:
         return np.asarray(np.column_stack([np.interp(at - shift_s, time, column) for column in commands.T]) - own)
 
-    between, mean = own - own.mean(axis=1, keepdims=True), own.mean(axis=1)
-    total, whole = float(((between - between.mean(axis=0)) ** 2).sum()), float(((mean - mean.mean()) ** 2).sum())
     lost = [float((_between(off(shift)) ** 2).sum()) for shift in _SHIFTS_S]
-    here = off(0.0)
-    mine = _between(here + own)
+    error = off(0.0)
+    # Whether they are right is seen where both were logged at once; how near they come is that of all.
+    near = np.abs(time[np.searchsorted(0.5 * (time[1:] + time[:-1]), at)] - at) <= _AT_ONCE_S
+    near = near if near.sum() >= _FEWEST else np.ones(len(at), dtype=bool)
+    found = _explained(axes, own[near], error[near], _lowest(lost))
+    found = found._replace(samples=len(at), error=float(np.sqrt((error**2).mean())))
+    if not late_s or (found.least >= _LEAST_EXPLAINED and abs(found.lag) < _ON_TIME_S):
+        return found
+    shifts = np.arange(0.0, late_s + 1e-9, 0.5 / _OFTEN_HZ)
+    each = np.array([off(shift) for shift in shifts])
+    best = (each**2).sum(axis=2).argmin(axis=0)
+    return _explained(axes, own, each[best, np.arange(len(at))], float(np.median(shifts[best])))
+
+
+def _explained(axes: Array, own: Array, error: Array, lag_s: float) -> _Compared:
+    """Sum up errors of rebuilt commands, shape (sample, rotor), against logged ones."""
+    turns, off = own @ axes.T, error @ axes.T
+    size = ((turns - turns.mean(axis=0)) ** 2).mean(axis=0)
+    seen = size > _SMALLEST**2
+    by_axis = 1 - np.divide((off**2).mean(axis=0), size, out=np.full(3, np.nan), where=seen)
+    between, mean = _between(own), own.mean(axis=1)
+    total, whole = float(((between - between.mean(axis=0)) ** 2).sum()), float(((mean - mean.mean()) ** 2).sum())
+    mine = _between(own + error)
     return _Compared(
-        samples=len(at),
-        differences=1 - float((_between(here) ** 2).sum()) / total if total > 0 else np.nan,
-        common=1 - float((here.mean(axis=1) ** 2).sum()) / whole if whole > 0 else np.nan,
-        lag=_lowest(lost),
+        samples=len(own),
+        differences=1 - float((_between(error) ** 2).sum()) / total if total > 0 else np.nan,
+        by_axis=by_axis,
+        common=1 - float((error.mean(axis=1) ** 2).sum()) / whole if whole > 0 else np.nan,
+        lag=lag_s,
         scale=float((between * mine).sum() / (mine**2).sum()) if mine.any() else np.nan,
-        error=float(np.sqrt((here**2).mean())),
+        error=float(np.sqrt((error**2).mean())),
+        offset=float(np.sqrt((error.mean(axis=1) ** 2).mean())),
     )
 
 
@@ -397,13 +441,16 @@ def _lowest(lost: list[float]) -> float:
     return float(_SHIFTS_S[best] + step * (_SHIFTS_S[1] - _SHIFTS_S[0]))
 
 
-def _refusal(found: _Compared) -> str:
+def _refusal(found: _Compared, late_s: float) -> str:
     if found.samples < _FEWEST:
         return f"only {found.samples} logged samples in flight to compare them with, {_FEWEST} are needed"
-    if not found.differences >= _LEAST_EXPLAINED:
-        return f"they explain {100 * found.differences:.3g} % of what was logged between the rotors"
+    if not found.least >= _LEAST_EXPLAINED:
+        axis = ("roll", "pitch", "yaw")[int(np.nanargmin(found.by_axis))] if np.isfinite(found.least) else "any axis"
+        return f"they explain {100 * max(found.least, 0.0):.3g} % of what was logged about {axis}"
     if not _SCALES[0] <= found.scale <= _SCALES[1]:
         return f"what was logged between the rotors is {found.scale:.3g} times as large"
-    if abs(found.lag) > _MOST_LAG_S:
+    if not (found.common >= _LEAST_EXPLAINED or found.offset <= _MOST_OFFSET):
+        return f"their mean is {100 * found.offset:.2g} % of full off the logged one"
+    if not -_MOST_LAG_S <= found.lag <= _MOST_LAG_S + late_s:
         return f"the logged ones come {1e3 * found.lag:.3g} ms later"
     return ""
