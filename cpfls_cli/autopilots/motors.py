@@ -38,14 +38,25 @@ class ThrustCurve:
     high: float = 1.0
     series: bool = False
 
-    def signal(self, thrust: Array) -> Array:
-        """Give the signals for shares of the full thrust, shape (rotor,)."""
+    def signal(self, thrust: Array, battery: Array | float = 1.0) -> Array:
+        """Give the signals for shares of the full thrust.
+
+        Parameters
+        ----------
+        thrust : array, shape (..., rotor)
+        battery : float or array, shape (..., 1)
+            Voltage over that of the full battery, which the signals make good, as ArduPilot does; 1 where they do not.
+        """
         share = np.clip(thrust, 0.0, 1.0)
         if self.series:
             share = self._reached(share)
-        elif abs(self.expo) > 1e-9:
-            straight = 1 - self.expo
-            share = (np.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
+        else:
+            # What the battery can still lift is the most that may be asked for.
+            share = share * (self.expo * battery**2 + (1 - self.expo) * battery)
+            if abs(self.expo) > 1e-9:
+                straight = 1 - self.expo
+                share = (np.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
+            share = np.minimum(share / battery, 1.0)
         return np.asarray(self.low + (self.high - self.low) * share)
 
     def thrust(self, signal: Array) -> Array:
@@ -115,10 +126,25 @@ def mixing(rule: MixerRule, vehicle: VehicleSettings) -> Array:
     places = np.array([rotor.position_m for rotor in vehicle.rotors])
     spins = np.array([rotor.spin for rotor in vehicle.rotors], dtype=float)
     arm = np.abs(places[:, :2]).max()
-    rows = np.array([np.ones(len(spins)), places[:, 1] / arm, -places[:, 0] / arm, -spins])
-    if np.linalg.matrix_rank(rows) < 4:
+    return inverse_mix(rule, np.array([np.ones(len(spins)), places[:, 1] / arm, -places[:, 0] / arm, -spins]))
+
+
+def inverse_mix(rule: MixerRule, rows: Array) -> Array:
+    """Invert what rotors do and scale it as a rule says, shape (rotor, 4).
+
+    Parameters
+    ----------
+    rows : array, shape (4 or more, rotor)
+        Thrust, roll, pitch, yaw of each rotor at full; forces across behind them, which are to stay nothing.
+
+    Raises
+    ------
+    ComputationError
+        If the rotors do not control thrust, roll, pitch and yaw.
+    """
+    if np.linalg.matrix_rank(rows[:4]) < 4:
         raise ComputationError("vehicle.rotors: they do not control thrust, roll, pitch and yaw, so no autopilot flies")
-    columns = np.linalg.pinv(rows)
+    columns = np.linalg.pinv(rows)[:, :4]
     columns[np.abs(columns) < 1e-9] = 0.0
     columns[:, 0] /= columns[:, 0].mean()
     peaks = np.abs(columns).max(axis=0)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Final, get_args
 
@@ -66,6 +67,13 @@ class LogTable:
         )
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
+
+    def with_topic(self, topic: str, fields: Mapping[str, Array]) -> "LogTable":
+        """Give the same log with one more topic, which has stamps of its own."""
+        more = copy(self)
+        more.topics = {**self.topics, topic: fields}
+        more.names = column_names(more.topics)
+        return more
 
     def require_long_enough(self, span_s: float) -> None:
         """Refuse a log, or what of it holds a flight, that is too short to be one."""

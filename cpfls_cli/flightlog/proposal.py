@@ -81,7 +81,8 @@ def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: P
         See `recognise`.
     """
     recognition = recognise(topics, units, parameters, system)
-    return KnownLog(name, recognition, parameters, system, frozenset(column_names(topics)))
+    derived = () if recognition.rebuilt is None else recognition.rebuilt.columns
+    return KnownLog(name, recognition, parameters, system, frozenset((*column_names(topics), *derived)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import handed
@@ -14,6 +14,9 @@ from cpfls_cli.flightlog.nameless import OF_A_MATRIX
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.settings import ROTORS, SignalMap, SignalName
 from cpfls_cli.units import UnitName, known_unit
+
+if TYPE_CHECKING:
+    from cpfls_cli.flightlog.rebuilt import Rebuilt
 
 Sure = Literal["data", "named", "guess"]
 """Whether the data decided, a name or the kind of log says so, or neither does."""
@@ -102,6 +105,8 @@ class Recognition:
         Whether it is of a VTOL and flies on the wing for a part, which is cut.
     counted_from_s : float
         Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
+    rebuilt : Rebuilt or None
+        Commands of the rotors that take the place of logged ones.
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -133,6 +138,7 @@ class Recognition:
     unused: tuple[str, ...] = ()
     winged: bool = False
     counted_from_s: float = 0.0
+    rebuilt: "Rebuilt | None" = field(default=None, repr=False)
 
     def signal(self, name: SignalName) -> Guess | None:
         """Give the guess for a signal; None where it is not recognised."""

@@ -26,6 +26,7 @@ from cpfls_cli.flightlog.motion_columns import (
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
+from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Guess, Load, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
@@ -109,6 +110,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     make_grid(log, candidates)
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
+    log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = _shares(log, rotors)
     flown = find_flown(_signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
@@ -137,7 +139,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _list_unused(seen)
     driving = rotors.speed or rotors.command
     found = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
-    return replace(found, winged=winged)
+    return replace(found, winged=winged, rebuilt=rebuilt)
 
 
 def _live_part(

@@ -24,8 +24,8 @@ from cpfls_cli.words import joined
 _FEWEST = 3
 """Rotors of a multirotor."""
 
-_MUCH_FASTER = 2.0
-"""Times as often that commands have to come to be preferred to measured speeds."""
+FASTER = 2.0
+"""Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones."""
 
 _SLOW_HZ = 25.0
 """Two samples in the 50 ms within which motors follow, and a half."""
@@ -146,7 +146,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     left_out = [words for guess in (speed, command) if guess is not None for words in guess.left_out]
     if speed is not None and command is not None:
         counts = [len(guess.columns.columns) for guess in (speed, command)]
-        if speed.rate_hz * _MUCH_FASTER < command.rate_hz:
+        if speed.rate_hz * FASTER < command.rate_hz:
             left_out.append(
                 f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz; the"
                 f" commands come at {command.rate_hz:.3g} Hz"
@@ -158,7 +158,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             )
             command = None
     warnings = [
-        warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess, system, parameters)
+        warning for guess in (speed, command) if guess is not None for warning in too_slow(guess, system, parameters)
     ]
     if speed is None and command is None:
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
@@ -199,11 +199,12 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     command = RotorGuess(guess, logged_hz(time), "Crazyflie")
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(
-        speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command, "Crazyflie", {}))
+        speed=None, command=command, command_is=command_is, warnings=tuple(too_slow(command, "Crazyflie", {}))
     )
 
 
-def _too_slow(guess: RotorGuess, system: str, parameters: Parameters) -> Iterator[str]:
+def too_slow(guess: RotorGuess, system: str, parameters: Parameters) -> Iterator[str]:
+    """Say of rotors that are logged too slowly how to log them faster."""
     if guess.rate_hz < _SLOW_HZ:
         yield (
             f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"

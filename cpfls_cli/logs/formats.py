@@ -207,14 +207,20 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
     clocks = import_module("cpfls_cli.flightlog.topics")
-    contents = log_contents(path, settings.mapped_columns)
+    mapped, notes = settings.mapped_columns, ()
+    rebuilds = any(column.startswith(f"{clocks.REBUILT}.") for column in mapped)
+    rebuilding = import_module("cpfls_cli.flightlog.rebuilt") if rebuilds else None
+    contents = log_contents(path, mapped if rebuilding is None else (*mapped, *rebuilding.SOURCES))
+    topics = contents.topics
     refuse_other_vehicle = import_module("cpfls_cli.flightlog.vehicle_kind").refuse_other_vehicle
     with about(path, InputError):
         refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
-        columns, chosen, warnings = clocks.on_one_clock(contents.topics, contents.units, settings)
-    stamped_hz = clocks.stamped_rates(contents.topics, chosen)
+        if rebuilding is not None:
+            topics, notes = rebuilding.with_topic(contents.topics, contents.parameters, contents.system, settings)
+        columns, chosen, warnings = clocks.on_one_clock(topics, contents.units, settings)
+    stamped_hz = clocks.stamped_rates(topics, chosen)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
-    warnings = (*contents.warnings, *warnings)
+    warnings = (*contents.warnings, *notes, *warnings)
     return LogColumns(
         columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system, stamped_hz
     )
