@@ -1,0 +1,133 @@
+"""Spectra of tapered windows, pooled by block: what estimates by frequency are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import fft
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
+
+_FEWEST_IN_BLOCK = 4
+"""Windows of a block: those of its ends share samples with the neighbours."""
+_MOST_BLOCKS = 24
+SHARED_BINS = 1.5
+"""Neighbouring frequencies of Hann's window for one independent."""
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class BlockSpectra:
+    """Sums over windows of products of Fourier transforms.
+
+    Attributes
+    ----------
+    frequency : array, shape (frequency,), Hz
+    cross : array of complex, shape (block, frequency, signal, signal)
+        ``conj(first) second``, summed over the windows of a block.
+    windows : array of int, shape (block,)
+    """
+
+    frequency: Array
+    cross: Numbers
+    windows: IntArray
+
+    @cached_property
+    def total(self) -> Numbers:
+        """Sum over blocks, shape (frequency, signal, signal)."""
+        return np.asarray(self.cross.sum(axis=0))
+
+    def coherence(self, first: int, second: int) -> Array:
+        """Give the share of one signal that another explains, less what chance explains, shape (frequency,)."""
+        total, windows = self.total, max(int(self.windows.sum()), 2)
+        power = np.maximum((total[:, first, first] * total[:, second, second]).real, _TINY)
+        raw = np.abs(total[:, first, second]) ** 2 / power
+        return np.asarray(np.clip(1 - (1 - raw) * windows / (windows - 1), 0.0, 1.0))
+
+    def gain(self, instrument: int, first: int, second: int) -> Numbers:
+        """Estimate second over first by an instrument, shape (frequency,); by least squares if it is the first."""
+        below = self.total[:, instrument, first]
+        return np.asarray(self.total[:, instrument, second] / np.where(below == 0, _TINY, below))
+
+
+def smoothed(values: Numbers, width: int = 5) -> Numbers:
+    """Average neighbouring frequencies, shape (..., frequency), fewer at the ends."""
+    kernel = np.ones(min(width, values.shape[-1]))
+    counts = np.convolve(np.ones(values.shape[-1]), kernel, "same")
+    flat = values.reshape(-1, values.shape[-1])
+    return np.asarray(np.array([np.convolve(row, kernel, "same") for row in flat]) / counts).reshape(values.shape)
+
+
+def window_starts(usable: BoolArray, length: int) -> IntArray:
+    """Give where windows begin that overlap by half and lie wholly in usable samples."""
+    begins: list[IntArray] = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]])))
+    for first, after in edges.reshape(-1, 2):
+        begins.append(np.arange(first, after - length + 1, max(length // 2, 1), dtype=np.int64))
+    return np.concatenate(begins) if begins else np.zeros(0, dtype=np.int64)
+
+
+def transforms(signal: Array, begins: IntArray, length: int, period: float, slope: bool = False) -> Numbers:
+    """Transform windows of a signal or of its slope, shape (window, frequency), under Hann's taper, trend removed.
+
+    The slope is moved onto the taper by parts, ``int w x' e = -int (w e)' x``: an integrator is exact then, and
+    nothing is differentiated.
+    """
+    phase = 2 * np.pi * (np.arange(length) + 0.5) / length
+    taper = 0.5 - 0.5 * np.cos(phase)
+    frames = signal[begins[:, None] + np.arange(length)]
+    centred = np.linspace(-1.0, 1.0, length)
+    mean = frames.mean(axis=1, keepdims=True)
+    if not slope:
+        trend = (frames @ centred) / (centred @ centred)
+        frames = frames - mean - trend[:, None] * centred
+        return np.asarray(fft.rfft(frames * taper, axis=1))
+    # A drift of the slope goes with a parabola of the signal.
+    bend = centred**2 - (centred**2).mean()
+    frames = frames - mean
+    frames = frames - np.outer((frames @ centred) / (centred @ centred), centred)
+    frames = frames - np.outer((frames @ bend) / (bend @ bend), bend)
+    taper_slope = np.pi / (length * period) * np.sin(phase)
+    turn = 2j * np.pi * fft.rfftfreq(length, period)
+    return np.asarray(turn * fft.rfft(frames * taper, axis=1) - fft.rfft(frames * taper_slope, axis=1))
+
+
+def cut_blocks(information: Array) -> IntArray:
+    """Cut a row of windows into blocks of about equal information, the number of the block of each.
+
+    Parameters
+    ----------
+    information : array, shape (window,)
+        At least 0, such as the power of the instrument: bursts are cut finer than rest.
+    """
+    count = max(min(_MOST_BLOCKS, len(information) // _FEWEST_IN_BLOCK), 1)
+    share = information.sum() / count
+    block, number, inside, gathered = np.zeros(len(information), dtype=np.int64), 0, 0, 0.0
+    for window, value in enumerate(information):
+        if inside >= _FEWEST_IN_BLOCK and gathered >= share * (1 - 1e-9):
+            number, inside, gathered = number + 1, 0, 0.0
+        block[window] = number
+        inside, gathered = inside + 1, gathered + float(value)
+    # A rest at the end is too little for a block of its own.
+    if number and (inside < _FEWEST_IN_BLOCK or gathered < 0.5 * share):
+        block[block == number] = number - 1
+    return block
+
+
+def block_spectra(parts: list[Numbers], block: IntArray, frequency: Array, inside: BoolArray) -> BlockSpectra:
+    """Sum products of transforms by block, at some frequencies.
+
+    Parameters
+    ----------
+    parts : list of array, shape (window, frequency)
+        Of each signal.
+    inside : array of bool, shape (frequency,)
+    """
+    stacked = np.stack([each[:, inside] for each in parts], axis=2)
+    blocks = int(block.max()) + 1 if len(block) else 0
+    cross = np.array(
+        [np.einsum("wfi,wfj->fij", stacked[block == b].conj(), stacked[block == b]) for b in range(blocks)]
+    )
+    return BlockSpectra(frequency[inside], cross, np.bincount(block, minlength=blocks).astype(np.int64))
