@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy import fft
+from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
 
@@ -69,29 +70,30 @@ def window_starts(usable: BoolArray, length: int) -> IntArray:
     return np.concatenate(begins) if begins else np.zeros(0, dtype=np.int64)
 
 
+def without_slow(values: Array, usable: BoolArray, half: int) -> tuple[Array, BoolArray]:
+    """Take off the mean under a triangle of so many samples to either side; tell also where it is wholly usable.
+
+    Slow motion is the largest, and would leak into windows of faster.
+    """
+    filled = np.where(usable, values, 0.0)
+    slow = uniform_filter1d(uniform_filter1d(filled, half, mode="nearest"), half, mode="nearest")
+    count = np.concatenate([np.zeros(half + 1), np.cumsum(usable), np.full(half, usable.sum())])
+    return filled - slow, usable & (count[2 * half + 1 :] - count[: -2 * half - 1] > 2 * half)
+
+
 def transforms(signal: Array, begins: IntArray, length: int, period: float, slope: bool = False) -> Numbers:
-    """Transform windows of a signal or of its slope, shape (window, frequency), under Hann's taper, trend removed.
+    """Transform windows of a signal or of its slope under Hann's taper, shape (window, frequency).
 
     The slope is moved onto the taper by parts, ``int w x' e = -int (w e)' x``: an integrator is exact then, and
     nothing is differentiated.
     """
     phase = 2 * np.pi * (np.arange(length) + 0.5) / length
-    taper = 0.5 - 0.5 * np.cos(phase)
     frames = signal[begins[:, None] + np.arange(length)]
-    centred = np.linspace(-1.0, 1.0, length)
-    mean = frames.mean(axis=1, keepdims=True)
+    tapered = fft.rfft(frames * (0.5 - 0.5 * np.cos(phase)), axis=1)
     if not slope:
-        trend = (frames @ centred) / (centred @ centred)
-        frames = frames - mean - trend[:, None] * centred
-        return np.asarray(fft.rfft(frames * taper, axis=1))
-    # A drift of the slope goes with a parabola of the signal.
-    bend = centred**2 - (centred**2).mean()
-    frames = frames - mean
-    frames = frames - np.outer((frames @ centred) / (centred @ centred), centred)
-    frames = frames - np.outer((frames @ bend) / (bend @ bend), bend)
+        return np.asarray(tapered)
     taper_slope = np.pi / (length * period) * np.sin(phase)
-    turn = 2j * np.pi * fft.rfftfreq(length, period)
-    return np.asarray(turn * fft.rfft(frames * taper, axis=1) - fft.rfft(frames * taper_slope, axis=1))
+    return np.asarray(2j * np.pi * fft.rfftfreq(length, period) * tapered - fft.rfft(frames * taper_slope, axis=1))
 
 
 def cut_blocks(information: Array) -> IntArray:

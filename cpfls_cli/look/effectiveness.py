@@ -20,6 +20,7 @@ from cpfls_cli.estimation.spectra import (
     smoothed,
     transforms,
     window_starts,
+    without_slow,
 )
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
@@ -37,6 +38,8 @@ _WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 25.0
 """Shortest and longest windows, and how often they fit into a flight between."""
 _SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 18.0, 2.0
 """Rate of the common clock below which windows are longer; top of the band; periods of its foot in a window."""
+_SLOW_S = 0.3
+"""Slower motion is left out."""
 _OF_CLOCK = 0.065
 """Top of the band, share of the rate of the clock, which is twice that of the slower signal: straight lines between
 samples weaken a signal by 3 % at a tenth of its rate."""
@@ -195,7 +198,11 @@ def plant_spectra(
         By which windows of the command begin earlier: what entered a window is then what left it, and slow motion of
         other windows does not leak into the phase.
     """
-    early = round(late * flight.rate_hz)
+    early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)
+    signals = (instrument, flight.command[:, axis], flight.body_rate[:, axis])
+    (instrument, command, rate), usable = (without_slow(each, usable, half)[0] for each in signals), without_slow(
+        instrument, usable, half
+    )[1]
     if early:
         usable = usable & np.concatenate([np.zeros(early, dtype=bool), usable[:-early]])
     seconds = float(np.clip(usable.sum() / flight.rate_hz / _WINDOWS, *_window_s(flight)))
@@ -205,7 +212,7 @@ def plant_spectra(
     inside = (frequency >= _PERIODS / seconds * (1 - 1e-9)) & (frequency <= min(_TOP_HZ, _OF_CLOCK * flight.rate_hz))
     if len(begins) < 2 or inside.sum() < 6:
         return None
-    period, command, rate = 1 / flight.rate_hz, flight.command[:, axis], flight.body_rate[:, axis]
+    period = 1 / flight.rate_hz
     parts = [transforms(each, begins, length, period) for each in (instrument, np.roll(command, early), rate)]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
     parts.append(transforms(rate, begins, length, period, slope=True))
@@ -413,8 +420,7 @@ def _drawn(fit: Fit, at_hz: float) -> np.ndarray:
 
 def _curves(equations: _Equations, fit: Fit) -> dict[str, np.ndarray]:
     spectra = equations.spectra
-    rate = 2j * np.pi * spectra.frequency
-    gain, direct = rate * spectra.gain(Z, U, Y), rate * spectra.gain(U, U, Y)
+    gain, direct = spectra.gain(Z, U, A), spectra.gain(U, U, A)
     model = PlantModel.of(fit.values, equations.at_hz)
     fitted = equations.filters * model.acceleration(spectra.frequency)
     clear = np.minimum(spectra.coherence(Z, U), spectra.coherence(Z, Y))
