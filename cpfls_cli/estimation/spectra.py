@@ -70,30 +70,37 @@ def window_starts(usable: BoolArray, length: int) -> IntArray:
     return np.concatenate(begins) if begins else np.zeros(0, dtype=np.int64)
 
 
-def without_slow(values: Array, usable: BoolArray, half: int) -> tuple[Array, BoolArray]:
-    """Take off the mean under a triangle of so many samples to either side; tell also where it is wholly usable.
+def without_slow(values: Array, usable: BoolArray, half: int) -> Array:
+    """Take off the mean under a triangle of so many samples to either side.
 
     Slow motion is the largest, and would leak into windows of faster.
     """
     filled = np.where(usable, values, 0.0)
-    slow = uniform_filter1d(uniform_filter1d(filled, half, mode="nearest"), half, mode="nearest")
+    return np.asarray(filled - uniform_filter1d(uniform_filter1d(filled, half, mode="nearest"), half, mode="nearest"))
+
+
+def eroded(usable: BoolArray, half: int) -> BoolArray:
+    """Tell where so many samples to either side are usable too."""
     count = np.concatenate([np.zeros(half + 1), np.cumsum(usable), np.full(half, usable.sum())])
-    return filled - slow, usable & (count[2 * half + 1 :] - count[: -2 * half - 1] > 2 * half)
+    return np.asarray(usable & (count[2 * half + 1 :] - count[: -2 * half - 1] > 2 * half))
 
 
-def transforms(signal: Array, begins: IntArray, length: int, period: float, slope: bool = False) -> Numbers:
-    """Transform windows of a signal or of its slope under Hann's taper, shape (window, frequency).
+def transforms(signal: Array, begins: IntArray, length: int, period: float, derivatives: int = 0) -> list[Numbers]:
+    """Transform windows of a signal and of its derivatives under Hann's taper, shape (window, frequency) each.
 
-    The slope is moved onto the taper by parts, ``int w x' e = -int (w e)' x``: an integrator is exact then, and
-    nothing is differentiated.
+    Derivatives are moved onto the taper by parts, ``int w x' e = -int (w e)' x``: a pole is exact then, and nothing is
+    differentiated.
     """
-    phase = 2 * np.pi * (np.arange(length) + 0.5) / length
-    frames = signal[begins[:, None] + np.arange(length)]
-    tapered = fft.rfft(frames * (0.5 - 0.5 * np.cos(phase)), axis=1)
-    if not slope:
-        return np.asarray(tapered)
-    taper_slope = np.pi / (length * period) * np.sin(phase)
-    return np.asarray(2j * np.pi * fft.rfftfreq(length, period) * tapered - fft.rfft(frames * taper_slope, axis=1))
+    frames, phase = signal[begins[:, None] + np.arange(length)], 2 * np.pi * (np.arange(length) + 0.5) / length
+    turn, ripple = 2j * np.pi * fft.rfftfreq(length, period), np.pi / (length * period)
+    found = [fft.rfft(frames * (0.5 - 0.5 * np.cos(phase)), axis=1)]
+    if derivatives:
+        bent = fft.rfft(frames * (ripple * np.sin(phase)), axis=1)
+        found.append(turn * found[0] - bent)
+    if derivatives > 1:
+        curved = fft.rfft(frames * (2 * ripple**2 * np.cos(phase)), axis=1)
+        found.append(curved - 2 * turn * bent + turn**2 * found[0])
+    return found
 
 
 def cut_blocks(information: Array) -> IntArray:

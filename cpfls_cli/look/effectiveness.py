@@ -17,6 +17,7 @@ from cpfls_cli.estimation.spectra import (
     BlockSpectra,
     block_spectra,
     cut_blocks,
+    eroded,
     smoothed,
     transforms,
     window_starts,
@@ -55,8 +56,8 @@ _FLOOR = 1e-6
 _DRAWS, _SEED = 200, 65
 _YAW = 2
 
-Z, U, Y, A = 0, 1, 2, 3
-"""Signals of the spectra: instrument, command, body rate, angular acceleration."""
+Z, U, Y, A, J = range(5)
+"""Signals of the spectra: instrument, command, body rate, angular acceleration, its derivative."""
 
 
 class PlantModel(NamedTuple):
@@ -94,8 +95,12 @@ class PlantModel(NamedTuple):
 
     def torque(self, frequency: float | Array) -> Numbers:
         """Evaluate angular acceleration by command where no rotation damps it."""
+        return np.asarray(self.push(frequency) / (1 + 2j * np.pi * frequency * self.lag))
+
+    def push(self, frequency: float | Array) -> Numbers:
+        """Evaluate the same in front of the lag."""
         s = 2j * np.pi * frequency
-        return np.asarray(self.gain * (1 + s * self.lead) * np.exp(-s * self.delay) / (1 + s * self.lag))
+        return np.asarray(self.gain * (1 + s * self.lead) * np.exp(-s * self.delay))
 
     def rate(self, frequency: float | Array) -> Numbers:
         """Evaluate body rate by command, Hz."""
@@ -178,7 +183,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
         filters = gyroscope_filters(law, axis, spectra.frequency)
         found = _of_spectra(AXES[axis], source, spectra, filters)
         if found.strength >= STRONG:
-            late = _lateness(spectra, filters * found.model.torque(spectra.frequency))
+            late = _lateness(spectra, filters * found.model.push(spectra.frequency))
             again = plant_spectra(flight, axis, values, known, max(late, 0.0))
             if again is not None:
                 found = _of_spectra(AXES[axis], source, again, gyroscope_filters(law, axis, again.frequency))
@@ -200,9 +205,8 @@ def plant_spectra(
     """
     early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)
     signals = (instrument, flight.command[:, axis], flight.body_rate[:, axis])
-    (instrument, command, rate), usable = (without_slow(each, usable, half)[0] for each in signals), without_slow(
-        instrument, usable, half
-    )[1]
+    instrument, command, rate = (without_slow(each, usable, half) for each in signals)
+    usable = eroded(usable, half)
     if early:
         usable = usable & np.concatenate([np.zeros(early, dtype=bool), usable[:-early]])
     seconds = float(np.clip(usable.sum() / flight.rate_hz / _WINDOWS, *_window_s(flight)))
@@ -213,9 +217,9 @@ def plant_spectra(
     if len(begins) < 2 or inside.sum() < 6:
         return None
     period = 1 / flight.rate_hz
-    parts = [transforms(each, begins, length, period) for each in (instrument, np.roll(command, early), rate)]
+    parts = [*transforms(instrument, begins, length, period), *transforms(np.roll(command, early), begins, length, period)]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
-    parts.append(transforms(rate, begins, length, period, slope=True))
+    parts += transforms(rate, begins, length, period, 2)
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
     if not power.sum() > 0:
         return None
@@ -234,54 +238,48 @@ def _window_s(flight: LogFlight) -> tuple[float, float]:
 
 
 class _Equations:
-    """Equations of one axis by frequency: the instrument's products with ``a + d y - H u`` vanish.
+    """Equations of one axis by frequency: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
 
-    Instruments are the slopes that the other blocks predict from the setpoint: a prediction by the same windows would
-    follow the gusts again.
+    Instruments are what the other blocks predict from the setpoint: a prediction by the same windows would follow the
+    gusts again.
     """
 
     def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float, instrument: int = Z) -> None:
         self.spectra, self.filters, self.at_hz, self.instrument = spectra, filters, at_hz, instrument
-        z = instrument
-        self._zu, self._zy, self._za = (spectra.cross[:, :, z, each] for each in (U, Y, A))
-        zz = smoothed((spectra.total[:, z, z] - spectra.cross[:, :, z, z]).real)
-        # Least squares takes its own command as it is.
-        self._u, self._y = (
-            smoothed(cross.sum(axis=0) - cross) / np.maximum(zz, np.finfo(float).tiny) for cross in (self._zu, self._zy)
-        )
+        self._seen = spectra.cross[:, :, instrument, U:]
+        power = (spectra.total[:, instrument, instrument] - spectra.cross[:, :, instrument, instrument]).real
+        others = np.moveaxis(self._seen.sum(axis=0) - self._seen, 2, 1)
+        predicted = smoothed(others) / np.maximum(smoothed(power), np.finfo(float).tiny)[:, None]
         if instrument == U:
-            self._u = np.ones_like(self._u)
-        self.windows = int(spectra.windows.sum())
+            # Least squares takes the command as it is.
+            predicted[:, 0] = 1.0
+        self._predicted = np.moveaxis(predicted, 1, 2)
+        self._windows = int(spectra.windows.sum())
 
-    def weight(self, values: Array) -> Array:
-        """Give the inverse variance of the disturbance for one window, shape (frequency,)."""
-        model, total = PlantModel.of(values, self.at_hz), self.spectra.total
-        torque = self.filters * model.torque(self.spectra.frequency)
-        terms = np.stack([-torque, np.full(len(total), model.damping), np.ones(len(total))])
-        rest = np.einsum("if,fij,jf->f", terms.conj(), total[:, U:, U:], terms).real / self.windows
-        scale = total[:, A, A].real / self.windows
-        level = np.exp(smoothed(np.log(np.maximum(rest, _FLOOR * scale))))
-        return np.asarray(2 / SHARED_BINS / level)
-
-    def slopes(self, values: Array) -> tuple[Numbers, Numbers]:
-        """Give H and its slopes by the numbers, shape (frequency,) and (number, frequency)."""
-        step, frequency = 1e-5, self.spectra.frequency
-        moved = values + step * np.concatenate([np.eye(len(values)), -np.eye(len(values))])
-        every = PlantModel.of(np.concatenate([values[None], moved])[:, None, :], self.at_hz).torque(frequency)
-        every = every * self.filters
-        return every[0], (every[1 : 1 + len(values)] - every[1 + len(values) :]) / (2 * step)
+    def terms(self, values: Array) -> Numbers:
+        """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
+        model = PlantModel.of(values[..., None, :], self.at_hz)
+        push = -self.filters * model.push(self.spectra.frequency)
+        rest = (model.damping, 1 + model.damping * model.lag, model.lag)
+        return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
 
     def __call__(self, values: Array) -> Normal:
-        torque, slopes = self.slopes(values)
-        damping = np.zeros((len(values), 1))
-        damping[3] = np.exp(values[3])
-        predicted = slopes[None] * self._u[:, None] - damping * self._y[:, None]
-        weighed = predicted.conj() * self.weight(values)
-        actual = slopes[None] * self._zu[:, None] - damping * self._zy[:, None]
-        residual = self._za + np.exp(values[3]) * self._zy - torque * self._zu
+        step, numbers = 1e-5, len(values)
+        moved = values + step * np.concatenate([np.zeros((1, numbers)), np.eye(numbers), -np.eye(numbers)])
+        terms = self.terms(moved)
+        slopes = (terms[1 + numbers :] - terms[1 : 1 + numbers]) / (2 * step)
+        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * self._weight(terms[0])
         return Normal(
-            np.einsum("bpf,bqf->bpq", weighed, actual).real, np.einsum("bpf,bf->bp", weighed, residual).real
+            np.einsum("bpf,qfs,bfs->bpq", predicted, slopes, self._seen, optimize=True).real,
+            np.einsum("bpf,bf->bp", predicted, (terms[0] * self._seen).sum(axis=2)).real,
         )
+
+    def _weight(self, terms: Numbers) -> Array:
+        """Give the inverse variance of the disturbance for one window, shape (frequency,)."""
+        parts = self.spectra.total[:, U:, U:] / self._windows
+        rest = np.einsum("fi,fij,fj->f", terms.conj(), parts, terms).real
+        least = _FLOOR * (np.abs(terms) ** 2 * np.einsum("fii->fi", parts).real).sum(axis=1)
+        return np.asarray(2 / SHARED_BINS / np.exp(smoothed(np.log(np.maximum(rest, least)))))
 
 
 def _prior(yaw: bool) -> Prior:
@@ -295,13 +293,13 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     """Fit the model, begun at the best of a few delays."""
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
-    spectra, z = equations.spectra, equations.instrument
-    power = np.maximum(spectra.total[:, z, z].real, np.finfo(float).tiny)
+    seen = equations.spectra.total[:, equations.instrument, U:]
+    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny)
     for delay in np.arange(1.0, 16.0, 1.5):
         values = np.concatenate([[0.0, delay], prior.mean[2:]])
-        torque = equations.filters * PlantModel.of(values, equations.at_hz).torque(spectra.frequency)
-        weight = 1 / (np.abs(torque) ** 2 * power)
-        follows, target = torque * spectra.total[:, z, U], spectra.total[:, z, A] + spectra.total[:, z, Y]
+        terms = equations.terms(values)
+        follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
+        weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
         gain = float((weight * (follows.conj() * target).real).sum() / (weight * np.abs(follows) ** 2).sum())
         left = float((weight * np.abs(target - gain * follows) ** 2).sum())
         if gain > 0 and left < best[0]:
