@@ -1,1 +1,1 @@
-"""Estimators: rows or bands with instruments, weights and blocks give values, their covariance and strength."""
+"""The one estimator: equations with instruments and weights in blocks, and spectra of windows to build them from."""

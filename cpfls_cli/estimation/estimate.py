@@ -1,0 +1,223 @@
+"""Numbers from equations with instruments: ``sum Z' W (r - X d) = 0``, their covariance over blocks, their strength.
+
+``r`` is the residual at values of the numbers, ``X`` its slopes (``r`` falls by ``X d`` for a step ``d``), ``Z`` what is
+correlated with the slopes and not with the disturbance. Least squares is the case ``Z = X``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import half_width, jackknife_covariance
+
+_STEPS, _STEPS_LEFT_OUT = 40, 3
+_SETTLED, _FARTHEST = 1e-5, 0.7
+"""Length of a step that is none any more, and of the longest."""
+_NEARLY = 1e-2
+"""Length of the last step from which the numbers were not found."""
+_TINY = float(np.finfo(float).tiny)
+
+
+class Normal(NamedTuple):
+    """Normal equations of each block at values of the numbers.
+
+    Attributes
+    ----------
+    information : array, shape (block, number, number)
+        ``Z' W X``.
+    score : array, shape (block, number)
+        ``Z' W r``.
+    """
+
+    information: Array
+    score: Array
+
+
+Equations = Callable[[Array], Normal]
+"""From values of the numbers, shape (number,), in units in which a step of 1 is a large one."""
+
+
+def of_rows(residual: Array, slopes: Array, instruments: Array, weight: Array, block: IntArray) -> Normal:
+    """Sum rows of equations by block.
+
+    Parameters
+    ----------
+    residual, weight : array, shape (row,)
+        Weight: inverse variance of the disturbance.
+    slopes, instruments : array, shape (row, number)
+    block : array of int, shape (row,)
+        From 0.
+    """
+    blocks, weighed = int(block.max()) + 1, instruments * weight[:, None]
+    information = np.zeros((blocks, slopes.shape[1], slopes.shape[1]))
+    score = np.zeros((blocks, slopes.shape[1]))
+    np.add.at(information, block, weighed[:, :, None] * slopes[:, None, :])
+    np.add.at(score, block, weighed * residual[:, None])
+    return Normal(information, score)
+
+
+class Prior(NamedTuple):
+    """What is known of numbers before: normal, with infinite spread where nothing is.
+
+    Attributes
+    ----------
+    mean, spread : array, shape (number,)
+    """
+
+    mean: Array
+    spread: Array
+
+    @classmethod
+    def none(cls, numbers: int) -> Prior:
+        """Know nothing."""
+        return cls(np.zeros(numbers), np.full(numbers, np.inf))
+
+    @property
+    def precision(self) -> Array:
+        """Inverse variance, shape (number,)."""
+        return np.asarray(self.spread**-2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """Numbers with their uncertainty.
+
+    Attributes
+    ----------
+    values : array, shape (number,)
+    covariance : array, shape (number, number)
+        Of the jackknife over blocks, and of what the prior leaves open.
+    left_out : array, shape (block, number)
+        Values without each block.
+    strength : array, shape (number,)
+        Conditional F statistic of the instruments of each number.
+    blocks : float
+        So many blocks of equal information would scatter as much.
+    settled : bool
+        Whether the steps came to an end.
+    """
+
+    values: Array
+    covariance: Array
+    left_out: Array
+    strength: Array
+    blocks: float
+    settled: bool
+
+    def half(self, direction: Array) -> float:
+        """Give half of the 95 % interval of ``direction @ values``, by Student's t."""
+        error = np.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
+        return float(half_width(np.array(error), np.array(self.blocks)))
+
+
+def estimate(
+    equations: Equations, start: Array, prior: Prior | None = None, bounds: tuple[Array, Array] | None = None
+) -> Fit:
+    """Solve equations by Gauss-Newton steps, and again without each block.
+
+    The error of a number with a prior has two parts: that of the data, which the jackknife shows, and that of the
+    prior, ``(S + P)^-1 P (S + P)^-1`` for an information S and a precision P.
+
+    Parameters
+    ----------
+    start : array, shape (number,)
+    bounds : tuple of array, shape (number,), or None
+        Lowest and highest values.
+
+    References
+    ----------
+    Söderström and Stoica 2002 (instrumental variables in closed loop); Efron and Tibshirani 1993 (jackknife).
+    """
+    prior = Prior.none(len(start)) if prior is None else prior
+    low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else bounds
+
+    def solve(values: Array, leave_out: int | None, steps: int) -> tuple[Array, Normal, bool]:
+        for _ in range(steps):
+            normal = equations(values)
+            information, score = normal.information.sum(axis=0), normal.score.sum(axis=0)
+            if leave_out is not None:
+                information = information - normal.information[leave_out]
+                score = score - normal.score[leave_out]
+            known = np.where(prior.precision > 0, prior.mean - values, 0.0) * prior.precision
+            step = np.linalg.solve(information + np.diag(prior.precision), score + known)
+            moved = np.clip(values + np.clip(step, -_FARTHEST, _FARTHEST), low, high)
+            step, values = moved - values, moved
+            if np.abs(step).max() < _SETTLED:
+                break
+        return values, normal, bool(np.abs(step).max() < _NEARLY)
+
+    values, normal, settled = solve(np.asarray(start, dtype=float), None, _STEPS)
+    left_out = np.array([solve(values, block, _STEPS_LEFT_OUT)[0] for block in range(len(normal.score))])
+    total = normal.information.sum(axis=0)
+    inverse = np.linalg.inv(total + np.diag(prior.precision))
+    held = inverse @ np.diag(prior.precision) @ inverse.T
+    return Fit(
+        values=values,
+        covariance=jackknife_covariance(left_out) + held,
+        left_out=left_out,
+        strength=conditional_strength(normal.information),
+        blocks=effective_blocks(np.trace(normal.information / np.diag(total), axis1=1, axis2=2)),
+        settled=settled,
+    )
+
+
+def conditional_strength(information: Array) -> Array:
+    """Compute the F statistic of each number jointly with all others, shape (number,).
+
+    What a block tells of a number, cleared of what tells the others, is a mean over blocks and a scatter about it; an
+    instrument without strength has the mean 0.
+
+    Parameters
+    ----------
+    information : array, shape (block, number, number)
+        Of instruments that were found without the block.
+
+    References
+    ----------
+    Sanderson and Windmeijer 2016.
+    """
+    inverse = np.linalg.pinv(information.sum(axis=0))
+    alone = np.where(np.diag(inverse) == 0, _TINY, np.diag(inverse))
+    each = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], information, inverse / alone)
+    blocks = len(each)
+    scatter = np.sqrt(blocks) * each.std(axis=0, ddof=1)
+    return np.asarray((np.maximum(each.sum(axis=0), 0.0) / np.maximum(scatter, _TINY)) ** 2)
+
+
+def effective_blocks(information: Array) -> float:
+    """Count the blocks of equal information that would scatter as much, from that of each, shape (block,)."""
+    known = np.maximum(information, 0.0)
+    return float(max(known.sum() ** 2 / max(float((known**2).sum()), _TINY), 2.0))
+
+
+def positive_ratio(numerator: Array, denominator: Array, confidence: float = 0.975) -> tuple[float, float]:
+    """Give the interval of a positive ratio of sums by Fieller, Anderson and Rubin: right for a weak denominator too.
+
+    It is what the ratio x may be for which ``sum (numerator - x denominator)`` is not significantly other than 0; from
+    0, and to infinity, where that bounds nothing.
+
+    Parameters
+    ----------
+    numerator, denominator : array, shape (block,)
+        Independent contributions to both sums.
+    """
+    blocks = len(numerator)
+    critical = float(half_width(np.array(1.0), blocks, confidence)) ** 2
+    n, d = float(numerator.sum()), float(denominator.sum())
+    apart = np.stack([numerator - n / blocks, denominator - d / blocks])
+    (nn, nd), (_, dd) = apart @ apart.T * blocks / (blocks - 1)
+    # (n - x d)^2 <= critical Var(n - x d): square x^2 - 2 line x + level <= 0.
+    square, line, level = d * d - critical * dd, n * d - critical * nd, n * n - critical * nn
+    root = line * line - square * level
+    if root <= 0 or square == 0:
+        return 0.0, np.inf
+    ends = sorted(((line - np.sqrt(root)) / square, (line + np.sqrt(root)) / square))
+    if square > 0:
+        return max(float(ends[0]), 0.0), max(float(ends[1]), 0.0)
+    # What lies between the ends is excluded.
+    return (max(float(ends[1]), 0.0) if ends[0] <= 0 else 0.0), np.inf

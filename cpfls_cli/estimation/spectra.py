@@ -1,0 +1,142 @@
+"""Spectra of tapered windows, pooled by block: what estimates by frequency are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import fft
+from scipy.ndimage import uniform_filter1d
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
+
+_FEWEST_IN_BLOCK = 4
+"""Windows of a block: those of its ends share samples with the neighbours."""
+_MOST_BLOCKS = 24
+SHARED_BINS = 1.5
+"""Neighbouring frequencies of Hann's window for one independent."""
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class BlockSpectra:
+    """Sums over windows of products of Fourier transforms.
+
+    Attributes
+    ----------
+    frequency : array, shape (frequency,), Hz
+    cross : array of complex, shape (block, frequency, signal, signal)
+        ``conj(first) second``, summed over the windows of a block.
+    windows : array of int, shape (block,)
+    """
+
+    frequency: Array
+    cross: Numbers
+    windows: IntArray
+
+    @cached_property
+    def total(self) -> Numbers:
+        """Sum over blocks, shape (frequency, signal, signal)."""
+        return np.asarray(self.cross.sum(axis=0))
+
+    def coherence(self, first: int, second: int) -> Array:
+        """Give the share of one signal that another explains, less what chance explains, shape (frequency,)."""
+        total, windows = self.total, max(int(self.windows.sum()), 2)
+        power = np.maximum((total[:, first, first] * total[:, second, second]).real, _TINY)
+        raw = np.abs(total[:, first, second]) ** 2 / power
+        return np.asarray(np.clip(1 - (1 - raw) * windows / (windows - 1), 0.0, 1.0))
+
+    def gain(self, instrument: int, first: int, second: int) -> Numbers:
+        """Estimate second over first by an instrument, shape (frequency,); by least squares if it is the first."""
+        below = self.total[:, instrument, first]
+        return np.asarray(self.total[:, instrument, second] / np.where(below == 0, _TINY, below))
+
+
+def smoothed(values: Numbers, width: int = 5) -> Numbers:
+    """Average neighbouring frequencies, shape (..., frequency), fewer at the ends."""
+    kernel = np.ones(min(width, values.shape[-1]))
+    counts = np.convolve(np.ones(values.shape[-1]), kernel, "same")
+    flat = values.reshape(-1, values.shape[-1])
+    return np.asarray(np.array([np.convolve(row, kernel, "same") for row in flat]) / counts).reshape(values.shape)
+
+
+def window_starts(usable: BoolArray, length: int) -> IntArray:
+    """Give where windows begin that overlap by half and lie wholly in usable samples."""
+    begins: list[IntArray] = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]])))
+    for first, after in edges.reshape(-1, 2):
+        begins.append(np.arange(first, after - length + 1, max(length // 2, 1), dtype=np.int64))
+    return np.concatenate(begins) if begins else np.zeros(0, dtype=np.int64)
+
+
+def without_slow(values: Array, usable: BoolArray, half: int) -> Array:
+    """Take off the mean under a triangle of so many samples to either side.
+
+    Slow motion is the largest, and would leak into windows of faster.
+    """
+    filled = np.where(usable, values, 0.0)
+    return np.asarray(filled - uniform_filter1d(uniform_filter1d(filled, half, mode="nearest"), half, mode="nearest"))
+
+
+def eroded(usable: BoolArray, half: int) -> BoolArray:
+    """Tell where so many samples to either side are usable too."""
+    count = np.concatenate([np.zeros(half + 1), np.cumsum(usable), np.full(half, usable.sum())])
+    return np.asarray(usable & (count[2 * half + 1 :] - count[: -2 * half - 1] > 2 * half))
+
+
+def transforms(signal: Array, begins: IntArray, length: int, period: float, derivatives: int = 0) -> list[Numbers]:
+    """Transform windows of a signal and of its derivatives under Hann's taper, shape (window, frequency) each.
+
+    Derivatives are moved onto the taper by parts, ``int w x' e = -int (w e)' x``: a pole is exact then, and nothing is
+    differentiated.
+    """
+    frames, phase = signal[begins[:, None] + np.arange(length)], 2 * np.pi * (np.arange(length) + 0.5) / length
+    turn, ripple = 2j * np.pi * fft.rfftfreq(length, period), np.pi / (length * period)
+    found = [fft.rfft(frames * (0.5 - 0.5 * np.cos(phase)), axis=1)]
+    if derivatives:
+        bent = fft.rfft(frames * (ripple * np.sin(phase)), axis=1)
+        found.append(turn * found[0] - bent)
+    if derivatives > 1:
+        curved = fft.rfft(frames * (2 * ripple**2 * np.cos(phase)), axis=1)
+        found.append(curved - 2 * turn * bent + turn**2 * found[0])
+    return found
+
+
+def cut_blocks(information: Array) -> IntArray:
+    """Cut a row of windows into blocks of about equal information, the number of the block of each.
+
+    Parameters
+    ----------
+    information : array, shape (window,)
+        At least 0, such as the power of the instrument: bursts are cut finer than rest.
+    """
+    count = max(min(_MOST_BLOCKS, len(information) // _FEWEST_IN_BLOCK), 1)
+    share = information.sum() / count
+    block, number, inside, gathered = np.zeros(len(information), dtype=np.int64), 0, 0, 0.0
+    for window, value in enumerate(information):
+        if inside >= _FEWEST_IN_BLOCK and gathered >= share * (1 - 1e-9):
+            number, inside, gathered = number + 1, 0, 0.0
+        block[window] = number
+        inside, gathered = inside + 1, gathered + float(value)
+    # A rest at the end is too little for a block of its own.
+    if number and (inside < _FEWEST_IN_BLOCK or gathered < 0.5 * share):
+        block[block == number] = number - 1
+    return block
+
+
+def block_spectra(parts: list[Numbers], block: IntArray, frequency: Array, inside: BoolArray) -> BlockSpectra:
+    """Sum products of transforms by block, at some frequencies.
+
+    Parameters
+    ----------
+    parts : list of array, shape (window, frequency)
+        Of each signal.
+    inside : array of bool, shape (frequency,)
+    """
+    stacked = np.stack([each[:, inside] for each in parts], axis=2)
+    blocks = int(block.max()) + 1 if len(block) else 0
+    cross = np.array(
+        [np.einsum("wfi,wfj->fij", stacked[block == b].conj(), stacked[block == b]) for b in range(blocks)]
+    )
+    return BlockSpectra(frequency[inside], cross, np.bincount(block, minlength=blocks).astype(np.int64))

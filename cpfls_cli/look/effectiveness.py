@@ -1,0 +1,458 @@
+"""Control effectiveness about each axis: angular acceleration per unit of command, by instruments, over frequency.
+
+Under an autopilot the command answers what disturbs the vehicle, and least squares finds a mixture of vehicle and
+autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing of gusts: it is the instrument.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio
+from cpfls_cli.estimation.spectra import (
+    SHARED_BINS,
+    BlockSpectra,
+    block_spectra,
+    cut_blocks,
+    eroded,
+    smoothed,
+    transforms,
+    window_starts,
+    without_slow,
+)
+from cpfls_cli.look.flight import AXES, LogFlight
+from cpfls_cli.look.law import flown_law, gyroscope_filters
+from cpfls_cli.look.setpoints import exogenous
+from cpfls_cli.result import Estimate, about, part, result
+
+STRONG = 10.0
+"""F statistic of an instrument below which its estimate falls back to that of the loop."""
+NARROW, NARROW_DELAY_S = 0.4, 0.02
+"""Half widths, of the logarithm of effectiveness and of the delay, above which it is not called identified."""
+GAIN_FLOOR, DELAY_FLOOR_S = 0.02, 5e-4
+"""Half widths that no interval is below: of straight lines between samples, clocks and the model's shape."""
+FEWEST_BLOCKS = 6
+_WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 25.0
+"""Shortest and longest windows, and how often they fit into a flight between."""
+_SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 18.0, 2.0
+"""Rate of the common clock below which windows are longer; top of the band; periods of its foot in a window."""
+_SLOW_S = 0.3
+"""Slower motion is left out."""
+_OF_CLOCK = 0.065
+"""Top of the band, share of the rate of the clock, which is twice that of the slower signal: straight lines between
+samples weaken a signal by 3 % at a tenth of its rate."""
+_AT_HZ = (0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
+_DELAY_UNIT_S, _MOST_DELAY_S, _LEAST_DELAY = 0.01, 0.3, 0.05
+_LAG_SHARE, _LAG_SPREAD = 0.5, 1.0
+"""Before: logarithm of lag over delay behind the rotors' commands, rotors of all sizes with their filters."""
+_DAMPING, _DAMPING_SPREAD = 1.0, 1.0
+"""Before: damping of multirotors, 1/s, and spread of its logarithm."""
+_LEAD_S, _LEAD_SPREAD = 0.01, 1.0
+"""Before: lead of yaw by the rotors' own angular momentum."""
+_FLOOR = 1e-6
+_DRAWS, _SEED = 200, 65
+_YAW = 2
+
+Z, U, Y, A, J = range(5)
+"""Signals of the spectra: instrument, command, body rate, angular acceleration, its derivative."""
+
+
+class PlantModel(NamedTuple):
+    """Body rate by command, ``b (1 + s L) exp(-s tau) / ((1 + s T) (s + d))``; numbers or columns of shape (draw, 1).
+
+    Attributes
+    ----------
+    gain : float, rad/s^2
+        b, per full command.
+    delay, lag, lead : float, s
+        tau, T, and L by the angular momentum of accelerated rotors, 0 but about yaw.
+    damping : float, 1/s
+    """
+
+    gain: float | Array
+    delay: float | Array
+    lag: float | Array
+    damping: float | Array
+    lead: float | Array
+
+    @classmethod
+    def of(cls, values: Array, at_hz: float) -> PlantModel:
+        """Read it from estimated numbers, shape (..., number)."""
+        x = np.moveaxis(values, -1, 0)
+        total = _DELAY_UNIT_S * x[1]
+        lag, damping = total / (1 + np.exp(-x[2])), np.exp(x[3])
+        lead = np.exp(x[4]) if len(x) > 4 else np.zeros_like(lag)
+        plain = cls(1.0, total - lag, lag, damping, lead)
+        return plain._replace(gain=np.exp(x[0]) / np.abs(plain.acceleration(at_hz)))
+
+    def acceleration(self, frequency: float | Array) -> Numbers:
+        """Evaluate angular acceleration by command, Hz."""
+        s = 2j * np.pi * frequency
+        return np.asarray(self.torque(frequency) * s / (s + self.damping))
+
+    def torque(self, frequency: float | Array) -> Numbers:
+        """Evaluate angular acceleration by command where no rotation damps it."""
+        return np.asarray(self.push(frequency) / (1 + 2j * np.pi * frequency * self.lag))
+
+    def push(self, frequency: float | Array) -> Numbers:
+        """Evaluate the same in front of the lag."""
+        s = 2j * np.pi * frequency
+        return np.asarray(self.gain * (1 + s * self.lead) * np.exp(-s * self.delay))
+
+    def rate(self, frequency: float | Array) -> Numbers:
+        """Evaluate body rate by command, Hz."""
+        return np.asarray(self.torque(frequency) / (2j * np.pi * frequency + self.damping))
+
+
+@result
+class AxisPlant:
+    """How the vehicle turns about one axis by what the autopilot commands.
+
+    Its numbers are of the vehicle from the command to the body rate in front of the gyroscope's filters where the log
+    states these, else behind them; its curves are of the body rate as logged. The delay is all that lies between a
+    logged command and its effect, so that a loop of it and a law needs no step of computing or holding beside it.
+    """
+
+    SHOWN = ("identified",)
+
+    axis: str = about("roll, pitch or yaw")
+    verdict: str = about("identified, weak, or none")
+    reason: str = about("why it is not identified; empty where it is")
+    instrument: str = about("signal that moves the vehicle and knows nothing of gusts; empty where there is none")
+    at_hz: float = about("frequency of the effectiveness", unit="Hz", gaps=True)
+    band_hz: np.ndarray = about("lowest and highest frequency of the estimate", "end", unit="Hz", gaps=True)
+    windows: int = about("windows of the estimate, overlapping by half")
+    strength: float = about("F statistic of the instrument, conditional on all other numbers", gaps=True)
+    coherence: float = about("of instrument and command, median over the band", gaps=True)
+    effectiveness: Estimate | None = part(default=None)
+    total_delay: Estimate | None = part(default=None)
+    """Delay and lag of torque behind the command at that frequency, s."""
+    delay: Estimate | None = part(default=None)
+    lag: Estimate | None = part(default=None)
+    least_squares: Estimate | None = part(default=None)
+    bound: Estimate | None = part(default=None)
+    frequency: np.ndarray = about("of the curves", "frequency", unit="Hz", brief=False)
+    gain: np.ndarray = about("angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
+    gain_error: np.ndarray = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
+    model_gain: np.ndarray = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    model_phase: np.ndarray = about("of the model", "frequency", unit="rad", gaps=True, brief=False)
+    direct_gain: np.ndarray = about("by least squares", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    direct_phase: np.ndarray = about("by least squares", "frequency", unit="rad", gaps=True, brief=False)
+    input_coherence: np.ndarray = about("of instrument and command", "frequency", gaps=True, brief=False)
+    output_coherence: np.ndarray = about("of instrument and body rate", "frequency", gaps=True, brief=False)
+    parameters: np.ndarray = about(
+        "gain rad/s^2, delay s, lag s, damping 1/s, lead s of the model", "number", gaps=True, brief=False
+    )
+    draws: np.ndarray = about("the same of plants that the log leaves possible", "draw", "number", brief=False)
+
+    @property
+    def identified(self) -> bool:
+        """Whether the numbers are of the vehicle, and sure enough to be used."""
+        return self.verdict == "identified"
+
+    @property
+    def model(self) -> PlantModel:
+        """The plant that was found."""
+        return PlantModel(*(float(each) for each in self.parameters))
+
+    @property
+    def possible(self) -> PlantModel:
+        """Plants that the log leaves possible, each number of shape (draw, 1)."""
+        return PlantModel(*(self.draws[:, [place]] for place in range(self.draws.shape[1])))
+
+
+def effectiveness(flight: LogFlight) -> tuple[AxisPlant, ...]:
+    """Estimate the control effectiveness about each axis."""
+    return tuple(axis_effectiveness(flight, axis) for axis in range(3))
+
+
+def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
+    """Estimate the control effectiveness about one axis, by the first instrument that is exogenous and strong."""
+    usable = flight.usable & np.isfinite(flight.command[:, axis]) & np.isfinite(flight.body_rate[:, axis])
+    chosen, law = exogenous(flight, axis, usable), flown_law(flight)
+    best: AxisPlant | None = None
+    for source, values in chosen.candidates:
+        known = usable & np.isfinite(values)
+        spectra = plant_spectra(flight, axis, values, known)
+        if spectra is None:
+            continue
+        filters = gyroscope_filters(law, axis, spectra.frequency)
+        found = _of_spectra(AXES[axis], source, spectra, filters)
+        if found.strength >= STRONG:
+            late = _lateness(spectra, filters * found.model.push(spectra.frequency))
+            again = plant_spectra(flight, axis, values, known, max(late, 0.0))
+            if again is not None:
+                found = _of_spectra(AXES[axis], source, again, gyroscope_filters(law, axis, again.frequency))
+        if best is None or (best.strength < STRONG and found.strength > best.strength):
+            best = found
+    return best or _none(AXES[axis], chosen.reason or "too short")
+
+
+def plant_spectra(
+    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float = 0.0
+) -> BlockSpectra | None:
+    """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
+
+    Parameters
+    ----------
+    late : float, s
+        By which windows of the command begin earlier: what entered a window is then what left it, and slow motion of
+        other windows does not leak into the phase.
+    """
+    early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)
+    signals = (instrument, flight.command[:, axis], flight.body_rate[:, axis])
+    instrument, command, rate = (without_slow(each, usable, half) for each in signals)
+    usable = eroded(usable, half)
+    if early:
+        usable = usable & np.concatenate([np.zeros(early, dtype=bool), usable[:-early]])
+    seconds = float(np.clip(usable.sum() / flight.rate_hz / _WINDOWS, *_window_s(flight)))
+    length = round(seconds * flight.rate_hz)
+    begins = window_starts(usable, length)
+    frequency = np.fft.rfftfreq(length, 1 / flight.rate_hz)
+    inside = (frequency >= _PERIODS / seconds * (1 - 1e-9)) & (frequency <= min(_TOP_HZ, _OF_CLOCK * flight.rate_hz))
+    if len(begins) < 2 or inside.sum() < 6:
+        return None
+    period = 1 / flight.rate_hz
+    parts = [*transforms(instrument, begins, length, period), *transforms(np.roll(command, early), begins, length, period)]
+    parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
+    parts += transforms(rate, begins, length, period, 2)
+    power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
+    if not power.sum() > 0:
+        return None
+    spectra = block_spectra(parts, cut_blocks(power), frequency, inside)
+    return spectra if len(spectra.windows) >= FEWEST_BLOCKS else None
+
+
+def _lateness(spectra: BlockSpectra, torque: Numbers) -> float:
+    """Give the slope of a phase over the band, s."""
+    turned, turn = np.unwrap(np.angle(torque)), 2 * np.pi * spectra.frequency
+    return float(-(turn @ turned) / (turn @ turn))
+
+
+def _window_s(flight: LogFlight) -> tuple[float, float]:
+    return _SLOW_WINDOW_S if flight.rate_hz < _SLOW_HZ else _WINDOW_S
+
+
+class _Equations:
+    """Equations of one axis by frequency: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
+
+    Instruments are what the other blocks predict from the setpoint: a prediction by the same windows would follow the
+    gusts again.
+    """
+
+    def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float, instrument: int = Z) -> None:
+        self.spectra, self.filters, self.at_hz, self.instrument = spectra, filters, at_hz, instrument
+        self._seen = spectra.cross[:, :, instrument, U:]
+        power = (spectra.total[:, instrument, instrument] - spectra.cross[:, :, instrument, instrument]).real
+        others = np.moveaxis(self._seen.sum(axis=0) - self._seen, 2, 1)
+        predicted = smoothed(others) / np.maximum(smoothed(power), np.finfo(float).tiny)[:, None]
+        if instrument == U:
+            # Least squares takes the command as it is.
+            predicted[:, 0] = 1.0
+        self._predicted = np.moveaxis(predicted, 1, 2)
+        self._windows = int(spectra.windows.sum())
+
+    def terms(self, values: Array) -> Numbers:
+        """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
+        model = PlantModel.of(values[..., None, :], self.at_hz)
+        push = -self.filters * model.push(self.spectra.frequency)
+        rest = (model.damping, 1 + model.damping * model.lag, model.lag)
+        return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
+
+    def __call__(self, values: Array) -> Normal:
+        step, numbers = 1e-5, len(values)
+        moved = values + step * np.concatenate([np.zeros((1, numbers)), np.eye(numbers), -np.eye(numbers)])
+        terms = self.terms(moved)
+        slopes = (terms[1 + numbers :] - terms[1 : 1 + numbers]) / (2 * step)
+        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * self._weight(terms[0])
+        return Normal(
+            np.einsum("bpf,qfs,bfs->bpq", predicted, slopes, self._seen, optimize=True).real,
+            np.einsum("bpf,bf->bp", predicted, (terms[0] * self._seen).sum(axis=2)).real,
+        )
+
+    def _weight(self, terms: Numbers) -> Array:
+        """Give the inverse variance of the disturbance for one window, shape (frequency,)."""
+        parts = self.spectra.total[:, U:, U:] / self._windows
+        rest = np.einsum("fi,fij,fj->f", terms.conj(), parts, terms).real
+        least = _FLOOR * (np.abs(terms) ** 2 * np.einsum("fii->fi", parts).real).sum(axis=1)
+        return np.asarray(2 / SHARED_BINS / np.exp(smoothed(np.log(np.maximum(rest, least)))))
+
+
+def _prior(yaw: bool) -> Prior:
+    """State what is known of multirotors before: nothing of effectiveness and delay, the order of the others."""
+    mean = [0.0, 0.0, _LAG_SHARE, np.log(_DAMPING), *([np.log(_LEAD_S)] if yaw else [])]
+    spread = [np.inf, np.inf, _LAG_SPREAD, _DAMPING_SPREAD, *([_LEAD_SPREAD] if yaw else [])]
+    return Prior(np.array(mean), np.array(spread))
+
+
+def _fitted(equations: _Equations, yaw: bool) -> Fit:
+    """Fit the model, begun at the best of a few delays."""
+    prior = _prior(yaw)
+    best = (np.inf, prior.mean)
+    seen = equations.spectra.total[:, equations.instrument, U:]
+    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny)
+    for delay in np.arange(1.0, 16.0, 1.5):
+        values = np.concatenate([[0.0, delay], prior.mean[2:]])
+        terms = equations.terms(values)
+        follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
+        weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
+        gain = float((weight * (follows.conj() * target).real).sum() / (weight * np.abs(follows) ** 2).sum())
+        left = float((weight * np.abs(target - gain * follows) ** 2).sum())
+        if gain > 0 and left < best[0]:
+            best = (left, np.concatenate([[np.log(gain)], values[1:]]))
+    low, high = np.full(len(prior.mean), -np.inf), np.full(len(prior.mean), np.inf)
+    low[1], high[1] = _LEAST_DELAY, _MOST_DELAY_S / _DELAY_UNIT_S
+    low[2:], high[2:] = prior.mean[2:] - 4 * prior.spread[2:], prior.mean[2:] + 4 * prior.spread[2:]
+    return estimate(equations, best[1], prior, (low, high))
+
+
+def _reference(spectra: BlockSpectra) -> float:
+    """Choose the frequency where the log knows effectiveness best: in the middle of what the instrument moves."""
+    clear = spectra.coherence(Z, U) * spectra.coherence(Z, Y)
+    weight = clear / np.maximum(1 - clear, 0.02)
+    middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), 1e-300)))
+    return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
+
+
+def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers) -> AxisPlant:
+    at_hz, yaw = _reference(spectra), axis == AXES[_YAW]
+    equations = _Equations(spectra, filters, at_hz)
+    fit, plain = _fitted(equations, yaw), _fitted(_Equations(spectra, filters, at_hz, U), yaw)
+    first = np.eye(len(fit.values))[0]
+    half_gain, total = float(np.hypot(fit.half(first), GAIN_FLOOR)), _delay_at(fit, at_hz)
+    verdict, reason = _judged(fit, half_gain, total.half)
+    return AxisPlant(
+        axis=axis,
+        verdict=verdict,
+        reason=reason,
+        instrument=source,
+        at_hz=at_hz,
+        band_hz=spectra.frequency[[0, -1]],
+        windows=int(spectra.windows.sum()),
+        strength=float(fit.strength[0]),
+        coherence=float(np.median(spectra.coherence(Z, U))),
+        effectiveness=_exponential(fit.values[0], half_gain) if verdict == "identified" else None,
+        total_delay=total if verdict == "identified" else None,
+        least_squares=_exponential(plain.values[0], plain.half(first)),
+        bound=None if verdict == "identified" else _bound(equations, fit.values),
+        **_apart(fit, verdict),
+        draws=_drawn(fit, at_hz) if verdict == "identified" else np.zeros((0, 5)),
+        **_curves(equations, fit),
+    )
+
+
+def _exponential(value: float, half: float) -> Estimate:
+    return Estimate(value=float(np.exp(value)), low=float(np.exp(value - half)), high=float(np.exp(value + half)))
+
+
+def _delay_at(fit: Fit, at_hz: float) -> Estimate:
+    """Give the delay of torque behind the command at a frequency, s: there it is known best."""
+
+    def delay(values: Array) -> Array:
+        model = PlantModel.of(values, 0.01)
+        turn = 2 * np.pi * at_hz
+        late = np.arctan(turn * model.lag) - np.arctan(turn * model.lead)
+        return np.asarray(model.delay + late / turn)
+
+    step = 1e-5 * np.eye(len(fit.values))
+    direction = (delay(fit.values + step) - delay(fit.values - step)) / 2e-5
+    value, half = float(delay(fit.values)), float(np.hypot(fit.half(direction), DELAY_FLOOR_S))
+    return Estimate(value=value, low=value - half, high=value + half)
+
+
+def _judged(fit: Fit, half_gain: float, half_delay: float) -> tuple[str, str]:
+    if fit.strength[0] < STRONG:
+        return "weak", "the instrument moves the vehicle too little"
+    if not fit.settled:
+        return "weak", "no model of a multirotor fits"
+    if half_gain > NARROW or half_delay > NARROW_DELAY_S:
+        return "weak", "the interval is too wide"
+    return "identified", ""
+
+
+def _bound(equations: _Equations, values: Array) -> Estimate | None:
+    """Give an interval of effectiveness that holds for a weak instrument, over all usual delays; None where none."""
+    lows, highs = [], []
+    for delay in (1.0, 2.5, 5.0, 8.0):
+        at = values.copy()
+        at[0], at[1] = 0.0, delay
+        normal = equations(at)
+        low, high = positive_ratio(normal.score[:, 0] + normal.information[:, 0, 0], normal.information[:, 0, 0])
+        lows.append(low)
+        highs.append(high)
+    low, high = min(lows), max(highs)
+    return Estimate(value=np.nan, low=low, high=high) if low > 0 or np.isfinite(high) else None
+
+
+def _apart(fit: Fit, verdict: str) -> dict[str, Estimate | None]:
+    """Give delay and lag apart where the log halves what was known of their shares before."""
+    half = fit.half(np.eye(len(fit.values))[2])
+    if verdict != "identified" or half > _LAG_SPREAD:
+        return {}
+    share = [1 / (1 + np.exp(-(fit.values[2] + side * half))) for side in (0.0, -1.0, 1.0)]
+    total = _DELAY_UNIT_S * fit.values[1]
+    spread = _DELAY_UNIT_S * fit.half(np.eye(len(fit.values))[1])
+
+    def of(value: float, low: float, high: float) -> Estimate:
+        # Ends of share and of the whole delay, taken as independent.
+        below, above = (np.hypot(total * (value - end), spread * value) for end in (low, high))
+        return Estimate(value=float(total * value), low=float(total * value - below), high=float(total * value + above))
+
+    return {"lag": of(*share), "delay": of(1 - share[0], 1 - share[2], 1 - share[1])}
+
+
+def _drawn(fit: Fit, at_hz: float) -> np.ndarray:
+    """Draw plants that the log leaves possible, shape (draw, 5), as wide as Student's t of few blocks."""
+    variance, axes = np.linalg.eigh(fit.covariance)
+    first = np.eye(len(fit.values))[0]
+    wider = fit.half(first) / 1.96 / float(np.sqrt(fit.covariance[0, 0]))
+    normal = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.values)))
+    draws = fit.values + wider * (normal * np.sqrt(np.maximum(variance, 0.0))) @ axes.T
+    draws[:, 1] = np.maximum(draws[:, 1], _LEAST_DELAY)
+    return np.stack([np.broadcast_to(each, _DRAWS) for each in PlantModel.of(draws, at_hz)], axis=1)
+
+
+def _curves(equations: _Equations, fit: Fit) -> dict[str, np.ndarray]:
+    spectra = equations.spectra
+    gain, direct = spectra.gain(Z, U, A), spectra.gain(U, U, A)
+    model = PlantModel.of(fit.values, equations.at_hz)
+    fitted = equations.filters * model.acceleration(spectra.frequency)
+    clear = np.minimum(spectra.coherence(Z, U), spectra.coherence(Z, Y))
+    with np.errstate(divide="ignore"):
+        error = np.sqrt((1 - clear) / (2 * np.maximum(clear, 1e-12) * max(int(spectra.windows.sum()), 1) * 0.6))
+    return {
+        "frequency": spectra.frequency,
+        "gain": np.abs(gain),
+        "phase": np.unwrap(np.angle(gain)),
+        "gain_error": error,
+        "model_gain": np.abs(fitted),
+        "model_phase": np.unwrap(np.angle(fitted)),
+        "direct_gain": np.abs(direct),
+        "direct_phase": np.unwrap(np.angle(direct)),
+        "input_coherence": spectra.coherence(Z, U),
+        "output_coherence": spectra.coherence(Z, Y),
+        "parameters": np.array([float(each) for each in model]),
+    }
+
+
+def _none(axis: str, reason: str) -> AxisPlant:
+    empty = np.zeros(0)
+    curves = ("frequency", "gain", "phase", "gain_error", "model_gain", "model_phase", "direct_gain", "direct_phase")
+    return AxisPlant(
+        axis=axis,
+        verdict="none",
+        reason=reason,
+        instrument="",
+        at_hz=np.nan,
+        band_hz=np.full(2, np.nan),
+        windows=0,
+        strength=np.nan,
+        coherence=np.nan,
+        **dict.fromkeys((*curves, "input_coherence", "output_coherence"), empty),
+        parameters=np.full(5, np.nan),
+        draws=np.zeros((0, 5)),
+    )
