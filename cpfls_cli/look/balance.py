@@ -1,0 +1,330 @@
+"""How thrust is shared among the rotors in steady flight, and what may cause that it is uneven."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.look.steady import WINDOW_S, Known, StatedCurve, Windows, jackknifed, on_clock, stated_curve, windows_of
+from cpfls_cli.result import Estimate, about, part, result
+
+SOUND = 0.03
+"""Shares of thrust by which sound motors, propellers and batteries differ from the mean; smaller is no finding."""
+_RATE, _TILT = np.radians(40.0), np.radians(15.0)
+"""Most root mean square of the body rates about roll and pitch, and mean rate about yaw; most mean tilt."""
+_AT_LIMIT, _LIMITED = 0.01, 0.02
+"""How near to a limit is at it, share of the range; most share of a window at it."""
+_RARE = 0.01
+"""Probability below which a cause does not explain a pattern."""
+_TURNED = 0.2
+"""Least of one minus the squared mean of the headings' unit vectors, for which the wind is told from the body."""
+_SIGNAL_TO_THRUST = (1.0, 2.0)
+"""Share of thrust over that of commands, where the curve between them is unknown: straight to square."""
+
+
+@result
+class RotorBalance:
+    """One rotor in steady flight."""
+
+    rotor: int = about("number of the rotor, as the autopilot counts")
+    share: Estimate | None = part(default=None)
+    expected: float = about("share where all rotors are equal and the centre of mass is where the autopilot has it")
+    scatter: float = about("standard deviation of the share over windows", gaps=True)
+    drift: Estimate | None = part(default=None)
+    speed_per_command: Estimate | None = part(default=None)
+    at_upper: float = about("share of the time flown at the upper limit of the command")
+    at_lower: float = about("share of the time flown at the lower limit of the command")
+    longest_upper_s: float = about("longest time at the upper limit", unit="s")
+    longest_lower_s: float = about("longest time at the lower limit", unit="s")
+
+
+@result
+class Cause:
+    """What may make the shares uneven."""
+
+    kind: str = about("rotor, centre of mass, yaw torque, or wind")
+    rotor: int = about("number of the rotor where it is one; else 0")
+    alone: bool = about("whether it explains all of the pattern")
+    size: Estimate = part()
+    forward: Estimate | None = part(default=None)
+    right: Estimate | None = part(default=None)
+    unit: str = about("of the size: share of thrust, share of the arm, mm")
+
+
+@result
+class Balance:
+    """Shares of thrust by rotor in steady flight, over their mean, and what may cause them."""
+
+    SHOWN = ("uneven",)
+
+    measured_by: str = about("rotor speed (squared), thrust curve (of the autopilot), or command (thrust not known)")
+    lacks: str = about("why there are no shares: empty, steady flight, or places")
+    steady_s: float = about("steady flight that is used", unit="s")
+    blocks: int = about("blocks of the jackknife")
+    rotors: tuple[RotorBalance, ...] = part()
+    roll: Estimate | None = part(default=None)
+    pitch: Estimate | None = part(default=None)
+    yaw: Estimate | None = part(default=None)
+    turned: float = about("how far headings spread: 0 for one, 1 for all alike", gaps=True)
+    fixed_forward: Estimate | None = part(default=None)
+    fixed_right: Estimate | None = part(default=None)
+    wind: Estimate | None = part(default=None)
+    causes: tuple[Cause, ...] = part()
+    time: Array = about("middle of each steady window", "window", unit="s", brief=False)
+    shares: Array = about("share of each rotor in each window", "window", "rotor", brief=False)
+    heading: Array = about("heading in each window", "window", unit="rad", gaps=True, brief=False)
+
+    @property
+    def uneven(self) -> tuple[int, ...]:
+        """Number the rotors whose share surely differs by more than sound rotors do, the most uneven first."""
+        apart = [
+            (max(each.share.low - each.expected, each.expected - each.share.high), each.rotor)
+            for each in self.rotors
+            if each.share
+        ]
+        return tuple(rotor for by, rotor in sorted(apart, reverse=True) if by > SOUND)
+
+
+def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
+    """Estimate the share of thrust of each rotor in steady flight; None where the log has no rotors.
+
+    Windows of 2 s count where the body hardly turns, tilts less than 15 degrees and no rotor is at a limit. Intervals
+    are by a jackknife over blocks of neighbouring windows.
+
+    Parameters
+    ----------
+    arm_m : float or None, m
+        For the centre of mass in mm.
+    """
+    stated = stated_curve(flight)
+    source, measured_by = _thrusts(flight, stated)
+    if not source.values.size:
+        return None
+    windows = _steady(flight, stated, source)
+    thrust = windows.means(source)
+    shares = thrust / thrust.mean(axis=1, keepdims=True)
+    heading = _heading(flight, windows)
+    expected = _expected(flight, shares.shape[1])
+    means = jackknifed(lambda kept: shares[kept].mean(axis=0), len(shares))
+    trims = _Trims(flight, means, expected, measured_by) if means and flight.places is not None else None
+    lean = trims.leans(shares, heading) if trims else None
+    first = {"steady flight": means is None, "places": trims is None}
+    return Balance(
+        measured_by=measured_by,
+        lacks=next((what for what, lacking in first.items() if lacking), ""),
+        steady_s=len(shares) * WINDOW_S,
+        blocks=means.blocks if means else 0,
+        rotors=_rows(flight, stated, windows, shares, means, expected),
+        roll=trims.known.estimate(0) if trims else None,
+        pitch=trims.known.estimate(1) if trims else None,
+        yaw=trims.known.estimate(2) if trims else None,
+        turned=_spread(heading),
+        fixed_forward=lean.estimate(0) if lean else None,
+        fixed_right=lean.estimate(1) if lean else None,
+        wind=_length(lean, 2) if lean else None,
+        causes=trims.causes(lean, arm_m) if trims else (),
+        time=windows.begin + 0.5 * windows.length_s,
+        shares=shares,
+        heading=heading,
+    )
+
+
+def _thrusts(flight: LogFlight, stated: StatedCurve) -> tuple[Samples, str]:
+    if flight.rotor_speed is not None:
+        return flight.rotor_speed._replace(values=flight.rotor_speed.values**2), "rotor speed"
+    known = "thrust curve" if stated.name and stated.value != 0 else "command"
+    return flight.rotors._replace(values=stated.thrusts(flight.rotors.values)), known
+
+
+def _limited(stated: StatedCurve, command: Array) -> tuple[BoolArray, BoolArray]:
+    """Tell where commands are at their upper and lower limits, shape (sample, rotor) each."""
+    low, high = (0.0, 1.0) if stated.thrust else (stated.curve.low, stated.curve.high)
+    near = _AT_LIMIT * (high - low)
+    return command >= high - near, command <= low + near
+
+
+def _steady(flight: LogFlight, stated: StatedCurve, source: Samples) -> Windows:
+    windows = windows_of(flight)
+    rate = windows.means(on_clock(flight, flight.body_rate))
+    moving = windows.means(on_clock(flight, flight.body_rate**2))
+    tilt = windows.means(on_clock(flight, np.hypot(flight.attitude[:, 0], flight.attitude[:, 1])))[:, 0]
+    steady = (moving[:, :2].sum(axis=1) < _RATE**2) & (np.abs(rate[:, 2]) < _RATE) & ~(tilt > _TILT)
+    if flight.rotors.values.size:
+        limited = np.any(_limited(stated, flight.rotors.values), axis=0).astype(float)
+        steady &= ~(windows.means(flight.rotors._replace(values=limited)).max(axis=1) > _LIMITED)
+    thrust = windows.means(source)
+    return windows.keep(steady & np.isfinite(thrust).all(axis=1) & (thrust > 0).all(axis=1))
+
+
+def _heading(flight: LogFlight, windows: Windows) -> Array:
+    """Average the heading over windows, rad; NaN where the log has none."""
+    parts = windows.means(on_clock(flight, np.stack([np.cos(flight.attitude[:, 2]), np.sin(flight.attitude[:, 2])], 1)))
+    return np.arctan2(parts[:, 1], parts[:, 0])
+
+
+def _spread(heading: Array) -> float:
+    return float(1 - np.abs(np.mean(np.exp(1j * heading))) ** 2) if len(heading) else np.nan
+
+
+def _columns(flight: LogFlight) -> Array:
+    """Give forward place, right place and spin of each rotor, shape (rotor, 3); no spin where it is not known."""
+    places = np.empty((0, 2)) if flight.places is None else flight.places
+    spins = np.zeros(len(places)) if flight.spins is None else flight.spins
+    return np.column_stack([places, spins])
+
+
+def _expected(flight: LogFlight, rotors: int) -> Array:
+    """Give the shares with which equal rotors about the stated centre hover, shape (rotor,)."""
+    columns = _columns(flight)
+    if len(columns) != rotors:
+        return np.ones(rotors)
+    thrust = np.linalg.pinv(np.column_stack([np.ones(rotors), columns]).T)[:, 0]
+    return np.asarray(thrust / thrust.mean())
+
+
+def _rows(
+    flight: LogFlight, stated: StatedCurve, windows: Windows, shares: Array, means: Known | None, expected: Array
+) -> tuple[RotorBalance, ...]:
+    middle = windows.begin + 0.5 * windows.length_s
+
+    def drift(kept: BoolArray) -> Array:
+        apart = middle[kept] - middle[kept].mean()
+        return np.asarray(apart @ shares[kept] / max(apart @ apart, 1e-12) * np.ptp(middle))
+
+    drifts = jackknifed(drift, len(shares))
+    speed = _per_command(flight, stated, windows)
+    flown = np.interp(flight.rotors.time, flight.time, flight.flown.astype(float)) > 0.5
+    ends = _limited(stated, flight.rotors.values) if flight.rotors.values.size else (np.zeros((0, len(expected))),) * 2
+    rows = []
+    for k in range(len(expected)):
+        upper, lower = (_time_at(flight.rotors.time, end[:, k] & flown, flown) if len(end) else (0, 0) for end in ends)
+        rows.append(
+            RotorBalance(
+                rotor=k + 1,
+                share=means.estimate(k) if means else None,
+                expected=float(expected[k]),
+                scatter=float(shares[:, k].std(ddof=1)) if means else np.nan,
+                drift=drifts.estimate(k) if drifts else None,
+                speed_per_command=speed.estimate(k) if speed else None,
+                at_upper=upper[0],
+                at_lower=lower[0],
+                longest_upper_s=upper[1],
+                longest_lower_s=lower[1],
+            )
+        )
+    return tuple(rows)
+
+
+def _per_command(flight: LogFlight, stated: StatedCurve, windows: Windows) -> Known | None:
+    """Compare speeds with those that are commanded, over the mean of the rotors: what motors alone differ by."""
+    if flight.rotor_speed is None or not flight.rotors.values.size:
+        return None
+    command = stated.thrusts(flight.rotors.values)
+    asked = np.sqrt(command) if stated.name and stated.value != 0 else command
+    ratio = windows.means(flight.rotor_speed) / windows.means(flight.rotors._replace(values=asked))
+    ratio = ratio / ratio.mean(axis=1, keepdims=True)
+    return jackknifed(lambda kept: ratio[kept].mean(axis=0), len(ratio))
+
+
+def _time_at(time: Array, at: BoolArray, flown: BoolArray) -> tuple[float, float]:
+    """Give the share of the time flown that is marked, and the longest stretch of it, s."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    longest = max((time[after - 1] - time[first] + step for first, after in runs(at)), default=0.0)
+    return float(at.sum() / max(flown.sum(), 1)), float(longest)
+
+
+def _length(known: Known, first: int) -> Estimate:
+    """Give the length of a vector of two numbers with its interval, not below 0."""
+    value = known.value[first : first + 2]
+    size = float(np.hypot(*value))
+    along = np.zeros((1, len(known.value)))
+    along[0, first : first + 2] = value / max(size, 1e-12)
+    half = float(known.moved(along).half[0])
+    return Estimate(value=size, low=max(size - half, 0.0), high=size + half)
+
+
+class _Trims:
+    """Trim about roll, pitch and yaw in shares of thrust, and the causes that it leaves possible."""
+
+    def __init__(self, flight: LogFlight, means: Known, expected: Array, measured_by: str) -> None:
+        columns, rotors = _columns(flight), len(expected)
+        self.columns = columns
+        self.measured_by, self.expected = measured_by, expected
+        apart = means.moved(np.eye(rotors))
+        self.apart = Known(apart.value - expected, apart.half, apart.covariance, apart.blocks)
+        centred = columns - columns.mean(axis=0)
+        # Right rotors push less to roll to the right.
+        signs = np.array([0, -1, 0]), np.array([1, 0, 0]), np.array([0, 0, 1])
+        self.known = self.apart.moved(np.array(signs) @ np.linalg.pinv(centred))
+        self.lean = np.stack([columns[:, 0], columns[:, 1]]) / rotors
+
+    def leans(self, shares: Array, heading: Array) -> Known | None:
+        """Part where the thrust acts, forward and right, into what turns with the body and what does not."""
+        if not np.isfinite(heading).all() or not _spread(heading) > _TURNED:
+            return None
+        leans = (shares - self.expected) @ self.lean.T
+        cosine, sine = np.cos(heading), np.sin(heading)
+        zero, one = np.zeros_like(cosine), np.ones_like(cosine)
+        rows = np.stack([np.stack([one, zero, cosine, sine], 1), np.stack([zero, one, -sine, cosine], 1)], axis=1)
+
+        def parted(kept: BoolArray) -> Array:
+            return np.asarray(np.linalg.lstsq(rows[kept].reshape(-1, 4), leans[kept].ravel(), rcond=None)[0])
+
+        return jackknifed(parted, len(shares))
+
+    def causes(self, lean: Known | None, arm_m: float | None) -> tuple[Cause, ...]:
+        """List what may cause the pattern; what it excludes is left out."""
+        lever = self.apart.moved(self.lean) if lean is None else lean
+        of_mass = bool(np.any(np.abs(lever.value[:2]) > lever.half[:2]))
+        flat, straight = self._explained(self.columns[:, :2]), self._explained(self.columns[:, 2:])
+        found = self._single_rotors()
+        if of_mass:
+            unit, scale = ("share of the arm", 1.0) if arm_m is None else ("mm", 1e3 * arm_m)
+            forward, right = (self._as_thrust(lever.estimate(axis), scale) for axis in (0, 1))
+            size = self._as_thrust(_length(lever, 0), scale)
+            found.append(
+                Cause(kind="centre of mass", rotor=0, alone=flat, size=size, forward=forward, right=right, unit=unit)
+            )
+        if not self.known.estimate(2).low <= 0 <= self.known.estimate(2).high:
+            size = self.known.estimate(2)
+            found.append(Cause(kind="yaw torque", rotor=0, alone=straight, size=size, unit="share of thrust"))
+        wind = self._as_thrust(_length(lever, 0) if lean is None else _length(lean, 2), 1.0)
+        if wind.low > 0 and (lean is not None or of_mass):
+            found.append(Cause(kind="wind", rotor=0, alone=flat, size=wind, unit="share of the arm"))
+        return tuple(found)
+
+    def _single_rotors(self) -> list[Cause]:
+        """List the rotors each of which, weaker or stronger than the others, explains the pattern alone."""
+        rotors = len(self.expected)
+        rows = np.column_stack([np.ones(rotors), self.columns])
+        project = rows @ np.linalg.pinv(rows)
+        found = []
+        for k in range(rotors):
+            pattern = project[:, k] - project[:, k].mean()
+            if not self._explained(pattern[:, None]):
+                continue
+            size = self.apart.moved(pattern[None] / (pattern @ pattern)).estimate()
+            if not size.low <= 0 <= size.high:
+                found.append(Cause(kind="rotor", rotor=k + 1, alone=True, size=size, unit="share of thrust"))
+        return found
+
+    def _explained(self, patterns: Array) -> bool:
+        """Test whether patterns, shape (rotor, pattern), leave nothing but noise and what sound rotors differ by."""
+        from scipy.special import fdtrc
+
+        rotors = len(self.expected)
+        flat = np.column_stack([np.ones(rotors), patterns])
+        basis = np.linalg.svd(flat)[0][:, np.linalg.matrix_rank(flat) :]
+        left = basis.T @ self.apart.value
+        if not len(left):
+            return True
+        covariance = basis.T @ self.apart.covariance @ basis + SOUND**2 / 4 * np.eye(len(left))
+        statistic = float(left @ np.linalg.solve(covariance, left)) / len(left)
+        return bool(fdtrc(len(left), max(self.apart.blocks - 1, 1), statistic) > _RARE)
+
+    def _as_thrust(self, given: Estimate, scale: float) -> Estimate:
+        """Scale a share of commands to one of thrust, over all curves that may lie between them."""
+        factors = _SIGNAL_TO_THRUST if self.measured_by == "command" else (1.0, 1.0)
+        ends = [scale * factor * end for factor in factors for end in (given.low, given.high)]
+        return Estimate(value=scale * 0.5 * sum(factors) * given.value, low=min(ends), high=max(ends))

@@ -1,0 +1,413 @@
+"""Vibration: spectra over throttle, the lines in them, what reaches the motors, and the filters against them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.law import STAGES, Filter, Law, chain
+from cpfls_cli.autopilots.parameters import Autopilot
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.blocks import contiguous, half_width, jackknife_error
+from cpfls_cli.look.flight import AXES, LogFlight, Samples
+from cpfls_cli.look.steady import Windows, number, windows_of
+from cpfls_cli.result import Estimate, about, part, result
+from cpfls_cli.tuning.noise import Noise
+
+_WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.5, 16, 32
+_ABOVE_HZ, _TELLS_HZ = 10.0, 50.0
+"""Vibration is what is above the first; a log that ends below the second shows too little of it for a size."""
+_LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
+"""A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the mean of all windows and in so many standard
+errors."""
+_POWERS = np.arange(-1.0, 1.3, 0.125)
+"""Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded."""
+_BLOCKS, _BINS = 12, 16
+_FIXED, _MOVES = 0.25, 0.15
+_WIDE = 0.06
+"""Relative half-width that a line takes with it."""
+_CLIPPED_GYROSCOPE, _CLIPPED_ACCELEROMETER = np.radians(1990.0), (78.0, 156.0, 313.0)
+"""Ends of the range of usual sensors: 2000 deg/s; 8, 16, 32 g."""
+LIMITS = {"ardupilot": (30.0, 60.0), "px4": (4.905, 9.81)}
+"""Vibration of the accelerometer, m/s^2: from where on there may be trouble, and from where on there is: ArduPilot's
+guide to measuring vibration (of its VIBE, above 5 Hz), and the colours of PX4's Flight Review (of its metric)."""
+
+
+@result
+class Spectrum:
+    """Power of a signal by frequency."""
+
+    signal: str = about("gyroscope before filters, gyroscope, accelerometer, or commands")
+    source: str = about("columns of the log")
+    rate_hz: float = about("as logged", unit="Hz")
+    rms: Array = about("root mean square above 10 Hz, by channel; rad/s, m/s^2 or share", "channel", gaps=True)
+    clipped: float = about("share of samples at the end of the sensor's range")
+    frequency: Array = about("frequencies", "frequency", unit="Hz", brief=False)
+    density: Array = about("single-sided, squared unit per Hz", "frequency", "channel", brief=False)
+
+
+@result
+class Line:
+    """A line of the gyroscope's spectrum."""
+
+    hz: float = about("at the median collective; as logged", unit="Hz")
+    lowest_hz: float = about("at the 5th percentile of the collective", unit="Hz")
+    highest_hz: float = about("at the 95th percentile of the collective", unit="Hz")
+    above_db: float = about("above its neighbourhood", unit="dB")
+    axis: str = about("where it is strongest")
+    kind: str = about("rotor, moves (with collective), fixed, folded, or unknown: collective varies too little")
+    power: Estimate | None = part(default=None)
+    rotor: int = about("number of the rotor that it follows; 0 where speeds are not logged")
+    order: float = about("over the rotor's turns", gaps=True)
+
+
+@result
+class StatedFilter:
+    """A filter that the log states."""
+
+    parameter: str = about("its name")
+    stage: str = about("what is filtered: measured, target, error, slope or output")
+    kind: str = about("first, second, or notch")
+    hz: float = about("cut-off or centre", unit="Hz")
+    width_hz: float = about("of a notch", unit="Hz")
+    delay_ms: float = about("that it costs at 5 Hz", unit="ms")
+    line_hz: float = about("the strongest fixed line, for a notch", unit="Hz", gaps=True)
+
+
+@result
+class Change:
+    """A parameter that this log shows should be another."""
+
+    parameter: str = about("its name")
+    now: float = about("as the log states it")
+    proposed: float = about("value")
+    reason: str = about("notch beside the line, or line outside the range of dynamic notches")
+
+
+@result
+class Vibration:
+    """Vibration of one flight."""
+
+    spectra: tuple[Spectrum, ...] = part()
+    lines: tuple[Line, ...] = part()
+    lines_lack: str = about("why no line can be seen: empty, rate, or time")
+    limit: tuple[float, ...] = about("of the autopilot for the accelerometer: doubtful, bad", "level", unit="m/s^2")
+    folds: bool = about("whether what is above half the logged rate may be folded below")
+    jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
+    filters: tuple[StatedFilter, ...] = part()
+    delay_ms: float = about("of all filters of the gyroscope at 5 Hz", unit="ms", gaps=True)
+    changes: tuple[Change, ...] = part()
+    map_collective: Array = about("middle of each bin", "bin", brief=False)
+    map_hz: Array = about("frequencies", "map_frequency", unit="Hz", brief=False)
+    map_db: Array = about("all axes, (rad/s)^2/Hz", "bin", "map_frequency", unit="dB", gaps=True, brief=False)
+
+
+def vibration_of(flight: LogFlight) -> Vibration | None:
+    """Estimate spectra, lines and their causes; None where no gyroscope is logged."""
+    if not flight.gyroscope.values.size:
+        return None
+    before, after = flight.gyroscope_unfiltered, flight.gyroscope
+    autopilot = AUTOPILOTS.get(flight.autopilot)
+    filtered = before is not None or bool(autopilot and after.source.startswith(autopilot.filtered))
+    given = [
+        ("gyroscope before filters", before if before is not None else None if filtered else after),
+        ("gyroscope", after if filtered else None),
+        ("accelerometer", flight.accelerometer),
+        ("commands", flight.rotors if flight.rotors_source == "logged" else None),
+    ]
+    parts = {name: _Power.of(flight, each) for name, each in given if each is not None and each.values.size}
+    spectra = tuple(power.spectrum(name) for name, power in parts.items() if power)
+    main = parts.get("gyroscope before filters") or parts.get("gyroscope")
+    lines = tuple(_lines(flight, main)) if main else ()
+    law = _law(flight, autopilot)
+    noise = _noise(main, law, filtered and before is None) if main and law else None
+    filters = tuple(_filters(flight, autopilot, law, lines)) if autopilot and law else ()
+    level, hz, db = _map(flight, main) if main else (np.empty(0), np.empty(0), np.empty((0, 0)))
+    highest = 0.5 * (before or after).rate_hz
+    return Vibration(
+        spectra=spectra,
+        lines=lines,
+        lines_lack="rate" if highest < 2 * _LOWEST_LINE_HZ else "" if main else "time",
+        limit=LIMITS.get(flight.autopilot, ()),
+        folds=highest < 500.0,
+        jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law and highest > _TELLS_HZ else (),
+        filters=filters,
+        delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
+        changes=tuple(_changes(flight, filters, lines)),
+        map_collective=level,
+        map_hz=hz,
+        map_db=db,
+    )
+
+
+class _Power(NamedTuple):
+    """Power of a signal by window and frequency.
+
+    Attributes
+    ----------
+    samples : Samples
+    windows : Windows
+    frequency : array, shape (frequency,), Hz
+    density : array, shape (window, frequency, channel)
+    """
+
+    samples: Samples
+    windows: Windows
+    frequency: Array
+    density: Array
+
+    @classmethod
+    def of(cls, flight: LogFlight, samples: Samples) -> _Power | None:
+        rate = samples.rate_hz
+        windows = windows_of(flight, max(_WINDOW_S, _LEAST_SAMPLES / max(rate, 1e-9)))
+        windows = windows.keep(np.asarray(np.isfinite(windows.means(samples)).all(axis=1)))
+        if len(windows.begin) < _FEWEST:
+            return None
+        count = round(windows.length_s * rate)
+        at = windows.begin[:, None] + np.arange(count) / rate
+        values = np.stack([np.interp(at, samples.time, channel) for channel in samples.values.T], axis=2)
+        taper = np.hanning(count)[:, None]
+        power = np.abs(np.fft.rfft(taper * (values - values.mean(axis=1, keepdims=True)), axis=1)) ** 2
+        frequency = np.asarray(np.fft.rfftfreq(count, 1 / rate), dtype=float)
+        return cls(samples, windows, frequency, power * 2 / (rate * (taper**2).sum()))
+
+    def spectrum(self, name: str) -> Spectrum:
+        """Average over windows."""
+        density = self.density.mean(axis=0)
+        shown = self.frequency >= _ABOVE_HZ
+        size = np.abs(self.samples.values).max(axis=1)
+        ends = {"accelerometer": _CLIPPED_ACCELEROMETER, "commands": ()}.get(name, (_CLIPPED_GYROSCOPE,))
+        # A range that is passed is not that of the sensor.
+        clipped = [np.mean(size >= end) for end in ends if size.max() < 1.02 * end]
+        return Spectrum(
+            signal=name,
+            source=self.samples.source,
+            rate_hz=self.samples.rate_hz,
+            rms=np.sqrt(density[shown].sum(axis=0) * self.frequency[1])
+            * (1.0 if self.frequency[-1] > _TELLS_HZ else np.nan),
+            clipped=float(clipped[0]) if clipped else 0.0,
+            frequency=self.frequency,
+            density=density,
+        )
+
+
+def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
+    if autopilot is None or autopilot.firmware.too_old(flight.system):
+        return None
+    values = autopilot.in_log(flight.parameters)
+    return autopilot.law(autopilot.of_log(values)) if values else None
+
+
+def _noise(power: _Power, law: Law, filtered: bool) -> Noise:
+    noise = Noise(power.frequency[1:], power.density.mean(axis=0)[1:])
+    return noise.before_filters(law) if filtered else noise
+
+
+def _map(flight: LogFlight, power: _Power) -> tuple[Array, Array, Array]:
+    """Average the power of all axes over windows of about equal collective, dB."""
+    level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
+    ends = np.nanpercentile(level, [2, 98]) if np.isfinite(level).any() else np.zeros(2)
+    edges = np.linspace(ends[0], ends[1], _BINS + 1)
+    total, rows = power.density.sum(axis=2), np.full((_BINS, len(power.frequency)), np.nan)
+    for k in range(_BINS):
+        inside = (level >= edges[k]) & (level < edges[k + 1])
+        if inside.sum() > 1:
+            rows[k] = total[inside].mean(axis=0)
+    return 0.5 * (edges[1:] + edges[:-1]), power.frequency, 10 * np.log10(np.maximum(rows, 1e-12))
+
+
+class _Drive(NamedTuple):
+    """What a line may follow, by window: the collective, or the turns of a rotor in 1/s."""
+
+    rotor: int
+    level: Array
+    powers: Array
+
+
+def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
+    if flight.rotor_speed is not None:
+        turns = power.windows.means(flight.rotor_speed) / (2 * np.pi)
+        for rotor in range(turns.shape[1]):
+            yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
+    level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
+    known = np.isfinite(level).any() and flight.rotor_speed is None
+    yield _Drive(0, level if known else np.ones(len(level)), _POWERS if known else np.zeros(1))
+
+
+def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
+    """Find lines one after the other, each along what it follows, and take each out before the next."""
+    from scipy.ndimage import median_filter
+
+    rate, spacing = power.samples.rate_hz, power.frequency[1]
+    if 0.5 * rate < 2 * _LOWEST_LINE_HZ:
+        return
+    total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
+    above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
+    above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
+    drives = [_usable(each) for each in _drives(flight, power)]
+    for _ in range(_MOST_LINES):
+        tables = [_Table(above, drive, rate, spacing) for drive in drives]
+        best = max(tables, key=lambda table: table.height)
+        if not best.sure:
+            return
+        yield best.line(power)
+        best.remove(above)
+
+
+def _usable(drive: _Drive) -> _Drive:
+    level = np.where(np.isfinite(drive.level) & (drive.level > 0), drive.level, np.nan)
+    return drive._replace(level=np.where(np.isfinite(level), level, np.nanmedian(level)))
+
+
+class _Table:
+    """Mean height above the floor along all curves that a line may follow.
+
+    Attributes
+    ----------
+    heights : array, shape (block, power, start)
+        Sums over the windows of a block.
+    """
+
+    def __init__(self, above: Array, drive: _Drive, rate: float, spacing: float) -> None:
+        self.drive, self.rate, self.spacing = drive, rate, spacing
+        self.middle = float(np.median(drive.level))
+        self.relative = drive.level / self.middle
+        self.starts = np.arange(_LOWEST_LINE_HZ, 0.5 * rate - spacing, 0.5 * spacing)
+        if drive.rotor:
+            self.starts = np.arange(0.8, max(2 * rate / self.middle, 1.0), 0.5 * spacing / self.middle) * self.middle
+        window = np.arange(len(above))[:, None, None]
+        found = above[window, self._bins(self.relative[:, None, None] ** drive.powers[:, None] * self.starts)]
+        group = contiguous(len(above), _BLOCKS)
+        self.counts = np.bincount(group, minlength=_BLOCKS)
+        self.heights = np.add.reduceat(found, np.searchsorted(group, np.arange(_BLOCKS)), axis=0)
+        self.mean = self.heights.sum(axis=0) / len(above)
+        at = int(np.argmax(self.mean))
+        self.best = divmod(at, self.mean.shape[1])
+        self.height = float(self.mean[self.best])
+
+    def _bins(self, hz: Array) -> Array:
+        """Give the bin in which a frequency shows, folded at half the rate."""
+        folded = np.abs((hz + 0.5 * self.rate) % self.rate - 0.5 * self.rate)
+        return np.rint(folded / self.spacing).astype(int)
+
+    @property
+    def sure(self) -> bool:
+        """Whether the highest is a line."""
+        each = self.heights[:, self.best[0], self.best[1]] / self.counts
+        return self.height > _LINE_DB and self.height > _SURE * float(each.std(ddof=1) / np.sqrt(_BLOCKS))
+
+    def power(self) -> Estimate | None:
+        """Estimate the power of the collective that the frequency goes with; None where it hardly varies."""
+        level = np.log(self.relative)
+        # Within a bin all powers fit.
+        coarse = 0.5 * self.spacing / self.starts[self.best[1]] / max(float(np.std(level)), 1e-9)
+        if self.drive.rotor or len(self.drive.powers) < 2 or coarse > 0.5:
+            return None
+        near = np.abs(self.starts / self.starts[self.best[1]] - 1) < 0.1
+        ridge = self.heights[:, :, near]
+
+        def highest(table: Array) -> float:
+            column = table.max(axis=1)
+            k = int(np.clip(np.argmax(column), 1, len(column) - 2))
+            left, top, right = column[k - 1 : k + 2]
+            bend = left - 2 * top + right
+            return float(self.drive.powers[k] + 0.125 * (0.5 * (left - right) / bend if bend < 0 else 0.0))
+
+        whole = ridge.sum(axis=0)
+        value = highest(whole)
+        left_out = np.array([highest(whole - each) for each in ridge])
+        half = float(half_width(jackknife_error(left_out), _BLOCKS)) + coarse
+        return Estimate(value=value, low=value - half, high=value + half)
+
+    def line(self, power: _Power) -> Line:
+        """Describe the highest."""
+        start, power_of = float(self.starts[self.best[1]]), self.power()
+        exponent = float(self.drive.powers[self.best[0]])
+        ends = np.percentile(self.relative, [5, 50, 95]) ** exponent * start
+        place = self._bins(self.relative**exponent * start)
+        strength = power.density[np.arange(len(place)), place].mean(axis=0)
+        kind = "rotor" if self.drive.rotor else "fixed" if len(self.drive.powers) == 1 else "unknown"
+        if power_of:
+            kinds = {
+                "folded": power_of.high < -_MOVES,
+                "moves": power_of.low > _MOVES,
+                "fixed": abs(power_of.value) + power_of.half < _FIXED,
+            }
+            kind = next((name for name, holds in kinds.items() if holds), "unknown")
+        shown = sorted(float(hz) for hz in self._bins(ends[[0, 2]]) * self.spacing)
+        return Line(
+            hz=float(self._bins(ends[1]) * self.spacing),
+            lowest_hz=shown[0],
+            highest_hz=shown[1],
+            above_db=self.height,
+            axis=AXES[int(np.argmax(strength))],
+            kind=kind,
+            power=power_of,
+            rotor=self.drive.rotor,
+            order=start / self.middle if self.drive.rotor else np.nan,
+        )
+
+    def remove(self, above: Array) -> None:
+        """Take the highest out of the heights."""
+        hz = self.relative ** self.drive.powers[self.best[0]] * self.starts[self.best[1]]
+        place = self._bins(hz)[:, None]
+        reach = np.maximum(2, np.rint(_WIDE * place))
+        above[np.abs(np.arange(above.shape[1]) - place) <= reach] = 0.0
+
+
+def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Line, ...]) -> Iterator[StatedFilter]:
+    """List the filters of the law about roll, or about the axis that alone has them."""
+    back = np.exp(-2j * np.pi * np.array([5.0]) * law.period)
+    fixed = [line for line in lines if line.kind == "fixed"]
+    seen: set[Filter] = set()
+    stated = autopilot.of_log(autopilot.in_log(flight.parameters))
+    for axis, own in zip(AXES, law.axes, strict=True):
+        for stage in STAGES:
+            for each in getattr(own, stage):
+                names = [
+                    parameter.name
+                    for parameter in autopilot.parameters
+                    if parameter.role.partition(".")[2].startswith(f"{stage}.{each.kind}")
+                    and parameter.role.partition(".")[0] in (axis, "all", "tilt")
+                    and parameter.unit == "Hz"
+                    and stated[parameter.name] * parameter.scale == each.hz
+                ]
+                if each in seen or not names:
+                    continue
+                seen.add(each)
+                yield StatedFilter(
+                    parameter=names[0],
+                    stage=stage,
+                    kind=each.kind,
+                    hz=each.hz,
+                    width_hz=each.width_hz,
+                    delay_ms=float(-np.angle(chain((each,), back, law.period))[0] / (2 * np.pi * 5.0) * 1e3),
+                    line_hz=fixed[0].hz if fixed and each.kind == "notch" else np.nan,
+                )
+
+
+def _changes(flight: LogFlight, filters: tuple[StatedFilter, ...], lines: tuple[Line, ...]) -> Iterator[Change]:
+    """Propose what is sure: a notch beside the one fixed line, and ends of dynamic notches that leave a line out."""
+    notches = [each for each in filters if each.kind == "notch" and each.stage == "measured"]
+    fixed = [line for line in lines if line.kind == "fixed" and line.above_db > 10]
+    if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0].hz) > 0.5 * notches[0].width_hz:
+        yield Change(
+            parameter=notches[0].parameter,
+            now=notches[0].hz,
+            proposed=float(round(fixed[0].hz)),
+            reason="notch beside the line",
+        )
+    moving = [line for line in lines if line.kind in ("moves", "rotor") and line.above_db > 10]
+    low, high = (number(flight, f"dyn_notch_{end}_hz") for end in ("min", "max"))
+    if moving and low and high and (number(flight, "dyn_notch_count") or 0) > 0:
+        least = min(line.lowest_hz for line in moving)
+        if least < low:
+            yield Change(
+                parameter="dyn_notch_min_hz",
+                now=low,
+                proposed=float(np.floor(least / 10) * 10),
+                reason="line outside the range of dynamic notches",
+            )
