@@ -79,6 +79,8 @@ class Firmware:
         First version whose gains count as these do.
     older : str
         What is otherwise in logs of before.
+    oldest_gains : tuple of int, or None
+        First version whose gains of the rate count as these do, whatever its filters; None: `oldest`.
     renamed : tuple of (tuple of int, mapping of str to str)
         A version, and from names here to those of the versions before it.
     """
@@ -87,6 +89,7 @@ class Firmware:
     systems: tuple[str, ...]
     oldest: tuple[int, int] = (0, 0)
     older: str = ""
+    oldest_gains: tuple[int, int] | None = None
     renamed: tuple[tuple[tuple[int, int], Mapping[str, str]], ...] = ()
 
     def wrote(self, system: str) -> bool:
@@ -97,6 +100,11 @@ class Firmware:
         """Tell whether gains of a log count otherwise."""
         version = version_of(system)
         return version is not None and version < self.oldest
+
+    def gains_differ(self, system: str) -> bool:
+        """Tell whether gains of the rate of a log count otherwise."""
+        version, oldest = version_of(system), self.oldest_gains or self.oldest
+        return version is not None and version < oldest
 
     def of(self, system: str) -> str:
         """Name the version that a file is for: that of a log where it tells one."""
