@@ -140,8 +140,8 @@ class Autopilot:
     fixed : mapping of str to float
         Quantities of the law that are no parameters, by role.
     logged_as : mapping of str to tuple of str
-        Parameters that a line of a log's header holds, separated by commas; an empty name is left out. Of two lines
-        that hold one the later counts, unless it is 0.
+        Parameters that a line of a log's header holds, separated by commas; an empty name is left out, and of two
+        names both have the value. Of two lines that hold one the later counts, unless it is 0.
     filtered : tuple of str
         First letters of the columns in which its logs hold the gyroscope behind the filters of the law.
     slope_of_error, integrates_first, holds_integral, series : bool
@@ -199,10 +199,9 @@ class Autopilot:
         """Take the parameters of the law out of what a log knows; empty where it holds no gain of a rate."""
         found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
         for line in (each for each in self.logged_as if each in logged):
-            for name, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
+            for names, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
                 # What is 0 there is off where an earlier line says it too.
-                if name and (_number(value) or name not in found):
-                    found[name] = value
+                found |= {name: value for name in names.split() if _number(value) or name not in found}
         gains = {each.name for each in self.parameters if each.role.endswith(".p")}
         return {name: _number(value) for name, value in found.items()} if gains & set(found) else {}
 

@@ -27,9 +27,13 @@ HOLDS = 0.95
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
-_FINE, _NEAR, _MOST_DB = 1e-9, 0.98, 99.0
+_FINE, _NEAR, _MOST_DB = 1e-6, 0.98, 99.0
 _ANY, _ANY_SHARE = np.array([100.0, 0.02, 0.02, 1.0, 0.0]), 0.5
 """Numbers of plants, and of a hover, that nothing is computed of."""
+_MOSTLY = 0.5
+_NO_ANGLE = 1e-3
+"""Gain of the angle, 1/s, that is none: the search takes a loop around the rate."""
+_NOISE_STEP_HZ = 8.0
 _LOWEST_NOISE_HZ = 40.0
 """Below, a spectrum holds more motion than noise; then noise is taken for white."""
 
@@ -93,7 +97,9 @@ class AxisGains:
 
     axis: str = about("roll, pitch or yaw")
     changed: bool = about("whether a change is sure")
-    reason: str = about("why nothing is proposed: weak, law, margins; empty where something is or gains are kept")
+    reason: str = about(
+        "why nothing is proposed: weak, law (with the plant it would not fly), margins; empty where something is or gains are kept"
+    )
     fact: str = about("more about the reason")
     attitude: bool = about("whether the loop of the attitude is closed around that of the rate")
     before: LoopMargins | None = part(default=None)
@@ -168,36 +174,41 @@ def _unusable(autopilot: Autopilot | None, system: str, known: Mapping[str, floa
 
 @dataclass
 class _Work:
-    """What gains are found from.
+    """What gains are found from."""
 
-    The plants are those behind the filters of the gyroscope, so the law is taken without them.
-    """
-
-    whole: Autopilot
+    autopilot: Autopilot
     flight: LogFlight
     plants: Sequence[Plant]
     asked: AskedMargins
     values: Mapping[str, float]
 
     def __post_init__(self) -> None:
-        kept = tuple(each for each in self.whole.parameters if ".measured." not in each.role)
-        fixed = {role: value for role, value in self.whole.fixed.items() if ".measured." not in role}
-        self.autopilot = replace(self.whole, parameters=kept, fixed=fixed)
-        # Without steps and ranges the best values are those of the plants.
-        self.open = replace(self.autopilot, parameters=tuple(_opened(each) for each in kept))
-        self.values = {each.name: self.values[each.name] for each in kept}
-        self.law = self.open.law(self.values)
-        self.names = self.whole.firmware.names(self.flight.system)
-        self.axes = [axis for axis, plant in enumerate(self.plants) if plant.identified]
-        self.noise = _noise(self.flight, self.law)
         flown = np.isfinite(self.flight.attitude_setpoint[self.flight.usable])
-        self.attitude = flown.mean(axis=0) > 0.5 if len(flown) else np.zeros(len(AXES), dtype=bool)
+        self.attitude = flown.mean(axis=0) > _MOSTLY if len(flown) else np.zeros(len(AXES), dtype=bool)
+        self.autopilot = _of_rates(self.autopilot, [AXES[axis] for axis in np.flatnonzero(~self.attitude)])
+        # Without steps and ranges the best values are those of the plants.
+        self.open = replace(self.autopilot, parameters=tuple(_opened(each) for each in self.autopilot.parameters))
+        self.values = {each.name: self.values[each.name] for each in self.autopilot.parameters}
+        self.law = self.open.law(self.values)
+        self.names = self.autopilot.firmware.names(self.flight.system)
+        self.axes = [axis for axis, plant in enumerate(self.plants) if plant.identified]
+        self.noise = _noise(self.flight, self.autopilot, self.law)
         self.best = [_plant(_draws(plant)[0], self.law) for plant in self.plants]
         self.possible = [[_plant(draw, self.law) for draw in _draws(plant)[1:]] for plant in self.plants]
         self._frequency = frequencies(self.law)
         self._moved = [
             np.stack([moved_by(self.law, each, self._frequency) for each in plants]) for plants in self.possible
         ]
+        self.refuted = [not self._keep_stable(axis) for axis in range(len(AXES))]
+
+    def _keep_stable(self, axis: int) -> bool:
+        """Drop the plants with which the loop that flew would be unstable; keep all where nearly none is left."""
+        stable = self._held(axis, self.values) > 0
+        if stable.mean() <= 1 - HOLDS:
+            return False
+        self.possible[axis] = [each for each, flies in zip(self.possible[axis], stable, strict=True) if flies]
+        self._moved[axis] = self._moved[axis][stable]
+        return True
 
     def found(self) -> tuple[list[AxisGains], list[GainRow]]:
         """Find what to change."""
@@ -207,6 +218,8 @@ class _Work:
         for axis, plant in enumerate(self.plants):
             if proposed is None or not plant.identified:
                 reasons[axis] = ("weak", plant.reason)
+            elif self.refuted[axis]:
+                reasons[axis] = ("law", "")
             elif proposed.disk[axis] < _NEAR * self.asked.disk:
                 reasons[axis] = ("margins", f"{_degrees(proposed.disk[axis]):.3g}")
             else:
@@ -271,7 +284,9 @@ class _Work:
 
     def _axis(self, axis: int, rows: Sequence[GainRow], reason: str, fact: str) -> AxisGains:
         identified = axis in self.axes
-        new = {name: row.proposed for row in rows for name in self.values if self.names.get(name, name) == row.parameter}
+        new = {
+            name: row.proposed for row in rows for name in self.values if self.names.get(name, name) == row.parameter
+        }
         return AxisGains(
             axis=AXES[axis],
             changed=any(row.axis == AXES[axis] and row.direction != "keep" for row in rows),
@@ -366,6 +381,19 @@ def _plant(numbers: Array, law: Law) -> AxisPlant:
     return AxisPlant(gain, gain * lead, 0.0, 1.0, damping, lag, delay - 1.5 * law.period)
 
 
+def _of_rates(autopilot: Autopilot, axes: Sequence[str]) -> Autopilot:
+    """Open the loop of the angle about axes that fly rates."""
+    groups = [
+        *axes,
+        *(["tilt"] if {"roll", "pitch"} <= set(axes) else []),
+        *(["all"] if len(axes) == len(AXES) else []),
+    ]
+    dropped = {f"{group}.{role}" for group in groups for role in ("angle", "angle_i", "angle_d")}
+    closed = {f"{axis}.angle": _NO_ANGLE for axis in axes}
+    kept = tuple(each for each in autopilot.parameters if each.role not in dropped)
+    return replace(autopilot, parameters=kept, fixed={**autopilot.fixed, **closed})
+
+
 def _opened(parameter: Parameter) -> Parameter:
     return replace(parameter, low=0.0, high=np.inf, step=_FINE * max(parameter.default, parameter.step))
 
@@ -378,16 +406,27 @@ def _value(found: Tuned, parameter: Parameter) -> float:
     return next(each.value for each in found.proposals if each.parameter.name == parameter.name)
 
 
-def _noise(flight: LogFlight, law: Law) -> Noise | None:
-    """Estimate the noise of the gyroscope, flat above what the log shows, so that no derivative hides there."""
-    samples = flight.gyroscope
+def _noise(flight: LogFlight, autopilot: Autopilot, law: Law) -> Noise | None:
+    """Estimate the noise of the gyroscope before filters, flat above what the log shows: no derivative hides there."""
+    raw = flight.gyroscope_unfiltered
+    samples = flight.gyroscope if raw is None else raw
     flown = np.interp(samples.time, flight.time, flight.usable.astype(float)) > 1 - _FINE
     noise = noise_of([(samples.time[flown], samples.values[flown])])
     if noise is None or noise.highest_hz < _LOWEST_NOISE_HZ:
         return None
-    spacing = float(noise.frequency[1] - noise.frequency[0])
-    more = np.arange(noise.highest_hz + spacing, 0.5 * law.rate_hz, spacing)
+    if raw is None and samples.source.startswith(autopilot.filtered):
+        noise = noise.before_filters(law)
     level = np.median(noise.density[noise.frequency > 0.5 * noise.highest_hz], axis=0)
-    return Noise(
-        np.concatenate([noise.frequency, more]), np.concatenate([noise.density, np.tile(level, (len(more), 1))])
-    )
+    step = _NOISE_STEP_HZ
+    frequency = np.arange(step, 0.5 * law.rate_hz, step)
+    mean = np.stack([_binned(noise.frequency, each, frequency, step) for each in noise.density.T], axis=1)
+    return Noise(frequency, np.where(np.isfinite(mean), mean, level))
+
+
+def _binned(frequency: Array, values: Array, middle: Array, width: float) -> Array:
+    """Average values around frequencies; NaN where there is none."""
+    place = np.round(frequency / width).astype(int) - 1
+    inside = (place >= 0) & (place < len(middle))
+    counts = np.bincount(place[inside], minlength=len(middle))
+    total = np.bincount(place[inside], values[inside], minlength=len(middle))
+    return np.asarray(np.where(counts > 0, total / np.maximum(counts, 1), np.nan))
