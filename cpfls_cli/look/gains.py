@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -27,6 +27,7 @@ HOLDS = 0.95
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
+_RAISED = "D in fast moves"
 _FINE, _NEAR, _MOST_DB = 1e-6, 0.98, 99.0
 _ANY, _ANY_SHARE = np.array([100.0, 0.02, 0.02, 1.0, 0.0]), 0.5
 """Numbers of plants, and of a hover, that nothing is computed of."""
@@ -58,6 +59,10 @@ class Plant(Protocol):
         """Gain, rad/s^2 per full command; delay, lag, s; damping, 1/s; lead, s; shape (5,)."""
 
     @property
+    def band_hz(self) -> Array:
+        """Lowest and highest frequency at which it is identified, shape (2,)."""
+
+    @property
     def draws(self) -> Array:
         """The same of plants that are possible, shape (draw, 5)."""
 
@@ -85,7 +90,7 @@ class GainRow:
     unit: str = about("empty for a ratio")
     today: float = about("in the log")
     proposed: float = about("holds the asked margins with 95 % of the plants; today's where no change is sure")
-    low: float = about("least of the best values over the plants")
+    low: float = about("least of the best values over the plants; not finite where it goes with another", gaps=True)
     high: float = about("largest of the best values; not finite where noise or a range sets the value", gaps=True)
     direction: str = about("raise, lower or keep")
     why: str = about("margins, noise, range, or with: it goes with another parameter of its axis; empty where kept")
@@ -98,7 +103,8 @@ class AxisGains:
     axis: str = about("roll, pitch or yaw")
     changed: bool = about("whether a change is sure")
     reason: str = about(
-        "why nothing is proposed: weak, law (with the plant it would not fly), margins; empty where something is or gains are kept"
+        "why nothing is proposed: weak, law (with the plant it would not fly), margins (no gains keep them), band (the "
+        "loop would cross above what is identified); empty where gains are proposed or kept"
     )
     fact: str = about("more about the reason")
     attitude: bool = about("whether the loop of the attitude is closed around that of the rate")
@@ -110,6 +116,7 @@ class AxisGains:
 class TunedGains:
     """Gains for the autopilot that wrote a log."""
 
+    FORMAT: ClassVar[str] = "cpfls/look-gains"
     SHOWN = ("changes",)
 
     autopilot: str = about("px4, ardupilot, betaflight, crazyflie; empty where its law is not known")
@@ -222,6 +229,8 @@ class _Work:
                 reasons[axis] = ("law", "")
             elif proposed.disk[axis] < _NEAR * self.asked.disk:
                 reasons[axis] = ("margins", f"{_degrees(proposed.disk[axis]):.3g}")
+            elif (crosses := self._margins(axis, _with(self.values, proposed)).crossover_hz.value) > plant.band_hz[1]:
+                reasons[axis] = ("band", f"{crosses:.3g}")
             else:
                 rows += self._rows(axis, proposed, single)
         return [self._axis(axis, rows, *reasons.get(axis, ("", ""))) for axis in range(len(AXES))], rows
@@ -330,7 +339,22 @@ class _Work:
                 )
             )
             values.append(value)
-        return self._together(axis, rows, values)
+        rows = self._together(axis, rows, values)
+        return [*rows, *self._raised(axis, rows)]
+
+    def _raised(self, axis: int, rows: Sequence[GainRow]) -> Iterator[GainRow]:
+        """Move the derivative of fast moves in proportion to that of calm flight."""
+        parameter = parameter_of(self.autopilot, axis, "d_raised")
+        calm = next((row for row in rows if row.term == _TERMS["d"]), None)
+        if parameter is None or calm is None or calm.direction == "keep" or not self.values[parameter.name] > 0:
+            return
+        name, today = self.names.get(parameter.name, parameter.name), self.values[parameter.name]
+        if name:
+            value = floored(parameter, today * calm.proposed / calm.today if calm.today else calm.proposed).value
+            yield replace(
+                calm, parameter=name, term=_RAISED, today=today, proposed=value, low=np.nan, high=np.nan, why="with",
+                direction=_direction(value - today),
+            )  # fmt: skip
 
     def _angled(self, axis: int, parameter: Parameter) -> bool:
         """Tell whether the gain of the angle is to be tuned with an axis: one of both tilts with the last of them."""
