@@ -79,6 +79,8 @@ class Firmware:
         First version whose gains count as these do.
     older : str
         What is otherwise in logs of before.
+    oldest_gains : tuple of int, or None
+        First version whose gains of the rate count as these do, whatever its filters; None: `oldest`.
     renamed : tuple of (tuple of int, mapping of str to str)
         A version, and from names here to those of the versions before it.
     """
@@ -87,6 +89,7 @@ class Firmware:
     systems: tuple[str, ...]
     oldest: tuple[int, int] = (0, 0)
     older: str = ""
+    oldest_gains: tuple[int, int] | None = None
     renamed: tuple[tuple[tuple[int, int], Mapping[str, str]], ...] = ()
 
     def wrote(self, system: str) -> bool:
@@ -97,6 +100,11 @@ class Firmware:
         """Tell whether gains of a log count otherwise."""
         version = version_of(system)
         return version is not None and version < self.oldest
+
+    def gains_differ(self, system: str) -> bool:
+        """Tell whether gains of the rate of a log count otherwise."""
+        version, oldest = version_of(system), self.oldest_gains or self.oldest
+        return version is not None and version < oldest
 
     def of(self, system: str) -> str:
         """Name the version that a file is for: that of a log where it tells one."""
@@ -132,8 +140,8 @@ class Autopilot:
     fixed : mapping of str to float
         Quantities of the law that are no parameters, by role.
     logged_as : mapping of str to tuple of str
-        Parameters that a line of a log's header holds, separated by commas; an empty name is left out. Of two lines
-        that hold one the later counts, unless it is 0.
+        Parameters that a line of a log's header holds, separated by commas; an empty name is left out, and of two
+        names both have the value. Of two lines that hold one the later counts, unless it is 0.
     filtered : tuple of str
         First letters of the columns in which its logs hold the gyroscope behind the filters of the law.
     slope_of_error, integrates_first, holds_integral, series : bool
@@ -191,10 +199,9 @@ class Autopilot:
         """Take the parameters of the law out of what a log knows; empty where it holds no gain of a rate."""
         found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
         for line in (each for each in self.logged_as if each in logged):
-            for name, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
+            for names, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
                 # What is 0 there is off where an earlier line says it too.
-                if name and (_number(value) or name not in found):
-                    found[name] = value
+                found |= {name: value for name in names.split() if _number(value) or name not in found}
         gains = {each.name for each in self.parameters if each.role.endswith(".p")}
         return {name: _number(value) for name, value in found.items()} if gains & set(found) else {}
 

@@ -23,7 +23,11 @@ _ANGLE_BELOW = 3.0
 _ANGLE_INTEGRAL_BELOW = 10.0
 """The integral of the angle takes over so much below what the angle follows at least: else each step is passed."""
 _LEADS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Derivative over proportional gain that is tried, in lags and delays of the loop."""
+USUAL_LEADS = {0: _LEADS, 1: _LEADS, 2: _LEADS[:1]}
+"""Derivative over proportional gain that is tried about each axis, in lags and delays of the loop.
+
+Yaw by reaction torque is slow and noisy; its derivative stays 0, as all autopilots have it.
+"""
 _WORTH = 1.03
 """A longer lead has to be worth this: it brings noise."""
 _OVERSHOOT = 1.1
@@ -108,6 +112,7 @@ def tuned(
     asked: AskedMargins,
     noise: Noise | None = None,
     before: Mapping[str, float] | None = None,
+    leads: Mapping[int, tuple[float, ...]] | None = None,
 ) -> Tuned:
     """Find the gains of all axes.
 
@@ -124,25 +129,28 @@ def tuned(
         None for white noise.
     before : mapping of str to float or None
         All parameters as they fly today, whose jitter counts; None: `values`.
+    leads : mapping of int to tuple of float, or None
+        Axes that are tuned, each with the derivatives over proportional gain that are tried, in lags and delays of the
+        loop; None: all axes with the usual ones.
     """
     today = autopilot.law(values if before is None else before)
     whole = dict(values) | {each.name: 1.0 for each in autopilot.parameters if each.role.endswith(".k")}
     law = autopilot.law(whole)
     wanted: dict[str, list[float]] = {}
-    least, quieter = [], []
-    for axis in range(len(AXES)):
-        search = _Search(law, axis, hover.corners(axis), asked.disk, noise, _LOUDER * _jitter(today, axis, noise))
-        found, held = search.found(autopilot)
-        least.append(held)
-        quieter.append(_jitter(_with(law, axis, found), axis, noise) > _NEAR * search.loudest)
+    least, quieter = [asked.disk] * len(AXES), [False] * len(AXES)
+    for axis, tried in (USUAL_LEADS if leads is None else leads).items():
+        loudest = _LOUDER * _jitter(today, axis, noise)
+        search = _Search(law, axis, hover.corners(axis), asked.disk, noise, loudest, tried)
+        found, least[axis] = search.found(autopilot)
+        quieter[axis] = _jitter(_with(law, axis, found), axis, noise) > _NEAR * search.loudest
         roles = {"p": found.p, "i": found.i, "d": found.d, "k": 1.0, "d_raised": found.d}
         roles |= {"angle": found.angle, "angle_i": found.angle_integral}
         for role, value in roles.items():
-            parameter = _parameter(autopilot, axis, role)
+            parameter = parameter_of(autopilot, axis, role)
             if parameter is not None:
                 wanted.setdefault(parameter.name, []).append(value / parameter.scale)
     # A parameter of several axes suits the one that bears the least.
-    proposals = [_proposal(autopilot.named(name), min(each)) for name, each in wanted.items()]
+    proposals = [floored(autopilot.named(name), min(each)) for name, each in wanted.items()]
     return Tuned(proposals, (least[0], least[1], least[2]), (quieter[0], quieter[1], quieter[2]))
 
 
@@ -178,7 +186,7 @@ def with_filters(
 
 def _yaw_angle(autopilot: Autopilot, given: Tuned | Mapping[str, float]) -> float:
     """Give how much rate an error of the yaw angle asks for, in the parameter's unit."""
-    angle = _parameter(autopilot, 2, "angle")
+    angle = parameter_of(autopilot, 2, "angle")
     if angle is None:
         return 0.0
     values = {each.parameter.name: each.value for each in given.proposals} if isinstance(given, Tuned) else given
@@ -197,17 +205,18 @@ def _jitter(law: Law, axis: int, noise: Noise | None) -> float:
     return float(np.sqrt(np.mean(np.abs(law.response(axis, frequency).feedback) ** 2)))
 
 
-def _parameter(autopilot: Autopilot, axis: int, role: str) -> Parameter | None:
+def parameter_of(autopilot: Autopilot, axis: int, role: str) -> Parameter | None:
     """Find the parameter of an axis, or the one that several share."""
     groups = (AXES[axis], "tilt", "all") if axis < 2 else (AXES[axis], "all")
     return next((found for group in groups if (found := autopilot.by_role(f"{group}.{role}")) is not None), None)
 
 
 def _kept(parameter: Parameter | None, value: float) -> float:
-    return value if parameter is None else parameter.scale * _proposal(parameter, value / parameter.scale).value
+    return value if parameter is None else parameter.scale * floored(parameter, value / parameter.scale).value
 
 
-def _proposal(parameter: Parameter, wanted: float) -> Proposal:
+def floored(parameter: Parameter, wanted: float) -> Proposal:
+    """Propose the next value below one that is wanted, inside the documented range."""
     steps = floor(wanted / parameter.step + 1e-9)
     value = min(max(steps * parameter.step, parameter.low), parameter.high)
     return Proposal(parameter, float(f"{value:.9g}"), wanted)
@@ -230,6 +239,11 @@ def _follows(p: float, d: float, plant: AxisPlant) -> float:
     return p * _torque(plant) / (1 + d * _torque(plant))
 
 
+def lateness(law: Law, plant: AxisPlant) -> float:
+    """Give lags and delays between command and rate, s."""
+    return plant.lag + plant.delay + 1.5 * law.period
+
+
 def _torque(plant: AxisPlant) -> float:
     """Give the angular acceleration of a full command in the end, rad/s^2."""
     return plant.gain + plant.slow
@@ -245,6 +259,7 @@ class _Search:
         With filters, limits and gains as they are, and as factor on all of them 1.
     loudest : float
         Most jitter of the command.
+    leads : tuple of float
     """
 
     law: Law
@@ -253,16 +268,17 @@ class _Search:
     disk: float
     noise: Noise | None
     loudest: float
+    leads: tuple[float, ...]
 
     def found(self, autopilot: Autopilot) -> tuple[AxisLaw, float]:
         """Find the gains, and the disk margin that they hold inside the documented ranges, as far as it is asked."""
-        angle = _parameter(autopilot, self.axis, "angle")
+        angle = parameter_of(autopilot, self.axis, "angle")
         # What no parameter sets stays as the law has it.
         rate = self._inside(autopilot, self._rate(None if angle is not None else self._own.angle))
         if angle is None:
             return rate, self._held(rate)
         wanted = self._angled(rate, self._angle(rate))
-        proposal = _proposal(angle, wanted.angle / angle.scale)
+        proposal = floored(angle, wanted.angle / angle.scale)
         if proposal.value <= proposal.wanted:
             return wanted, self._held(wanted)
         # The range asks for more than the rate bears: then the rate has to suit it.
@@ -278,19 +294,17 @@ class _Search:
         """Bring gains of the rate inside the documented ranges, through which the angle is controlled."""
         kept = {"p": rate.p, "i": rate.i, "d": rate.d}
         for role, value in kept.items():
-            parameter = _parameter(autopilot, self.axis, role)
+            parameter = parameter_of(autopilot, self.axis, role)
             if parameter is not None:
-                kept[role] = parameter.scale * _proposal(parameter, value / parameter.scale).value
+                kept[role] = parameter.scale * floored(parameter, value / parameter.scale).value
         return replace(rate, p=kept["p"], i=kept["i"], d=kept["d"])
 
     def _rate(self, angle: float | None) -> AxisLaw:
         """Find the gains of the rate with a given gain of the angle, or with one that suits them."""
         found = self.plants[0]
-        late = found.lag + found.delay + 1.5 * self.law.period
-        # Yaw by reaction torque is slow and noisy; its derivative stays 0, as all autopilots have it.
-        leads = _LEADS if self.axis < 2 else _LEADS[:1]
+        late = lateness(self.law, found)
         best: AxisLaw | None = None
-        for lead in leads:
+        for lead in self.leads:
 
             def own(gain: float, lead: float = lead) -> AxisLaw:
                 slope = gain * lead * late

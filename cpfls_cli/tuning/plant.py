@@ -97,15 +97,20 @@ class HoverPlant:
         Of the full thrust that hovers, in the units of the law.
     signal : float
         Of the motors, from 0 to 1, mean over them.
+    drawn : tuple of tuple of AxisPlant
+        Plants of each axis that are possible, in place of the ends of intervals; empty: those ends.
     """
 
     axes: tuple[AxisPlant, AxisPlant, AxisPlant]
     share: float
     signal: float
     spreads: tuple[Spread, Spread, Spread] = field(default=(Spread(), Spread(), Spread()))
+    drawn: tuple[tuple[AxisPlant, ...], ...] = ()
 
     def corners(self, axis: int) -> list[AxisPlant]:
         """Give the plants of an axis that flights leave possible, the one that was found first."""
+        if self.drawn:
+            return [self.axes[axis], *self.drawn[axis]]
         return list(self.spreads[axis].corners(self.axes[axis]))
 
 

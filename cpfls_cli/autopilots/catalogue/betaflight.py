@@ -42,12 +42,16 @@ BETAFLIGHT = Autopilot(
         ("Betaflight",),
         oldest=(4, 3),
         older="Betaflight before 4.3 has other names of filters and another thrust_linear",
+        # The scales of P, I and D and of their sum are the same since.
+        oldest_gains=(3, 1),
         renamed=(
             # D of the PID is that of fast moves there.
             (
                 (2025, 12),
                 {f"{new}_{axis}": f"{old}_{axis}" for axis in AXES for new, old in (("d", "d_min"), ("d_max", "d"))},
             ),
+            # D has one value, and no other in fast moves.
+            ((4, 0), {f"d_{axis}": f"d_{axis}" for axis in AXES} | {f"d_max_{axis}": "" for axis in AXES}),
             ((4, 5), {"angle_p_gain": "angle_level_strength"}),
         ),
     ),
@@ -90,6 +94,7 @@ BETAFLIGHT = Autopilot(
             "low-pass of the gyroscope",
             "Hz",
             step=1.0,
+            absent=0.0,
         ),
         Parameter(
             "gyro_lpf2_static_hz",
@@ -100,11 +105,20 @@ BETAFLIGHT = Autopilot(
             "second low-pass of the gyroscope",
             "Hz",
             step=1.0,
+            absent=0.0,
         ),
         Parameter("gyro_notch1_hz", "all.measured.notch", 0.0, 0.0, 1000.0, "notch of the gyroscope", "Hz", step=1.0),
         Parameter("gyro_notch1_cutoff", "all.measured.notch_lower", 0.0, 0.0, 1000.0, "its lower end", "Hz", step=1.0),
         Parameter(
-            "dterm_lpf1_dyn_min_hz", "all.slope.first", 75.0, 0.0, 1000.0, "low-pass of the derivative", "Hz", step=1.0
+            "dterm_lpf1_dyn_min_hz",
+            "all.slope.first",
+            75.0,
+            0.0,
+            1000.0,
+            "low-pass of the derivative",
+            "Hz",
+            step=1.0,
+            absent=0.0,
         ),
         Parameter(
             "dterm_lpf2_static_hz",
@@ -115,6 +129,7 @@ BETAFLIGHT = Autopilot(
             "second low-pass of the derivative",
             "Hz",
             step=1.0,
+            absent=0.0,
         ),
         Parameter(
             "pid_process_denom",
@@ -141,9 +156,7 @@ BETAFLIGHT = Autopilot(
     # A pilot holds the heading; here its error asks for a rate.
     fixed={"motors.low": 0.055, "yaw.angle": 1.0},
     logged_as={
-        "rollPID": ("p_roll", "i_roll", "d_roll"),
-        "pitchPID": ("p_pitch", "i_pitch", "d_pitch"),
-        "yawPID": ("p_yaw", "i_yaw", "d_yaw"),
+        **{f"{axis}PID": (f"p_{axis}", f"i_{axis}", f"d_{axis} d_max_{axis}") for axis in AXES},
         # Until 4.5 the gains above are those of fast moves.
         "d_min": ("d_roll", "d_pitch", "d_yaw"),
         "d_max": ("d_max_roll", "d_max_pitch", "d_max_yaw"),
@@ -153,6 +166,14 @@ BETAFLIGHT = Autopilot(
         "gyro_lpf1_dyn_hz": ("gyro_lpf1_dyn_min_hz",),
         "dterm_lpf1_static_hz": ("dterm_lpf1_dyn_min_hz",),
         "dterm_lpf1_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
+        # Until 4.2, and the first until 3.4.
+        "dterm_lpf_hz": ("dterm_lpf1_dyn_min_hz",),
+        "gyro_lowpass_hz": ("gyro_lpf1_dyn_min_hz",),
+        "gyro_lowpass_dyn_hz": ("gyro_lpf1_dyn_min_hz",),
+        "gyro_lowpass2_hz": ("gyro_lpf2_static_hz",),
+        "dterm_lowpass_hz": ("dterm_lpf1_dyn_min_hz",),
+        "dterm_lowpass_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
+        "dterm_lowpass2_hz": ("dterm_lpf2_static_hz",),
         "gyro_notch_hz": ("gyro_notch1_hz",),
         "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
     },

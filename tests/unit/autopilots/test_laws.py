@@ -114,7 +114,11 @@ def test_a_header_of_betaflight_tells_what_is_off():
     assert (found["d_roll"], found["d_pitch"], found["d_yaw"]) == (30, 46, 0)
     assert (found["gyro_lpf1_dyn_min_hz"], found["dterm_lpf1_dyn_min_hz"]) == (0, 90)
     assert found["angle_p_gain"] == 55
-    assert AUTOPILOTS["betaflight"].in_log({"rollPID": "45,80,40"}) == {"p_roll": 45, "i_roll": 80, "d_roll": 40}
+    assert (found["d_max_roll"], found["d_max_pitch"]) == (40, 46)
+    assert AUTOPILOTS["betaflight"].in_log({"rollPID": "45,80,40"}) == {
+        **{"p_roll": 45, "i_roll": 80, "d_roll": 40},
+        "d_max_roll": 40,
+    }
     assert AUTOPILOTS["px4"].in_log(named) == {}
 
 
