@@ -44,12 +44,12 @@ class Cause:
     """What may make the shares uneven."""
 
     kind: str = about("rotor, centre of mass, yaw torque, or wind")
-    rotor: int = about("number of the rotor where it is one; else 0")
+    rotor: int = about("number of the rotor where it is one; else 0", default=0)
     alone: bool = about("whether it explains all of the pattern")
     size: Estimate = part()
     forward: Estimate | None = part(default=None)
     right: Estimate | None = part(default=None)
-    unit: str = about("of the size: share of thrust, share of the arm, mm")
+    unit: str = about("of the size: share of thrust, share of the arm, mm", default="share of thrust")
 
 
 @result
@@ -169,9 +169,10 @@ def _spread(heading: Array) -> float:
 
 def _columns(flight: LogFlight) -> Array:
     """Give forward place, right place and spin of each rotor, shape (rotor, 3); no spin where it is not known."""
-    places = np.empty((0, 2)) if flight.places is None else flight.places
-    spins = np.zeros(len(places)) if flight.spins is None else flight.spins
-    return np.column_stack([places, spins])
+    if flight.places is None:
+        return np.empty((0, 3))
+    spins = np.zeros(len(flight.places)) if flight.spins is None else flight.spins
+    return np.column_stack([flight.places, spins])
 
 
 def _expected(flight: LogFlight, rotors: int) -> Array:
@@ -258,6 +259,9 @@ class _Trims:
         signs = np.array([0, -1, 0]), np.array([1, 0, 0]), np.array([0, 0, 1])
         self.known = self.apart.moved(np.array(signs) @ np.linalg.pinv(centred))
         self.lean = np.stack([columns[:, 0], columns[:, 1]]) / rotors
+        # Of the arm, that makes half as much as sound rotors differ by.
+        self.small = 0.5 * SOUND * float(np.sqrt(np.mean(columns[:, :2] ** 2)))
+        self.uneven = bool(np.any(np.abs(self.apart.value) - self.apart.half > SOUND))
 
     def leans(self, shares: Array, heading: Array) -> Known | None:
         """Part where the thrust acts, forward and right, into what turns with the body and what does not."""
@@ -274,24 +278,24 @@ class _Trims:
         return jackknifed(parted, len(shares))
 
     def causes(self, lean: Known | None, arm_m: float | None) -> tuple[Cause, ...]:
-        """List what may cause the pattern; what it excludes is left out."""
+        """List what may cause a pattern that is larger than sound rotors make; what the flight excludes is left out."""
+        if not self.uneven:
+            return ()
         lever = self.apart.moved(self.lean) if lean is None else lean
-        of_mass = bool(np.any(np.abs(lever.value[:2]) > lever.half[:2]))
+        unit, scale = ("share of the arm", 1.0) if arm_m is None else ("mm", 1e3 * arm_m)
         flat, straight = self._explained(self.columns[:, :2]), self._explained(self.columns[:, 2:])
-        found = self._single_rotors()
-        if of_mass:
-            unit, scale = ("share of the arm", 1.0) if arm_m is None else ("mm", 1e3 * arm_m)
-            forward, right = (self._as_thrust(lever.estimate(axis), scale) for axis in (0, 1))
-            size = self._as_thrust(_length(lever, 0), scale)
+        found, yaw = self._single_rotors(), self.known.estimate(2)
+        of_mass, of_wind = _length(lever, 0), _length(lever, 0) if lean is None else _length(lean, 2)
+        if of_mass.low > 0 and of_mass.value > self.small:
+            ends = (self._as_thrust(lever.estimate(axis), scale) for axis in (0, 1))
+            size = self._as_thrust(of_mass, scale)
             found.append(
-                Cause(kind="centre of mass", rotor=0, alone=flat, size=size, forward=forward, right=right, unit=unit)
+                Cause(kind="centre of mass", alone=flat, size=size, unit=unit, forward=next(ends), right=next(ends))
             )
-        if not self.known.estimate(2).low <= 0 <= self.known.estimate(2).high:
-            size = self.known.estimate(2)
-            found.append(Cause(kind="yaw torque", rotor=0, alone=straight, size=size, unit="share of thrust"))
-        wind = self._as_thrust(_length(lever, 0) if lean is None else _length(lean, 2), 1.0)
-        if wind.low > 0 and (lean is not None or of_mass):
-            found.append(Cause(kind="wind", rotor=0, alone=flat, size=wind, unit="share of the arm"))
+        if yaw.low * yaw.high > 0 and abs(yaw.value) > 0.5 * SOUND:
+            found.append(Cause(kind="yaw torque", alone=straight, size=yaw))
+        if of_wind.low > 0 and of_wind.value > self.small:
+            found.append(Cause(kind="wind", alone=flat, size=self._as_thrust(of_wind, 1.0), unit="share of the arm"))
         return tuple(found)
 
     def _single_rotors(self) -> list[Cause]:
@@ -305,8 +309,8 @@ class _Trims:
             if not self._explained(pattern[:, None]):
                 continue
             size = self.apart.moved(pattern[None] / (pattern @ pattern)).estimate()
-            if not size.low <= 0 <= size.high:
-                found.append(Cause(kind="rotor", rotor=k + 1, alone=True, size=size, unit="share of thrust"))
+            if size.low * size.high > 0 and abs(size.value) > SOUND:
+                found.append(Cause(kind="rotor", rotor=k + 1, alone=True, size=size))
         return found
 
     def _explained(self, patterns: Array) -> bool:

@@ -25,10 +25,13 @@ _HOVERS, _CLIMBS, _TILTS = 0.05, 0.3, np.radians(10.0)
 """Most difference of the vertical specific force from gravity, share; climb rate, m/s; and tilt, rad."""
 _STANDS = 0.5
 """Share of the median thrust below which a vehicle that shows gravity stands on the ground."""
-_CURVE_S, _LEAST_FORCE, _SHARPEST = 0.5, 0.2, 0.5
-"""Windows of the thrust curve; least specific force along the thrust, in g: below, drag and inflow count as much as the
-rotors; half-width of the exponent of thrust above which the shape is not known."""
-_BATTERY_S, _BASELINE_S, _FULL = 1.0, 20.0, 0.9
+_CURVE_S, _SPREAD, _LEAST_FORCE, _SHARPEST = 0.5, 1.25, 0.2, 0.5
+"""Windows of the thrust curve; least ratio of the 95th to the 5th percentile of the collective; least specific force
+along the thrust, in g: below, drag and inflow count as much as the rotors; half-width of the exponent of thrust above
+which the shape is not known."""
+_BATTERY_S, _PER_DEGREE_S, _FULL, _VARIES = 1.0, 30.0, 0.9, 0.15
+"""Windows of the battery; time of the flight for a degree of the polynomial; collective that is full; least variation
+of the load, share of it: by less, a current rises because voltage falls, at equal power."""
 
 
 @result
@@ -52,7 +55,7 @@ class ThrustShape:
     """How thrust grows with the collective command: with which power of it."""
 
     exponent: Estimate = part()
-    expo: Estimate = part()
+    stated: float = about("exponent that the autopilot's curve has in the middle of the range", gaps=True)
     lowest: float = about("collective, 5th percentile")
     highest: float = about("collective, 95th percentile")
     collective: Array = about("of each window", "point", brief=False)
@@ -90,7 +93,7 @@ class Hover:
     voltage_drift: float = about("change of the voltage over the same time", unit="V", gaps=True)
     shape: ThrustShape | None = part(default=None)
     battery: Battery | None = part(default=None)
-    stated: tuple[Stated, ...] = part()
+    stated: Stated | None = part(default=None)
 
 
 def hover_of(flight: LogFlight) -> Hover | None:
@@ -118,7 +121,7 @@ def hover_of(flight: LogFlight) -> Hover | None:
         voltage_drift=float(_slope(time, voltage)[0] * np.ptp(time)) if drift else np.nan,
         shape=shape,
         battery=_battery(flight, throttle),
-        stated=tuple(_compared(flight, stated, of_thrust, shape)),
+        stated=_compared(flight, of_thrust),
     )
 
 
@@ -158,7 +161,7 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     low, high = (0.0, 1.0) if stated.thrust else (stated.curve.low, stated.curve.high)
     share = (collective - low) / (high - low)
     used = (share > 0.02) & (share < 0.99) & (up > _LEAST_FORCE * GRAVITY)
-    if used.sum() < 2 or np.ptp(share[used]) <= 0:
+    if used.sum() < 2 or np.divide(*np.percentile(share[used], [95, 5])) < _SPREAD:
         return None
     share, up, collective = share[used], up[used], collective[used]
     by, of = np.log(share), np.log(up)
@@ -174,13 +177,11 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     exponent = Estimate(value=float(np.sqrt(lower.value * upper.value)), low=lower.low, high=upper.high)
     if lower.low <= 0 or exponent.half > _SHARPEST:
         return None
-    # At the middle of the range, e s^2 + (1 - e) s grows with the power (1 - e + 2 e s) / (1 - e + e s).
-    middle = float(np.exp(by.mean()))
-    power = np.clip([exponent.value, exponent.low, exponent.high], 1, 2)
-    expo = (power - 1) / (power - 1 + middle * (2 - power))
+    middle = np.exp(by.mean()) * np.array([0.99, 1.01]) * (high - low) + low
+    curve = np.log(stated.thrusts(middle))
     return ThrustShape(
         exponent=exponent,
-        expo=Estimate(value=float(expo[0]), low=float(expo[1]), high=float(expo[2])),
+        stated=float(np.diff(curve)[0] / np.log(1.01 / 0.99)) if stated.name else np.nan,
         lowest=float(np.percentile(collective, 5)),
         highest=float(np.percentile(collective, 95)),
         collective=collective,
@@ -188,17 +189,12 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     )
 
 
-def _compared(flight: LogFlight, stated: StatedCurve, thrust: Known | None, shape: ThrustShape | None) -> list[Stated]:
-    """Compare stated expo and hover with what is measured."""
-    rows = []
-    if shape and stated.name and not stated.thrust and not stated.curve.series:
-        rows.append(Stated(parameter=stated.name, value=stated.value, measured=shape.expo))
+def _compared(flight: LogFlight, thrust: Known | None) -> Stated | None:
+    """Compare the thrust that hovers with what the autopilot was given, or learned."""
     autopilot = AUTOPILOTS.get(flight.autopilot)
     hover = autopilot.by_role("motors.hover") if autopilot else None
     value = number(flight, hover.name) if hover else None
-    if hover and value is not None and thrust:
-        rows.append(Stated(parameter=hover.name, value=value, measured=thrust.estimate()))
-    return rows
+    return Stated(parameter=hover.name, value=value, measured=thrust.estimate()) if hover and value and thrust else None
 
 
 def _battery(flight: LogFlight, throttle: Array) -> Battery | None:
@@ -213,17 +209,20 @@ def _battery(flight: LogFlight, throttle: Array) -> Battery | None:
     if whole.sum() < 2 or np.ptp(voltage[whole]) <= 0:
         return None
     voltage, load, time = voltage[whole], load[whole], windows.begin[whole] + 0.5 * _BATTERY_S
-    known = jackknifed(lambda kept: _discharge(time[kept], voltage[kept], load[kept], time), len(time))
+    ends = np.array([time[0], time[-1]])
+    known = jackknifed(lambda kept: _discharge(time[kept], voltage[kept], load[kept], ends), len(time))
+    lightest, heaviest = (float(end) for end in np.percentile(load, [5, 95]))
+    varies = heaviest - lightest > _VARIES * abs(heaviest)
     # A battery gives way under load; a slope that may be none is no finding.
-    found = known if known is not None and known.value[0] > known.half[0] else None
+    found = known if known is not None and varies and known.value[0] > known.half[0] else None
     circuit = found if measured else None
     full = load[collective[whole] > _FULL]
     hovering = load[np.abs(collective[whole] / np.mean(throttle) - 1) < _HOVERS] if len(throttle) else full[:0]
     return Battery(
         against="current" if measured else "collective",
         slope=found.estimate(0) if found else None,
-        lightest=float(np.percentile(load, 5)),
-        heaviest=float(np.percentile(load, 95)),
+        lightest=lightest,
+        heaviest=heaviest,
         open_circuit_begin=circuit.estimate(1) if circuit else None,
         open_circuit_end=circuit.estimate(2) if circuit else None,
         sag_hover=circuit.moved(hovering.mean() * np.eye(3)).estimate() if circuit and len(hovering) else None,
@@ -236,15 +235,15 @@ def _battery(flight: LogFlight, throttle: Array) -> Battery | None:
     )
 
 
-def _discharge(time: Array, voltage: Array, load: Array, whole: Array) -> Array:
-    """Fit voltage without load as straight lines over 20 s and more, minus a slope times the load.
+def _discharge(time: Array, voltage: Array, load: Array, ends: Array) -> Array:
+    """Fit voltage without load as a polynomial of time, up to a cubic, minus a slope times the load.
 
     Returns
     -------
     array, shape (3,)
         Slope, and voltage without load at both ends of the flight.
     """
-    knots = np.linspace(whole[0], whole[-1], max(int((whole[-1] - whole[0]) / _BASELINE_S), 1) + 1)
-    tents = [np.interp(time, knots, row) for row in np.eye(len(knots))]
-    fit = np.linalg.lstsq(np.stack([-load, *tents], axis=1), voltage, rcond=None)[0]
-    return np.asarray(fit[[0, 1, -1]])
+    degree = int(np.clip((ends[1] - ends[0]) / _PER_DEGREE_S, 1, 3))
+    scaled, bounds = (np.vander(2 * (at - ends[0]) / (ends[1] - ends[0]) - 1, degree + 1) for at in (time, ends))
+    fit = np.linalg.lstsq(np.column_stack([-load, scaled]), voltage, rcond=None)[0]
+    return np.array([fit[0], *(bounds @ fit[1:])])

@@ -15,7 +15,7 @@ from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.result import Estimate
 
 WINDOW_S = 2.0
-MOST_BLOCKS, PER_BLOCK = 16, 3
+MOST_BLOCKS, PER_BLOCK = 10, 4
 """Blocks of a jackknife, of at least so many windows where there are enough of them."""
 FEWEST_WINDOWS = 6
 _WHOLE = 0.7
@@ -52,7 +52,7 @@ class Windows(NamedTuple):
 def windows_of(flight: LogFlight, length_s: float = WINDOW_S) -> Windows:
     """Cut the usable stretches of a flight into windows that do not overlap."""
     begins = [
-        np.arange(flight.time[first], flight.time[after - 1] - length_s + 0.5 / flight.rate_hz, length_s)
+        np.arange(flight.time[first], flight.time[after - 1] - length_s + 1.5 / flight.rate_hz, length_s)
         for first, after in runs(flight.usable)
     ]
     return Windows(np.concatenate(begins) if begins else np.empty(0), length_s)

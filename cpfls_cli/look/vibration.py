@@ -17,17 +17,20 @@ from cpfls_cli.look.steady import Windows, number, windows_of
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
 
-_WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.5, 16, 32
+_WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
 _ABOVE_HZ, _TELLS_HZ = 10.0, 50.0
-"""Vibration is what is above the first; a log that ends below the second shows too little of it for a size."""
+"""Vibration is what is above the first; a log that ends below the second shows too little of it."""
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
-"""A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the mean of all windows and in so many standard
-errors."""
+"""A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
+mean of all windows, and so many standard errors."""
 _POWERS = np.arange(-1.0, 1.3, 0.125)
 """Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded."""
 _BLOCKS, _BINS = 12, 16
+_ORDERS, _NEAR_ORDER, _PREFERRED_DB = 4, 0.05, 1.0
+"""Multiples of a rotor's turns at which it shakes, how near a line is to one, and how much less a line along a rotor's
+turns may rise than along the collective."""
 _FIXED, _MOVES = 0.25, 0.15
-_WIDE = 0.06
+_WIDE = 0.15
 """Relative half-width that a line takes with it."""
 _CLIPPED_GYROSCOPE, _CLIPPED_ACCELEROMETER = np.radians(1990.0), (78.0, 156.0, 313.0)
 """Ends of the range of usual sensors: 2000 deg/s; 8, 16, 32 g."""
@@ -43,7 +46,7 @@ class Spectrum:
     signal: str = about("gyroscope before filters, gyroscope, accelerometer, or commands")
     source: str = about("columns of the log")
     rate_hz: float = about("as logged", unit="Hz")
-    rms: Array = about("root mean square above 10 Hz, by channel; rad/s, m/s^2 or share", "channel", gaps=True)
+    rms: Array = about("root mean square above 10 Hz, by channel; rad/s, m/s^2 or share", "channel")
     clipped: float = about("share of samples at the end of the sensor's range")
     frequency: Array = about("frequencies", "frequency", unit="Hz", brief=False)
     density: Array = about("single-sided, squared unit per Hz", "frequency", "channel", brief=False)
@@ -61,7 +64,7 @@ class Line:
     kind: str = about("rotor, moves (with collective), fixed, folded, or unknown: collective varies too little")
     power: Estimate | None = part(default=None)
     rotor: int = about("number of the rotor that it follows; 0 where speeds are not logged")
-    order: float = about("over the rotor's turns", gaps=True)
+    order: int = about("multiple of the rotor's turns; 0 where speeds are not logged")
 
 
 @result
@@ -130,10 +133,10 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     return Vibration(
         spectra=spectra,
         lines=lines,
-        lines_lack="rate" if highest < 2 * _LOWEST_LINE_HZ else "" if main else "time",
+        lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
         limit=LIMITS.get(flight.autopilot, ()),
         folds=highest < 500.0,
-        jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law and highest > _TELLS_HZ else (),
+        jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
         delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
         changes=tuple(_changes(flight, filters, lines)),
@@ -162,7 +165,9 @@ class _Power(NamedTuple):
     @classmethod
     def of(cls, flight: LogFlight, samples: Samples) -> _Power | None:
         rate = samples.rate_hz
-        windows = windows_of(flight, max(_WINDOW_S, _LEAST_SAMPLES / max(rate, 1e-9)))
+        if rate < 2 * _TELLS_HZ:
+            return None
+        windows = windows_of(flight, max(_WINDOW_S, _LEAST_SAMPLES / rate))
         windows = windows.keep(np.asarray(np.isfinite(windows.means(samples)).all(axis=1)))
         if len(windows.begin) < _FEWEST:
             return None
@@ -186,8 +191,7 @@ class _Power(NamedTuple):
             signal=name,
             source=self.samples.source,
             rate_hz=self.samples.rate_hz,
-            rms=np.sqrt(density[shown].sum(axis=0) * self.frequency[1])
-            * (1.0 if self.frequency[-1] > _TELLS_HZ else np.nan),
+            rms=np.sqrt(density[shown].sum(axis=0) * self.frequency[1]),
             clipped=float(clipped[0]) if clipped else 0.0,
             frequency=self.frequency,
             density=density,
@@ -233,7 +237,7 @@ def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
         for rotor in range(turns.shape[1]):
             yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
     level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
-    known = np.isfinite(level).any() and flight.rotor_speed is None
+    known = np.isfinite(level).any()
     yield _Drive(0, level if known else np.ones(len(level)), _POWERS if known else np.zeros(1))
 
 
@@ -242,15 +246,13 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     from scipy.ndimage import median_filter
 
     rate, spacing = power.samples.rate_hz, power.frequency[1]
-    if 0.5 * rate < 2 * _LOWEST_LINE_HZ:
-        return
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
     above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
     drives = [_usable(each) for each in _drives(flight, power)]
     for _ in range(_MOST_LINES):
         tables = [_Table(above, drive, rate, spacing) for drive in drives]
-        best = max(tables, key=lambda table: table.height)
+        best = max(tables, key=lambda table: table.height + (_PREFERRED_DB if table.drive.rotor else 0.0))
         if not best.sure:
             return
         yield best.line(power)
@@ -277,7 +279,8 @@ class _Table:
         self.relative = drive.level / self.middle
         self.starts = np.arange(_LOWEST_LINE_HZ, 0.5 * rate - spacing, 0.5 * spacing)
         if drive.rotor:
-            self.starts = np.arange(0.8, max(2 * rate / self.middle, 1.0), 0.5 * spacing / self.middle) * self.middle
+            steps = np.arange(-_NEAR_ORDER, _NEAR_ORDER, 0.5 * spacing / self.middle)
+            self.starts = self.middle * (np.arange(1, _ORDERS + 1)[:, None] + steps).ravel()
         window = np.arange(len(above))[:, None, None]
         found = above[window, self._bins(self.relative[:, None, None] ** drive.powers[:, None] * self.starts)]
         group = contiguous(len(above), _BLOCKS)
@@ -314,7 +317,8 @@ class _Table:
             k = int(np.clip(np.argmax(column), 1, len(column) - 2))
             left, top, right = column[k - 1 : k + 2]
             bend = left - 2 * top + right
-            return float(self.drive.powers[k] + 0.125 * (0.5 * (left - right) / bend if bend < 0 else 0.0))
+            inside = float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+            return float(self.drive.powers[k] + inside * (self.drive.powers[1] - self.drive.powers[0]))
 
         whole = ridge.sum(axis=0)
         value = highest(whole)
@@ -329,7 +333,7 @@ class _Table:
         ends = np.percentile(self.relative, [5, 50, 95]) ** exponent * start
         place = self._bins(self.relative**exponent * start)
         strength = power.density[np.arange(len(place)), place].mean(axis=0)
-        kind = "rotor" if self.drive.rotor else "fixed" if len(self.drive.powers) == 1 else "unknown"
+        kind = "rotor" if self.drive.rotor else "unknown"
         if power_of:
             kinds = {
                 "folded": power_of.high < -_MOVES,
@@ -347,7 +351,7 @@ class _Table:
             kind=kind,
             power=power_of,
             rotor=self.drive.rotor,
-            order=start / self.middle if self.drive.rotor else np.nan,
+            order=round(start / self.middle) if self.drive.rotor else 0,
         )
 
     def remove(self, above: Array) -> None:

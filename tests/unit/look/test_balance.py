@@ -1,0 +1,144 @@
+"""Shares of thrust in steady flight, their intervals and what may cause them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.look.balance import balance_of
+from cpfls_cli.look.flight import Samples
+from tests.builders.look_flights import CROSS, SPINS, hovering
+
+CURVE = {"parameters": {"MOT_THST_EXPO": 0.0001, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0}, "autopilot": "ardupilot"}
+"""Commands are thrust, as the log states."""
+EVEN = np.ones(4)
+
+
+def shares(balance):
+    return np.array([rotor.share.value for rotor in balance.rotors])
+
+
+def kinds(balance):
+    return {(cause.kind, cause.rotor) for cause in balance.causes}
+
+
+def test_a_weak_rotor_works_more_and_intervals_cover():
+    """One of 90 % of the others' thrust gets a command 1/0.9 as large."""
+    truth = np.array([1, 1, 1 / 0.9, 1])
+    truth = truth / truth.mean()
+    inside = np.zeros(4)
+    for seed in range(100):
+        balance = balance_of(hovering(EVEN, seed, weak={2: 0.9}, **CURVE))
+        assert np.abs(shares(balance) - truth).max() < 0.02
+        inside += [r.share.low <= t <= r.share.high for r, t in zip(balance.rotors, truth, strict=True)]
+    assert np.all((inside >= 88) & (inside <= 100))
+    assert inside.mean() >= 92
+
+
+def test_a_single_rotor_is_one_cause_of_several():
+    balance = balance_of(hovering(EVEN, weak={2: 0.75}, gusts=0.005, **CURVE))
+    assert balance.uneven[0] == 3
+    assert kinds(balance) == {("rotor", 3), ("centre of mass", 0), ("yaw torque", 0), ("wind", 0)}
+    alone = {cause.kind: cause.alone for cause in balance.causes}
+    assert alone == {"rotor": True, "centre of mass": False, "yaw torque": False, "wind": False}
+    (rotor,) = (cause for cause in balance.causes if cause.kind == "rotor")
+    mean = (3 + 1 / 0.75) / 4
+    assert rotor.size.low < (1 / 0.75 - 1) / mean < rotor.size.high
+
+
+def test_a_centre_of_mass_is_found_in_mm():
+    """Rotors of an X at 0.2 m that hold a mass 10 mm ahead of the middle: sum of place times thrust."""
+    ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
+    balance = balance_of(hovering(1 + ahead, gusts=0.005, **CURVE), arm_m=0.2)
+    (cause,) = (cause for cause in balance.causes if cause.kind == "centre of mass")
+    assert cause.alone
+    assert cause.unit == "mm"
+    assert cause.forward.value == pytest.approx(10, abs=0.5)
+    assert cause.right.value == pytest.approx(0, abs=0.5)
+    assert kinds(balance) == {("centre of mass", 0), ("wind", 0)}
+
+
+def test_turns_of_the_heading_part_wind_from_the_body():
+    ahead = 0.04 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
+
+    def turning(time):
+        return np.pi * (time > 30)
+
+    balance = balance_of(hovering(1 + ahead, gusts=0.005, heading=turning, wind=(0.06, 0.03), **CURVE))
+    assert balance.fixed_forward.low < 0.04 < balance.fixed_forward.high
+    assert balance.fixed_right.low < 0 < balance.fixed_right.high
+    assert balance.wind.low < np.hypot(0.06, 0.03) < balance.wind.high
+    assert balance.turned == pytest.approx(1, abs=0.01)
+    one_way = balance_of(hovering(1 + ahead, gusts=0.005, wind=(0.06, 0.03), **CURVE))
+    assert one_way.wind is None
+    assert ("wind", 0) in kinds(one_way)
+
+
+def test_wind_alone_is_no_centre_of_mass_after_a_turn():
+    balance = balance_of(hovering(EVEN, gusts=0.005, heading=lambda t: t / 8, wind=(0.1, 0.0), **CURVE))
+    assert ("centre of mass", 0) not in kinds(balance)
+
+
+def test_a_yaw_trim_is_positive_clockwise_and_roll_to_the_right():
+    """Rotors that turn counter-clockwise drive a clockwise turn; left ones roll to the right; front ones pitch up."""
+    pattern = 1 - 0.05 * CROSS[:, 1] + 0.03 * CROSS[:, 0] + 0.1 * SPINS
+    balance = balance_of(hovering(pattern, gusts=0.001, **CURVE))
+    trims = [balance.roll.value, balance.pitch.value, balance.yaw.value]
+    assert trims == pytest.approx([0.05, 0.03, 0.1], abs=0.003)
+
+
+def test_sound_rotors_need_no_cause():
+    balance = balance_of(hovering([1.01, 0.99, 1.005, 0.995], gusts=0.005, **CURVE))
+    assert balance.uneven == ()
+    assert balance.causes == ()
+
+
+def test_unknown_thrust_curves_widen_the_centre_of_mass():
+    """Between straight and square, a share of commands is one to two of thrust."""
+    ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
+    balance = balance_of(hovering(1 + ahead, gusts=0.001))
+    assert balance.measured_by == "command"
+    (cause,) = (cause for cause in balance.causes if cause.kind == "centre of mass")
+    assert cause.forward.low == pytest.approx(0.05, abs=0.003)
+    assert cause.forward.high == pytest.approx(0.1, abs=0.006)
+
+
+def test_squared_speeds_share_thrust_and_show_the_motor():
+    """Equal speeds at a command a tenth larger: the motor of rotor 1, not its load."""
+    flight = hovering(EVEN, gusts=0.001, weak={0: 1 / 1.1}, **CURVE)
+    speed = Samples(flight.time, np.full_like(flight.rotors.values, 500.0))
+    balance = balance_of(replace(flight, rotor_speed=speed))
+    assert balance.measured_by == "rotor speed"
+    assert shares(balance) == pytest.approx(1, abs=1e-9)
+    truth = np.sqrt([1 / 1.1, 1, 1, 1])
+    ratio = [rotor.speed_per_command.value for rotor in balance.rotors]
+    assert ratio == pytest.approx(truth / truth.mean(), abs=2e-3)
+
+
+def test_limits_are_counted_and_kept_out():
+    flight = hovering(EVEN, gusts=0.001, **CURVE)
+    command = flight.rotors.values.copy()
+    command[100:120, 1] = 1.0
+    command[200:210, 1] = 1.0
+    command[300:304, 3] = 0.0
+    balance = balance_of(replace(flight, rotors=flight.rotors._replace(values=command)))
+    assert balance.rotors[1].at_upper == pytest.approx(30 / len(command))
+    assert balance.rotors[1].longest_upper_s == pytest.approx(1.0)
+    assert balance.rotors[3].longest_lower_s == pytest.approx(0.2)
+    assert shares(balance) == pytest.approx(1, abs=0.003)
+
+
+def test_what_is_lacking_is_named():
+    flight = hovering(EVEN, **CURVE)
+    fast = replace(flight, body_rate=np.add(flight.body_rate, [1.0, 0, 0]))
+    assert balance_of(fast).lacks == "steady flight"
+    assert all(rotor.share is None for rotor in balance_of(fast).rotors)
+    assert balance_of(replace(flight, places=None)).lacks == "places"
+    assert balance_of(replace(flight, rotors=Samples(np.empty(0), np.empty((0, 0))))) is None
+
+
+def test_a_slope_along_the_flight_is_drift():
+    flight = hovering(EVEN, gusts=0.001, **CURVE)
+    grown = flight.rotors.values * (1 + np.outer(np.linspace(0, 0.08, len(flight.time)), [1, -1, 0, 0]))
+    balance = balance_of(replace(flight, rotors=flight.rotors._replace(values=grown)))
+    assert balance.rotors[0].drift.value == pytest.approx(0.08, rel=0.1)
