@@ -28,8 +28,8 @@ _OF_SCALE, _CLIPPED_ROWS = 0.02, 3
 """Share by which a largest reading may differ from a full scale, and rows in which it stays there, to be clipped."""
 
 _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
-"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one that
-make it one; and how long a rotor is there."""
+"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
+that make it one; and how long a rotor is there, s."""
 
 _UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.3, 0.17, 0.25, 0.15, 1.0
 """How long it is on its back; shares of the voltage, from 4.2 to 3.5 V a cell, over s; and what is lost within s at the
@@ -39,9 +39,9 @@ _NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
 """By which the autopilot's word for take-off and landing is near that of the signals; by which a clock falls back that
 starts anew; and from which on a gap in flight, and a pause outside, is worth a line, s."""
 
-_AROUND_S, _AT_END_S, _POWERS_S, _LESS = 0.75, 0.1, 5.0, 0.7
-"""Of a flight that signals leave out near the ground, at the end of a log, and around a flight, s; and the share of what
-carries the vehicle below which nothing does."""
+_AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
+"""Of a flight that signals leave out near the ground, and at the end of a log, s; and the share of what carries the
+vehicle below which nothing does."""
 
 _TRAILS_S: Final = 3.0
 """After a flight, while a rotor at its limit still matters."""
@@ -159,16 +159,18 @@ def timeline(
 def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Iterator[Event]:
     lifts, lands = _land_detector(topics)
     ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
-    last = float(flight.time[-1])
-    for first, after in runs(flight.flown):
+    last, spans = float(flight.time[-1]), runs(flight.flown)
+    for number, (first, after) in enumerate(spans):
+        before = spans[number - 1][1] if number else 0
+        follows = spans[number + 1][0] if number + 1 < len(spans) else None
         begin, end = float(flight.time[first]), float(flight.time[after - 1])
         yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
         lifted, landed = _nearest(lifts, begin), _nearest(lands, end)
-        if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _powers(flight, first, -1)):
+        if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _rests(flight, slice(before, first))):
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
             continue
-        if landed is not None or (last - end > _AROUND_S and _powers(flight, after - 1, 1)):
+        if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows))):
             yield Event(time_s=end if landed is None else landed, kind="landing", text="lands")
         elif last - end < _AT_END_S and _carries(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
@@ -184,11 +186,10 @@ def _carried_by(flight: LogFlight) -> float:
     return float(np.median(flown)) if len(flown) else np.nan
 
 
-def _powers(flight: LogFlight, row: int, way: int) -> bool:
-    """Tell whether rotors give much less before (-1) or after (1) a sample than in flight."""
-    rows = round(_POWERS_S * flight.rate_hz)
-    beside = flight.collective[max(0, row - rows) : row] if way < 0 else flight.collective[row : row + rows]
-    return bool(np.isfinite(beside).any()) and float(np.nanmin(beside)) < _LESS * _carried_by(flight)
+def _rests(flight: LogFlight, part: slice) -> bool:
+    """Tell whether rotors anywhere in a part of the log give much less than in flight."""
+    known = flight.collective[part][np.isfinite(flight.collective[part])]
+    return len(known) > 0 and float(known.min()) < _LESS * _carried_by(flight)
 
 
 def _carries(flight: LogFlight) -> bool:
@@ -282,11 +283,11 @@ def _of_ardupilot(topics: Topics) -> Iterator[Event]:
     time, numbers = _field(topics, "ERR", "Subsys")
     codes = _field(topics, "ERR", "ECode")[1]
     for at, number, code in zip(time.tolist(), numbers.tolist(), codes.tolist(), strict=True):
-        text = _COPTER_ERRORS.get(int(number))
+        error = _COPTER_ERRORS.get(int(number))
         # Of 0 an error is over.
-        if text is not None and code:
-            kind = "failsafe" if text.startswith("failsafe") else "error"
-            yield Event(time_s=at, kind=kind, text=text, severity="danger" if kind == "failsafe" else "warning")
+        if error is not None and code:
+            kind = "failsafe" if error.startswith("failsafe") else "error"
+            yield Event(time_s=at, kind=kind, text=error, severity="danger" if kind == "failsafe" else "warning")
 
 
 def _of_betaflight(topics: Topics) -> Iterator[Event]:
@@ -328,7 +329,7 @@ def _limits(flight: LogFlight) -> Iterator[Event]:
 def _at_limit(flight: LogFlight) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
-    most = float(np.nanmax(values))
+    most = min(float(np.nanmax(values)), 1.0)
     inside = np.zeros(len(time), dtype=bool)
     for first, after in runs(flight.flown):
         inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
