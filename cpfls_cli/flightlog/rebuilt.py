@@ -104,7 +104,7 @@ class Rebuilt:
         return (
             f"rotor commands are rebuilt from {self.source}: {self.rate_hz:.3g} Hz instead of {self.logged_hz:.3g};"
             f" they explain {100 * min(self.differences, 0.999):.3g} % of what was logged between the rotors, within"
-            f" {100 * self.error:.2g} % of full"
+            f" {100 * max(self.error, 1e-4):.2g} % of full"
         )
 
 
@@ -195,9 +195,9 @@ def with_rebuilt(
             f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz",
         )
         speed = None
-    warnings = tuple(each for own in (speed, command) if own for each in too_slow(own, system, parameters))
+    slow = (each for own in (speed, command) if own for each in too_slow(own, system, parameters))
     more = log.with_topic(REBUILT, rebuilt.topic)
-    found = replace(rotors, speed=speed, command=command, left_out=left_out, warnings=warnings)
+    found = replace(rotors, speed=speed, command=command, left_out=left_out, warnings=(rebuilt.sentence, *slow))
     return more, found, rebuilt
 
 
