@@ -116,6 +116,7 @@ def _cell(value: Any) -> str:
 
 
 _FILTERS: Mapping[str, Callable[..., Any]] = {
+    "capitalize_first": lambda text: text[:1].upper() + text[1:],
     "change": change,
     "code": code,
     "duration": duration,
@@ -343,7 +344,7 @@ def _sections(nodes: Sequence[Node], figures: Figures) -> Iterator[str]:
         cards = [at for at, node in enumerate(own) if node.kind == "heading" or "open" in node.marks]
         yield from _html(own[: cards[0] if cards else len(own)], figures)
         yield '<div class="cards">' if cards else ""
-        for start, stop in zip(cards, [*cards[1:], len(own)], strict=True):
+        for start, stop in zip(cards, [*cards, len(own)][1:], strict=True):
             yield f'<article class="{" ".join(("card", *own[start].marks))}"><h3>{_line(own[start].text)}</h3>'
             yield from _html([*own[start].inner, *own[start + 1 : stop]], figures)
             yield "</article>"

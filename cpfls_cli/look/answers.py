@@ -20,7 +20,10 @@ from cpfls_cli.words import joined
 
 _HOVER = "hover for 20 s in still air"
 _PUNCH = "climb twice at nearly full throttle, for 2 s each"
-_STICKS = "move one stick at a time, there and back, slowly then faster, for 20 s an axis, in a mode without position hold"
+_STICKS = (
+    "move one stick at a time, there and back, slowly then faster, for 20 s an axis, in a mode without position hold"
+)
+_MOST_STEPS = 3
 _WHOLE_SPECTRUM_HZ = 900.0
 """Rate of a gyroscope whose log shows what rotors of usual sizes vibrate with."""
 
@@ -32,8 +35,18 @@ class Answer:
     question: str = about("what is asked")
     answer: str = about("yes, roughly, or no")
     why: str = about("what the answer rests on, or what is missing")
-    log: str = about("what to set in the autopilot, so that another log answers it; empty where nothing helps", default="")
+    log: str = about(
+        "what to set in the autopilot, so that another log answers it; empty where nothing helps", default=""
+    )
     fly: str = about("what to fly, so that another log answers it; empty where nothing helps", default="")
+
+
+@result
+class NextStep:
+    """What helps most: something to log, to fly or to type."""
+
+    what: str = about("a setting, a flight or a command")
+    why: str = about("what it would answer; empty where it says so itself", default="")
 
 
 class Found:
@@ -81,7 +94,12 @@ def answers_of(found: Found) -> tuple[Answer, ...]:
 def _balance(found: Found) -> Answer:
     balance, question = found.balance, "balance of rotors"
     if balance is None or not len(found.flight.rotors.time):
-        return Answer(question=question, answer="no", why="commands of the rotors are not logged", log=found.faster("rotor commands"))
+        return Answer(
+            question=question,
+            answer="no",
+            why="commands of the rotors are not logged",
+            log=found.faster("rotor commands"),
+        )
     shares = [row.share for row in balance.rotors if row.share is not None]
     if not shares:
         return Answer(question=question, answer="no", why="no steady flight in it", fly=_HOVER)
@@ -95,7 +113,11 @@ def _balance(found: Found) -> Answer:
 def _hover(found: Found) -> Answer:
     hover, question = found.hover, "hover throttle"
     if hover is None or hover.throttle is None:
-        missing = "no hover in it" if len(found.flight.rotors.time) or np.isfinite(found.flight.collective).any() else "commands are not logged"
+        missing = (
+            "no hover in it"
+            if len(found.flight.rotors.time) or np.isfinite(found.flight.collective).any()
+            else "commands are not logged"
+        )
         return Answer(question=question, answer="no", why=missing, fly=_HOVER)
     why = f"{hover.hover_s:.0f} s of hover, seen by {hover.found_by}"
     return Answer(question=question, answer="yes" if hover.throttle.half < 0.03 else "roughly", why=why)
@@ -122,7 +144,9 @@ def _loops(found: Found) -> Answer:
             why=joined([f"{loop.axis} up to {loop.ends_hz:.0f} Hz" for loop in known]),
         )
     if not np.isfinite(found.flight.rate_setpoint).any():
-        return Answer(question=question, answer="no", why="rate setpoints are not logged", log=found.faster("rate setpoints"))
+        return Answer(
+            question=question, answer="no", why="rate setpoints are not logged", log=found.faster("rate setpoints")
+        )
     return Answer(question=question, answer="no", why="rate setpoints move too little", fly=_STICKS)
 
 
@@ -138,9 +162,19 @@ def _gains(found: Found) -> Answer:
     known = [axis.axis for axis in gains.axes if not axis.reason]
     if len(known) == len(gains.axes):
         return Answer(question=question, answer="yes", why="all axes")
-    reasons = {"weak": "effectiveness is not identified", "law": "law and effectiveness do not fit each other", "margins": "no gains keep the margins", "band": "the loop would be faster than what is identified"}
+    reasons = {
+        "weak": "effectiveness is not identified",
+        "law": "law and effectiveness do not fit each other",
+        "margins": "no gains keep the margins",
+        "band": "the loop would be faster than what is identified",
+    }
     why = joined([f"{axis.axis}: {reasons.get(axis.reason, axis.reason)}" for axis in gains.axes if axis.reason])
-    return Answer(question=question, answer="roughly" if known else "no", why=why, fly=_STICKS if any(axis.reason == "weak" for axis in gains.axes) else "")
+    return Answer(
+        question=question,
+        answer="roughly" if known else "no",
+        why=why,
+        fly=_STICKS if any(axis.reason == "weak" for axis in gains.axes) else "",
+    )
 
 
 def _spectra(found: Found) -> Answer:
@@ -151,7 +185,12 @@ def _spectra(found: Found) -> Answer:
     if rate >= _WHOLE_SPECTRUM_HZ:
         return Answer(question=question, answer="yes", why=f"up to {rate / 2:.0f} Hz")
     why = f"up to {rate / 2:.0f} Hz; what is faster is folded below or averaged away"
-    return Answer(question=question, answer="roughly" if rate > 150.0 else "no", why=why, log=found.faster("the gyroscope", _WHOLE_SPECTRUM_HZ))
+    return Answer(
+        question=question,
+        answer="roughly" if rate > 150.0 else "no",
+        why=why,
+        log=found.faster("the gyroscope", _WHOLE_SPECTRUM_HZ),
+    )
 
 
 def _curve(found: Found) -> Answer:
@@ -168,7 +207,12 @@ def _gusts(found: Found) -> Answer:
     question = "gusts"
     if found.gusts:
         return Answer(question=question, answer="roughly", why=joined([each.axis for each in found.gusts]))
-    return Answer(question=question, answer="no", why="effectiveness is not identified", fly=_STICKS if not found.identified else "")
+    return Answer(
+        question=question,
+        answer="no",
+        why="effectiveness is not identified",
+        fly=_STICKS if not found.identified else "",
+    )
 
 
 def _with_constants(found: Found) -> Iterator[Answer]:
@@ -177,3 +221,18 @@ def _with_constants(found: Found) -> Iterator[Answer]:
     then = "cpfls init LOG --mass KG --arm M, then cpfls "
     for question, command in (("inertia", "vehicle"), ("drag", "vehicle"), ("what a model misses", "gap")):
         yield Answer(question=question, answer="no", why=why, fly=then + command)
+
+
+def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
+    """Choose the two or three flights and settings that answer most of what is open."""
+    open_ = [each for each in answers if each.answer != "yes"]
+    steps: list[NextStep] = []
+    for kind in ("log", "fly"):
+        wanted: dict[str, list[str]] = {}
+        for each in open_:
+            text = getattr(each, kind)
+            if text and not text.startswith("cpfls "):
+                wanted.setdefault(text, []).append(each.question)
+        ranked = sorted(wanted.items(), key=lambda own: -len(own[1]))
+        steps += [NextStep(what=text, why=f"answers {joined(questions)}") for text, questions in ranked[:2]]
+    return tuple(steps[:_MOST_STEPS])

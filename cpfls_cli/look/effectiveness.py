@@ -123,7 +123,7 @@ class AxisPlant:
     reason: str = about("why it is not identified; empty where it is")
     instrument: str = about("signal that moves the vehicle and knows nothing of gusts; empty where there is none")
     at_hz: float = about("frequency of the effectiveness", unit="Hz", gaps=True)
-    band_hz: np.ndarray = about("lowest and highest frequency of the estimate", "end", unit="Hz", gaps=True)
+    band_hz: Array = about("lowest and highest frequency of the estimate", "end", unit="Hz", gaps=True)
     windows: int = about("windows of the estimate, overlapping by half")
     strength: float = about("F statistic of the instrument, conditional on all other numbers", gaps=True)
     coherence: float = about("of instrument and command, median over the band", gaps=True)
@@ -134,20 +134,22 @@ class AxisPlant:
     lag: Estimate | None = part(default=None)
     least_squares: Estimate | None = part(default=None)
     bound: Estimate | None = part(default=None)
-    frequency: np.ndarray = about("of the curves", "frequency", unit="Hz", brief=False)
-    gain: np.ndarray = about("angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
-    gain_error: np.ndarray = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
-    model_gain: np.ndarray = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    model_phase: np.ndarray = about("of the model", "frequency", unit="rad", gaps=True, brief=False)
-    direct_gain: np.ndarray = about("by least squares", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    direct_phase: np.ndarray = about("by least squares", "frequency", unit="rad", gaps=True, brief=False)
-    input_coherence: np.ndarray = about("of instrument and command", "frequency", gaps=True, brief=False)
-    output_coherence: np.ndarray = about("of instrument and body rate", "frequency", gaps=True, brief=False)
-    parameters: np.ndarray = about(
+    frequency: Array = about("of the curves", "frequency", unit="Hz", brief=False)
+    gain: Array = about(
+        "angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False
+    )
+    phase: Array = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
+    gain_error: Array = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
+    model_gain: Array = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    model_phase: Array = about("of the model", "frequency", unit="rad", gaps=True, brief=False)
+    direct_gain: Array = about("by least squares", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    direct_phase: Array = about("by least squares", "frequency", unit="rad", gaps=True, brief=False)
+    input_coherence: Array = about("of instrument and command", "frequency", gaps=True, brief=False)
+    output_coherence: Array = about("of instrument and body rate", "frequency", gaps=True, brief=False)
+    parameters: Array = about(
         "gain rad/s^2, delay s, lag s, damping 1/s, lead s of the model", "number", gaps=True, brief=False
     )
-    draws: np.ndarray = about("the same of plants that the log leaves possible", "draw", "number", brief=False)
+    draws: Array = about("the same of plants that the log leaves possible", "draw", "number", brief=False)
 
     @property
     def identified(self) -> bool:
@@ -217,7 +219,10 @@ def plant_spectra(
     if len(begins) < 2 or inside.sum() < 6:
         return None
     period = 1 / flight.rate_hz
-    parts = [*transforms(instrument, begins, length, period), *transforms(np.roll(command, early), begins, length, period)]
+    parts = [
+        *transforms(instrument, begins, length, period),
+        *transforms(np.roll(command, early), begins, length, period),
+    ]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
     parts += transforms(rate, begins, length, period, 2)
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
@@ -294,7 +299,9 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
     seen = equations.spectra.total[:, equations.instrument, U:]
-    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny)
+    scale = np.maximum(
+        equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny
+    )
     for delay in np.arange(1.0, 16.0, 1.5):
         values = np.concatenate([[0.0, delay], prior.mean[2:]])
         terms = equations.terms(values)

@@ -7,37 +7,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.recognition import recognise
-from cpfls_cli.look.answers import Answer, Found, answers_of
+from cpfls_cli.look.answers import Answer, Found, NextStep, answers_of, next_steps
 from cpfls_cli.look.balance import Balance, balance_of
-from cpfls_cli.look.columns import LookedLog, on_clock
+from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.effectiveness import AxisPlant, effectiveness
-from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.gains import TunedGains, tuned_gains
-from cpfls_cli.look.gusts import AxisGusts, gusts_of
+from cpfls_cli.look.gusts import AxisGusts, Driven, gusts_of
 from cpfls_cli.look.hover import Hover, hover_of
 from cpfls_cli.look.logged import Logged, what_is_logged
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.timeline import Event, timeline
 from cpfls_cli.look.vibration import Vibration, vibration_of
 from cpfls_cli.result import about, part, result
-
-_DRAWN_HZ = 1000.0
-
-
-@result
-class Traces:
-    """Signals over the whole log, for the page."""
-
-    time: Array = about("from the first stamp", "time", unit="s", brief=False)
-    body_rate: Array = about("roll, pitch, yaw; right, nose up, clockwise", "time", "axis", unit="rad/s", gaps=True, brief=False)
-    rate_setpoint: Array = about("of the same", "time", "axis", unit="rad/s", gaps=True, brief=False)
-    attitude: Array = about("roll and pitch", "time", "lean", unit="rad", gaps=True, brief=False)
-    rotors: Array = about("commands, share of full", "time", "rotor", gaps=True, brief=False)
-    height: Array = about("from where it starts", "time", unit="m", gaps=True, brief=False)
-    voltage: Array = about("of the battery", "time", unit="V", gaps=True, brief=False)
-
+from cpfls_cli.trace import Track, track
 
 @result
 class Look:
@@ -50,15 +34,16 @@ class Look:
     logged: Logged | None = part(default=None)
     events: tuple[Event, ...] = part(default=())
     answers: tuple[Answer, ...] = part(default=())
+    next_steps: tuple[NextStep, ...] = part(default=())
     balance: Balance | None = part(default=None)
     hover: Hover | None = part(default=None)
     command_source: str = about("how what acts about the axes is known", default="")
     rotors_source: str = about("logged or rebuilt; empty where commands of the rotors are neither", default="")
-    plants: tuple[AxisPlant, ...] = part(default=())
+    plants: dict[str, AxisPlant] | None = part(default=None)
     vibration: Vibration | None = part(default=None)
-    gusts: tuple[AxisGusts, ...] = part(default=())
+    gusts: dict[str, AxisGusts] | None = part(default=None)
     gains: TunedGains | None = part(default=None)
-    traces: Traces | None = part(default=None)
+    tracks: dict[str, Track] | None = part(default=None)
 
 
 def look_at(
@@ -87,39 +72,49 @@ def look_at(
     balance, hover, vibration = balance_of(flight), hover_of(flight), vibration_of(flight)
     progress("effectiveness")
     plants = effectiveness(flight)
-    gusts = gusts_of(flight, {plant.axis: plant.model for plant in plants if plant.identified})
+    gusts = gusts_of(flight, {plant.axis: _driven(plant) for plant in plants if plant.identified})
     progress("gains")
     gains = tuned_gains(flight, plants)
     found = Found(flight, balance, hover, plants, (), vibration, gusts, gains)
+    answers = answers_of(found)
     return Look(
         name=name,
-        logged=what_is_logged(flight, LookedLog(topics), recognition, flown_at, warnings),
+        logged=what_is_logged(flight, LookedLog(topics, units, system), recognition, flown_at, warnings),
         events=timeline(flight, topics, recognition, messages),
-        answers=answers_of(found),
+        answers=answers,
+        next_steps=next_steps(found, answers),
         balance=balance,
         hover=hover,
         command_source=flight.command_source,
         rotors_source=flight.rotors_source,
-        plants=plants,
+        plants={plant.axis: plant for plant in plants},
         vibration=vibration,
-        gusts=gusts,
+        gusts={each.axis: each for each in gusts},
         gains=gains,
-        traces=_traces(flight),
+        tracks=_tracks(flight),
     )
 
 
-def _traces(flight: LogFlight) -> Traces:
-    step = max(1, round(flight.rate_hz / _DRAWN_HZ))
-    each = slice(None, None, step)
-    rotors = flight.rotors.values.shape[1] if flight.rotors.values.ndim > 1 else 0
-    known = on_clock(Samples(flight.rotors.time, flight.rotors.values), flight.time, rotors) if rotors else np.empty((len(flight.time), 0))
-    small = np.float32
-    return Traces(
-        time=flight.time[each],
-        body_rate=flight.body_rate[each].astype(small),
-        rate_setpoint=flight.rate_setpoint[each].astype(small),
-        attitude=flight.attitude[each, :2].astype(small),
-        rotors=known[each].astype(small),
-        height=flight.height[each].astype(small),
-        voltage=flight.voltage[each].astype(small),
-    )
+def _driven(plant: AxisPlant) -> Driven:
+    model = plant.model
+    return Driven(float(model.gain), float(model.delay), float(model.lag), float(model.damping))
+
+
+def _tracks(flight: LogFlight) -> dict[str, Track]:
+    """Take the signals that the page draws over time, those that the log has."""
+    degrees = 180 / np.pi
+    labels = tuple(f"M{rotor + 1}" for rotor in range(flight.rotors.values.shape[-1] if flight.rotors.values.size else 0))
+    lean, volts = ("roll", "pitch"), ("voltage",)
+    given = {
+        "rate": (AXES, flight.time, degrees * flight.body_rate, False),
+        "rate_asked": (AXES, flight.time, degrees * flight.rate_setpoint, True),
+        "attitude": (lean, flight.time, degrees * flight.attitude[:, :2], False),
+        "rotors": (labels, flight.rotors.time, flight.rotors.values, False),
+        "height": (("height",), flight.time, flight.height, False),
+        "voltage": (volts, flight.time, flight.voltage, False),
+    }
+    return {
+        name: track(words, time, values, dashed=asked)
+        for name, (words, time, values, asked) in given.items()
+        if len(time) and np.isfinite(values).any()
+    }

@@ -94,7 +94,7 @@ class Change:
 class Vibration:
     """Vibration of one flight."""
 
-    spectra: tuple[Spectrum, ...] = part()
+    spectra: dict[str, Spectrum] = part()
     lines: tuple[Line, ...] = part()
     lines_lack: str = about("why no line can be seen: empty, rate, or time")
     limit: tuple[float, ...] = about("of the autopilot for the accelerometer: doubtful, bad", "level", unit="m/s^2")
@@ -122,7 +122,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         ("commands", flight.rotors if flight.rotors_source == "logged" else None),
     ]
     parts = {name: _Power.of(flight, each) for name, each in given if each is not None and each.values.size}
-    spectra = tuple(power.spectrum(name) for name, power in parts.items() if power)
+    spectra = {name: power.spectrum(name) for name, power in parts.items() if power}
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
     law = _law(flight, autopilot)

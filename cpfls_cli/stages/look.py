@@ -6,26 +6,197 @@ Without -o the answer is printed; with it, FOLDER gets a page and a result for e
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
+import numpy as np
 import typer
 
+from cpfls_cli.chart import Axis, Chart, span
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
-from cpfls_cli.result import about, result
+from cpfls_cli.look.effectiveness import AxisPlant
+from cpfls_cli.look.flight import AXES
+from cpfls_cli.look.look import Look, look_at
 from cpfls_cli.stage import Run, stage, unique_names
+from cpfls_cli.traces import traces
+
+_SEEN = 0.15
+"""Coherence below which a point of a frequency response is left out."""
+_DECIBELS = 30.0
 
 
-@result
-class Look:
-    """What a log can answer."""
+def _balance(r: Look) -> str:
+    """Draw the share of thrust of each rotor against the mean."""
+    rows = [] if r.balance is None else [row for row in r.balance.rotors if row.share is not None]
+    if not rows:
+        return ""
+    values, low, high = (
+        np.array([100 * (getattr(row.share, end) - 1) for row in rows]) for end in ("value", "low", "high")
+    )
+    x = np.array([float(row.rotor) for row in rows])
+    chart = Chart(
+        "balance",
+        "Share of each rotor against the mean, in per cent, with 95 % intervals",
+        Axis("rotor", 0.4, x.max() + 0.6, names={at: f"M{at:.0f}" for at in x}),
+        Axis("above the mean, %", *span(values, low, high, zero=True)),
+    )
+    chart.bars("", x, values, 0, low=low, high=high)
+    expected = np.array([100 * (row.expected - 1) for row in rows])
+    if np.abs(expected).max() > 0.5:
+        chart.points("equal rotors", x, expected, "g")
+    return str(chart)
 
-    FORMAT: ClassVar = "cpfls/look"
 
-    name: str = about("of the log")
-    system: str = about("what wrote the log, and its version; empty where unknown")
+def _effectiveness(r: Look) -> str:
+    """Draw angular acceleration per full command over frequency, by instruments and by least squares."""
+    shown = [plant for plant in (r.plants or {}).values() if len(plant.frequency)]
+    if not shown:
+        return ""
+    seen = [np.minimum(plant.input_coherence, plant.output_coherence) > _SEEN for plant in shown]
+    tops = [plant.model_gain if plant.identified else plant.direct_gain for plant in shown]
+    frequency = np.concatenate([plant.frequency for plant in shown])
+    chart = Chart(
+        "effectiveness",
+        "Angular acceleration per full command over frequency",
+        Axis("frequency, Hz", float(frequency.min()), float(frequency.max()), log=True),
+        Axis("rad/s² per full command", 0.0, 1.6 * max(float(np.nanmax(each)) for each in tops)),
+    )
+    for plant, clear in zip(shown, seen, strict=True):
+        _curves(chart, plant, clear)
+    return str(chart)
 
 
-@stage(Look, folder=True)
+def _curves(chart: Chart, plant: AxisPlant, clear: np.ndarray) -> None:
+    style = AXES.index(plant.axis)
+    if plant.identified:
+        spread = np.exp(1.96 * plant.gain_error)
+        gain = np.where(clear, plant.gain, np.nan)
+        chart.points("", plant.frequency, gain, style, low=gain / spread, high=gain * spread)
+        chart.line(f"{plant.axis}, by {plant.instrument}", plant.frequency, plant.model_gain, style)
+    chart.line(
+        f"{plant.axis}, least squares",
+        plant.frequency,
+        plant.direct_gain,
+        "g" if plant.identified else style,
+        kind="dashed thin",
+    )
+
+
+def _map(r: Look) -> str:
+    """Draw the power of the gyroscope over frequency and throttle."""
+    v = r.vibration
+    if v is None or not v.map_db.size or not np.isfinite(v.map_db).any():
+        return ""
+    known = np.isfinite(v.map_db)
+    high = float(np.nanpercentile(v.map_db[known], 99.5))
+    half = 0.5 * (v.map_collective[1] - v.map_collective[0])
+    chart = Chart(
+        "vibration-map",
+        "Power of the gyroscope over frequency and throttle: the darker, the stronger",
+        Axis("frequency, Hz", float(v.map_hz[0]), float(v.map_hz[-1])),
+        Axis("throttle, share of full", float(v.map_collective[0] - half), float(v.map_collective[-1] + half)),
+    )
+    chart.map(v.map_db, high - _DECIBELS, high)
+    return str(chart)
+
+
+def _spectra(r: Look) -> str:
+    """Draw the spectra of the gyroscope, before and after filters."""
+    shown = [] if r.vibration is None else [each for each in r.vibration.spectra.values() if each.signal.startswith("gyroscope")]
+    if not shown:
+        return ""
+    densities = [np.degrees(np.sqrt(each.density.mean(axis=1))) for each in shown]
+    inside = [each.frequency > 1.0 for each in shown]
+    chart = Chart(
+        "spectra",
+        "Spectrum of the gyroscope, mean of its axes",
+        Axis("frequency, Hz", 1.0, max(float(each.frequency[-1]) for each in shown), log=True),
+        Axis("deg/s per √Hz", *_decades(*(d[i] for d, i in zip(densities, inside, strict=True))), log=True),
+    )
+    names = {
+        "gyroscope before filters": "before filters",
+        "gyroscope": "after filters" if len(shown) > 1 else "as logged",
+    }
+    for index, (each, density, part) in enumerate(zip(shown, densities, inside, strict=True)):
+        chart.line(names[each.signal], each.frequency[part], density[part], "g" if index and len(shown) > 1 else 0)
+    for line in () if r.vibration is None else r.vibration.lines:
+        chart.mark(f"{line.hz:.0f}", x=line.hz)
+    return str(chart)
+
+
+def _decades(*values: np.ndarray) -> tuple[float, float]:
+    every = np.concatenate(values)
+    every = every[np.isfinite(every) & (every > 0)]
+    return (
+        (float(10 ** np.floor(np.log10(every.min()))), float(10 ** np.ceil(np.log10(every.max()))))
+        if len(every)
+        else (0.1, 1.0)
+    )
+
+
+def _thrust(r: Look) -> str:
+    """Draw specific force over the collective command."""
+    shape = None if r.hover is None else r.hover.shape
+    if shape is None or not len(shape.collective):
+        return ""
+    chart = Chart(
+        "thrust",
+        "Specific force along the rotors' axis over the collective command",
+        Axis("throttle, share of full", *span(shape.collective)),
+        Axis("specific force, m/s²", *span(shape.specific_force, zero=True)),
+        table=False,
+    )
+    chart.points("", shape.collective, shape.specific_force, 0)
+    level = np.linspace(*span(shape.collective, room=0.0), 50)
+    middle = float(np.median(shape.specific_force / shape.collective**shape.exponent.value))
+    chart.line(f"exponent {shape.exponent.value:.2f}", level, middle * level**shape.exponent.value, 1)
+    return str(chart)
+
+
+def _battery(r: Look) -> str:
+    """Draw the voltage over time."""
+    battery = None if r.hover is None else r.hover.battery
+    if battery is None or not len(battery.time):
+        return ""
+    chart = Chart(
+        "battery",
+        "Voltage of the battery over time",
+        Axis("time, s", *span(battery.time, room=0.0)),
+        Axis("V", *span(battery.voltage)),
+        table=False,
+    )
+    chart.line("", battery.time, battery.voltage, 0)
+    return str(chart)
+
+
+_PANELS = {
+    "rate, deg/s": ("rate", "rate_asked"),
+    "attitude, deg": ("attitude",),
+    "rotor command": ("rotors",),
+    "height, m": ("height",),
+    "battery, V": ("voltage",),
+}
+
+
+def _traces(r: Look) -> str:
+    """Draw signals over the whole log."""
+    tracks = r.tracks or {}
+    panels = {label: [tracks[name] for name in names if name in tracks] for label, names in _PANELS.items()}
+    return traces({label: own for label, own in panels.items() if own}, r.events)
+
+
+FIGURES = {
+    "traces": _traces,
+    "balance": _balance,
+    "effectiveness": _effectiveness,
+    "vibration-map": _map,
+    "spectra": _spectra,
+    "thrust": _thrust,
+    "battery": _battery,
+}
+
+
+@stage(Look, figures=FIGURES, folder=True)
 def look(
     run: Run,
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs: {suffixes_in_words()}.")],
@@ -38,11 +209,29 @@ def look(
         return None
     found = {}
     for done, (name, path) in enumerate(named.items()):
-        run.progress(done, len(named), path.name)
-        contents = log_contents(path)
-        found[name] = Look(name=path.name, system=contents.system)
-        for warning in contents.warnings:
-            run.caution(f"{path}: {warning}", name)
+        try:
+            found[name] = _one(run, path, done, len(named))
+        except InputError as error:
+            if len(named) == 1:
+                raise
+            found[name] = Look(name=path.name, refused=str(error))
     if run.output is None:
         run.next.append(("cpfls", "look", *logs, "-o", "look"))
     return found
+
+
+def _one(run: Run, path: Path, done: int, total: int) -> Look:
+    run.progress(done, total, f"reads {path.name}")
+    contents = log_contents(path)
+    with about(path, InputError):
+        return look_at(
+            path.name,
+            contents.topics,
+            contents.units,
+            contents.parameters,
+            contents.system,
+            messages=contents.messages,
+            flown_at=contents.flown_at,
+            warnings=contents.warnings,
+            progress=lambda what: run.progress(done, total, f"{path.name}: {what}"),
+        )
