@@ -125,7 +125,7 @@ def _lines(own: Described, value: Any) -> Sequence[Any]:
 
 
 def _write_values(group: h5py.Group, name: str, value: Any, own: Described, about: About) -> None:
-    array = np.asarray(value, _NUMPY[own.scalar])
+    array = _as(own, value)
     if array.dtype.kind == "U":
         # Text of fixed length: that of variable length lies in a heap whose bytes are not reproducible.
         array = np.char.encode(array, "utf-8")
@@ -240,7 +240,13 @@ def _values(group: h5py.Group, name: str, own: Described) -> np.ndarray[Any, Any
     if dataset is None or dataset.dtype.kind not in _HELD[own.scalar]:
         raise ValueError(f"{group.name}/{name} holds no {own.scalar.__name__}")
     array = np.asarray(dataset[()])
-    return np.char.decode(array, "utf-8") if array.dtype.kind == "S" else array.astype(_NUMPY[own.scalar])
+    return np.char.decode(array, "utf-8") if array.dtype.kind == "S" else _as(own, array)
+
+
+def _as(own: Described, value: Any) -> np.ndarray[Any, Any]:
+    """Give values in the type of their field; single precision is kept."""
+    held = getattr(value, "dtype", None)
+    return np.asarray(value, np.float32 if own.scalar is float and held == np.float32 else _NUMPY[own.scalar])
 
 
 def _value(own: Described, array: Any, *, single: bool = False) -> Any:

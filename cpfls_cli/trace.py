@@ -28,15 +28,13 @@ def track(
     labels: tuple[str, ...], time: Array, values: Array, *, dashed: bool = False, most: int = MOST_SAMPLES
 ) -> Track:
     """Take signals, shape (sample,) or (sample, channel), of increasing time; gaps and long signals are thinned out."""
-    values = np.asarray(values, np.float32).reshape(len(time), -1)
+    held = np.asarray(values, np.float32).reshape(len(time), -1)
     steps = np.diff(time)
-    before = np.flatnonzero(steps > _PAUSE * np.median(steps)) + 1 if len(steps) else np.empty(0, int)
+    behind = np.flatnonzero(steps > _PAUSE * np.median(steps)) + 1 if len(steps) else np.empty(0, int)
     # Between the last sample before a gap and the first behind it no line leads.
-    time = np.insert(np.asarray(time, float), before, 0.5 * (time[before - 1] + time[before]))
-    values = np.insert(values, before, np.nan, axis=0)
-    return Track(
-        labels=labels, dashed=dashed, **dict(zip(("time", "values"), thinned(time, values, most), strict=True))
-    )
+    whole_time = np.insert(np.asarray(time, float), behind, 0.5 * (time[behind - 1] + time[behind]))
+    kept_time, kept = thinned(whole_time, np.insert(held, behind, np.nan, axis=0), most)
+    return Track(labels=labels, dashed=dashed, time=kept_time, values=kept)
 
 
 def thinned(time: Array, values: NDArray[np.float32], most: int) -> tuple[Array, NDArray[np.float32]]:

@@ -149,13 +149,10 @@ def _still(
         drawn = [(own, *thinned(own.time, own.values, _STILL)) for own in tracks]
         x, y = Axis("s" if last else "", *ends), Axis(title, *span(*(values for *_, values in drawn)))
         chart = Chart(f"still-{at}", title, x, y, width=1000, height=170, table=False)
-        for own in events:
-            chart.mark(own.text if at == 0 and own.severity != _SEVERITIES[0] else "", x=own.time_s)
+        for event in events:
+            chart.mark(event.text if at == 0 and event.severity != _SEVERITIES[0] else "", x=event.time_s)
         for own, time, values in drawn:
+            kind = "thin dashed" if own.dashed else "thin"
             for channel, label in enumerate(own.labels):
-                _curve(chart, label, time, values[:, channel], channel, dashed=own.dashed)
+                chart.line(label, time, values[:, channel].astype(float), channel % COLOURS, kind=kind)
         yield str(chart)
-
-
-def _curve(chart: Chart, label: str, time: Array, values: Array, channel: int, *, dashed: bool) -> None:
-    chart.line(label, time, values.astype(float), channel % COLOURS, kind="thin dashed" if dashed else "thin")

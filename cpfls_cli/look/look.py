@@ -75,7 +75,9 @@ def look_at(
     gusts = gusts_of(flight, {plant.axis: _driven(plant) for plant in plants if plant.identified})
     progress("gains")
     gains = tuned_gains(flight, plants)
-    found = Found(flight, balance, hover, plants, (), vibration, gusts, gains)
+    found = Found(
+        flight=flight, balance=balance, hover=hover, plants=plants, loops=loops, vibration=vibration, gusts=gusts, gains=gains
+    )
     answers = answers_of(found)
     return Look(
         name=name,
