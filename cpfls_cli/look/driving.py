@@ -20,6 +20,9 @@ _OF_OUTPUT, _FAST_HZ, _SLOWEST_HZ = 0.7, 40.0, 4.0
 """Times as fast as the output of the rate loop that rotors have to be logged to be taken before it, and Hz; and Hz
 below which a command says nothing of motion."""
 
+REBUILT: Final = "rebuilt"
+"""Topic of commands that are rebuilt from what an autopilot allocates."""
+
 _FOLLOWS: Final = 0.6
 """Correlation from which on one signal is another one's, but for its sign and size."""
 
@@ -46,7 +49,8 @@ class Rotors:
         """``logged``, ``rebuilt`` of what goes into a mixer, or empty where there are none."""
         if self.samples is None or self.guess is None:
             return ""
-        return "logged" if self.guess.columns.mixer is None else "rebuilt"
+        rebuilt = self.guess.columns.mixer is not None or self.guess.columns.columns[0].startswith(f"{REBUILT}.")
+        return "rebuilt" if rebuilt else "logged"
 
     def layout(self) -> tuple[Array, Array] | None:
         """Give places, shape (rotor, 2), forward and right as shares of the arm, and spins; None where not known."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -44,7 +45,7 @@ _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 vehicle below which nothing does."""
 
 _TRAILS_S: Final = 3.0
-"""After a flight, while a rotor at its limit still matters."""
+"""After a flight, while what happens still belongs to it, s."""
 
 _MOST_OF_A_KIND: Final = 4
 """Events of one kind that are listed one by one."""
@@ -60,6 +61,7 @@ _COPTER_MODES: Final = """
 """
 """Modes in the order of their numbers, from 0; empty where a number has none."""
 
+_PX4_ARMED: Final = 2
 _LEVEL_MODES: Final = "acro, angle, horizon"
 _COPTER_EVENTS: Final[Mapping[int, tuple[str, str]]] = {
     10: ("armed", "armed"),
@@ -102,9 +104,12 @@ _COPTER_ERRORS: Final = {
 }
 _FAILSAFE_PHASES: Final = {1: "radio lost", 2: "landing", 3: "landed", 4: "radio awaited", 6: "rescue by GPS"}
 _BANNER: Final = re.compile(
-    r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New mission|Flight plan|GPS \d: (detected|probing)|u-blox|fmuv"
+    r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New (mission|rally|fence)|Flight plan|GPS \d: (detected|probing)"
+    r"|u-blox|fmuv|Param space|RC Protocol|RCOut:|(Arming|Disarming) motors|EKF\d IMU\d is using|[0-9a-f]{32}$"
     r"|\S+ [0-9A-F]{8} )"
 )
+"""What ArduPilot says at each start, and what its events say as well."""
+
 _LOUD: Final = {"EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "EMERG", "CRIT", "ERR"}
 _MOMENTS: Final[Mapping[str, tuple[str, Severity]]] = {
     "loss of control": ("loss of control", "danger"),
@@ -150,6 +155,8 @@ def timeline(
         *_on_its_back(flight),
         *_battery(flight),
     ]
+    # What held before the log began is stamped before it.
+    found = [replace(event, time_s=max(event.time_s, 0.0)) for event in found]
     return tuple(sorted(_merged(found), key=lambda event: (event.time_s, event.kind)))
 
 
@@ -251,7 +258,11 @@ def _stated(system: str, topics: Topics) -> Iterator[Event]:
 
 def _of_px4(topics: Topics) -> Iterator[Event]:
     yield from _modes(_changes(*_field(topics, "vehicle_status", "nav_state")), _NAV_STATES)
-    yield from _arming(_changes(*_field(topics, "actuator_armed", "armed")))
+    time, armed = _field(topics, "actuator_armed", "armed")
+    if not len(time):
+        time, states = _field(topics, "vehicle_status", "arming_state")
+        armed = (states == _PX4_ARMED).astype(float)
+    yield from _arming(_changes(time, armed))
     for at, on in _changes(*_field(topics, "vehicle_status", "failsafe")):
         if on:
             yield Event(time_s=at, kind="failsafe", text="failsafe", severity="danger")
@@ -330,10 +341,7 @@ def _at_limit(flight: LogFlight) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
-    inside = np.zeros(len(time), dtype=bool)
-    for first, after in runs(flight.flown):
-        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
-    full = (values >= most - _ROUNDED) & inside[:, None]
+    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time)[:, None]
     plateaus = sum(after - first >= 2 for column in full.T for first, after in runs(column))
     if most < _FULL and plateaus < _FEWEST_PLATEAUS:
         return
@@ -345,6 +353,14 @@ def _at_limit(flight: LogFlight) -> Iterator[Event]:
             more = "" if len(held) == 1 else f" in all, {longest:.2g} s at most"
             text = f"M{rotor + 1} at its upper limit {times}, {total:.2g} s{more}"
             yield Event(time_s=held[0][0], until_s=held[-1][1], kind="limit", text=text, severity="warning")
+
+
+def _flown_or_after(flight: LogFlight, time: Array) -> BoolArray:
+    """Mark where it flies, and right after, where a flight that failed goes on."""
+    inside = np.zeros(len(time), dtype=bool)
+    for first, after in runs(flight.flown):
+        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
+    return inside
 
 
 def _held(time: Array, marked: BoolArray, least_s: float) -> Iterator[tuple[float, float]]:
@@ -407,7 +423,7 @@ def _counted(topics: Topics) -> Iterator[Event]:
 def _on_its_back(flight: LogFlight) -> Iterator[Event]:
     up = np.cos(flight.attitude[:, 0]) * np.cos(flight.attitude[:, 1])
     with np.errstate(invalid="ignore"):
-        for begin, end in _held(flight.time, (up < 0) & flight.flown, _UPSIDE_DOWN_S):
+        for begin, end in _held(flight.time, (up < 0) & _flown_or_after(flight, flight.time), _UPSIDE_DOWN_S):
             yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
 
 
