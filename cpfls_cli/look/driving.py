@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -141,7 +141,9 @@ def _curve(rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) 
     straight = rotors.guess is not None and rotors.guess.columns.columns[0].startswith("actuator_motors")
     if autopilot is None or not known or straight:
         return ThrustCurve()
-    return autopilot.law(autopilot.of_log(known)).curve
+    curve = autopilot.law(autopilot.of_log(known)).curve
+    # The range that Betaflight's header states begins where motors idle.
+    return replace(curve, low=0.0, high=1.0) if autopilot.name == "betaflight" else curve
 
 
 def mixer_columns(places: Array, spins: Array, rule: MixerRule) -> Array | None:

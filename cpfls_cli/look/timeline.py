@@ -32,7 +32,7 @@ _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
 """Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
 that make it one; and how long a rotor is there, s."""
 
-_UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.3, 0.17, 0.25, 0.15, 1.0
+_UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.2, 0.17, 0.25, 0.15, 1.0
 """How long it is on its back; shares of the voltage, from 4.2 to 3.5 V a cell, over s; and what is lost within s at the
 end of a log that stops in the air."""
 
