@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot, version_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError, about
@@ -30,9 +31,9 @@ from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.flightlog.vehicle_kind import forward_flight
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
-from cpfls_cli.look.driving import REBUILT, Rotors, find_driving
+from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.units import known_unit
+from cpfls_cli.units import SPEED_UNITS, known_unit
 
 _DEGREES: Final = 180 / np.pi
 _MOST_HZ: Final = 1000.0
@@ -53,7 +54,7 @@ _DEBUG_GYRO: Final = 6
 
 _LEAST_V, _LARGEST_V = 2.0, 100.0
 """Of any battery of a multirotor."""
-_BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration")
+_BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
 
@@ -102,12 +103,17 @@ class _Reader:
         """Gather all signals on one clock."""
         gyroscope = self._gyroscope()
         rate = self._rate(gyroscope)
-        rotors = Rotors(self.signal("rotor_command"), self.recognition.signal("rotor_command"), self._airframe())
-        driving = find_driving(self.log, rotors, self.autopilot, self.parameters)
+        speeds = self.signal("rotor_speed")
+        guess = self.recognition.signal("rotor_command")
+        commands = self.signal("rotor_command")
+        if commands is not None and guess is not None and guess.columns.unit in SPEED_UNITS:
+            commands = as_shares(commands)
+        rotors = Rotors(commands, guess, self._airframe(), speeds)
+        driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
-        thrust = rotors.samples or next(self.log.found("thrust"), None)
-        if driving.command is None and not any((rotors.samples, setpoint, asked, sticks)):
+        thrust = rotors.samples or next(self.log.found("thrust"), None) or rotors.thrusts(ThrustCurve())
+        if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
         if thrust is not None and float(thrust.values.max()) < ALIVE:
             raise InputError(f"{self.name}: no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
@@ -142,7 +148,7 @@ class _Reader:
             usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
             rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
             rotors_source=rotors.source,
-            rotor_speed=self.signal("rotor_speed"),
+            rotor_speed=speeds,
             places=driving.places,
             spins=driving.spins,
             gyroscope=gyroscope,

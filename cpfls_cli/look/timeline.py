@@ -45,7 +45,7 @@ _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 vehicle below which nothing does."""
 
 _TRAILS_S: Final = 3.0
-"""After a flight, while what happens still belongs to it, s."""
+"""After a flight that ended early, while what happens still belongs to it, s."""
 
 _MOST_OF_A_KIND: Final = 4
 """Events of one kind that are listed one by one."""
@@ -150,9 +150,9 @@ def timeline(
         *_flights(flight, topics, recognition),
         *_stated(flight.system, topics),
         *_told(messages),
-        *_limits(flight),
+        *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
-        *_on_its_back(flight),
+        *_on_its_back(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_battery(flight),
     ]
     # What held before the log began is stamped before it.
@@ -328,20 +328,20 @@ def _told(messages: Sequence[Message]) -> Iterator[Event]:
 # What signals show.
 
 
-def _limits(flight: LogFlight) -> Iterator[Event]:
+def _limits(flight: LogFlight, after_s: float) -> Iterator[Event]:
     yield from _clipped(flight.gyroscope_unfiltered or flight.gyroscope, _FULL_SCALES_RAD_S, "gyroscope")
     scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
     if flight.accelerometer is not None:
         yield from _clipped(flight.accelerometer, scales, "accelerometer")
     if len(flight.rotors.time) and flight.rotors_source == "logged":
-        yield from _at_limit(flight)
+        yield from _at_limit(flight, after_s)
 
 
-def _at_limit(flight: LogFlight) -> Iterator[Event]:
+def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
-    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time)[:, None]
+    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
     plateaus = sum(after - first >= 2 for column in full.T for first, after in runs(column))
     if most < _FULL and plateaus < _FEWEST_PLATEAUS:
         return
@@ -355,11 +355,11 @@ def _at_limit(flight: LogFlight) -> Iterator[Event]:
             yield Event(time_s=held[0][0], until_s=held[-1][1], kind="limit", text=text, severity="warning")
 
 
-def _flown_or_after(flight: LogFlight, time: Array) -> BoolArray:
+def _flown_or_after(flight: LogFlight, time: Array, after_s: float) -> BoolArray:
     """Mark where it flies, and right after, where a flight that failed goes on."""
     inside = np.zeros(len(time), dtype=bool)
     for first, after in runs(flight.flown):
-        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
+        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + after_s)
     return inside
 
 
@@ -420,10 +420,10 @@ def _counted(topics: Topics) -> Iterator[Event]:
             yield Event(time_s=begin, until_s=end, kind="clipping", text=text, severity="warning")
 
 
-def _on_its_back(flight: LogFlight) -> Iterator[Event]:
+def _on_its_back(flight: LogFlight, after_s: float) -> Iterator[Event]:
     up = np.cos(flight.attitude[:, 0]) * np.cos(flight.attitude[:, 1])
     with np.errstate(invalid="ignore"):
-        for begin, end in _held(flight.time, (up < 0) & _flown_or_after(flight, flight.time), _UPSIDE_DOWN_S):
+        for begin, end in _held(flight.time, (up < 0) & _flown_or_after(flight, flight.time, after_s), _UPSIDE_DOWN_S):
             yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
 
 
