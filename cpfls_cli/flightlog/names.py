@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Final, Literal
 
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
@@ -54,7 +55,7 @@ class ColumnGroup:
     kind: Kind
     columns: tuple[str, ...]
 
-    @property
+    @cached_property
     def ending(self) -> str:
         """The unit at the end of the name or in brackets, as it is written; empty where there is none."""
         before, star, after = self.pattern.partition("*")
@@ -70,7 +71,7 @@ class ColumnGroup:
                 return name[start:]
         return ""
 
-    @property
+    @cached_property
     def words(self) -> tuple[str, ...]:
         """Words of the pattern in lower case, without numbers and without the unit at its end."""
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
@@ -81,6 +82,7 @@ class ColumnGroup:
         return tuple(words.split())
 
 
+@cache
 def _symbols(text: str) -> str:
     """Write a unit as `SPELLINGS` do, such as rad/s for rad_per_sec."""
     text = re.sub(r"([a-z]{2})([A-Z])", r"\1_\2", text.strip("[]()_ ")).lower().replace("²", "2")

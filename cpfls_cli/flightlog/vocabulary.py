@@ -326,6 +326,8 @@ RANGES: Final = (
     Range(0.0, -inf, 101.0, 0.01, 0.0, "per cent", "of commands"),
     Range(800.0, -inf, 2300.0, 1e-3, -1.0, "pulses of 1000 to 2000 us", "never", (_OLD_PX4,)),
     Range(0.0, 32768.0, 65536.0, 1 / 65536, 0.0, "16 bits", "of commands"),
+    # Less than an eighth of 16 bits flies nothing.
+    Range(0.0, 2300.0, 8191.5, 1 / 8191, 0.0, "13 bits of UAVCAN", "never"),
     Range(0.0, 2300.0, 32768.0, 1 / 65536, 0.0, "16 bits", "never"),
     Range(0.0, -inf, 2048.0, 1 / 2000, -48 / 2000, "48 to 2047 of DShot", "never"),
 )

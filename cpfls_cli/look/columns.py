@@ -36,7 +36,9 @@ _TABLE: Final = """
     thrust    ArduPilot   CTUN.{ThO}                              1        +
     thrust    ArduPilot   CTUN.{ThrOut}                           1/1000   +
     thrust    Crazyflie   controller.{cmd_thrust}                 1/65536  +
+    setpoint  PX4         vehicle_rates_setpoint.{roll,pitch,yaw} 1        +++
     setpoint  ArduPilot   RATE.{R,P,Y}Des                         deg      +++
+    setpoint  Betaflight  setpoint[{0,1,2}]                       deg      +--
     setpoint  Betaflight  axisRate[{0,1,2}]                       deg      +--
     current   PX4         battery_status.{current_a}              1        +
     current   ArduPilot   BAT.{Curr}                              1        +

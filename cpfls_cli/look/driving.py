@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,13 +15,20 @@ from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess
 from cpfls_cli.look.columns import FRD, LookedLog, along_each
 from cpfls_cli.look.flight import Samples
+from cpfls_cli.units import SPEED_UNITS
 
 _OF_OUTPUT, _FAST_HZ, _SLOWEST_HZ = 0.7, 40.0, 4.0
 """Times as fast as the output of the rate loop that rotors have to be logged to be taken before it, and Hz; and Hz
 below which a command says nothing of motion."""
 
+REBUILT: Final = "rebuilt"
+"""Topic of commands that are rebuilt from what an autopilot allocates."""
+
 _FOLLOWS: Final = 0.6
 """Correlation from which on one signal is another one's, but for its sign and size."""
+
+_LARGEST: Final = 0.999
+"""Quantile of speeds that is taken for the largest."""
 
 _OLD_FULL, _FULL = 4500.0, 1.5
 """Full command of ArduCopter before 3.4, and the largest of the versions since."""
@@ -35,26 +42,46 @@ class Rotors:
     ----------
     samples : Samples or None
         Shape (sample, rotor), shares of full.
+    speeds : Samples or None
+        The same of measured speeds, rad/s.
     """
 
     samples: Samples | None
     guess: Guess | None
     airframe: Airframe | None
+    speeds: Samples | None = None
 
     @property
     def source(self) -> str:
         """``logged``, ``rebuilt`` of what goes into a mixer, or empty where there are none."""
         if self.samples is None or self.guess is None:
             return ""
-        return "logged" if self.guess.columns.mixer is None else "rebuilt"
+        rebuilt = self.guess.columns.mixer is not None or self.guess.columns.columns[0].startswith(f"{REBUILT}.")
+        return "rebuilt" if rebuilt else "logged"
 
     def layout(self) -> tuple[Array, Array] | None:
         """Give places, shape (rotor, 2), forward and right as shares of the arm, and spins; None where not known."""
         rotors = () if self.airframe is None else self.airframe.rotors
-        if not rotors or (self.samples is not None and self.samples.values.shape[1] != len(rotors)):
+        known = self.samples or self.speeds
+        if not rotors or (known is not None and known.values.shape[1] != len(rotors)):
             return None
         places = np.array([rotor.direction for rotor in rotors]) * [1.0, -1.0]
         return places / float(np.hypot(*places.T).max()), np.array([rotor.spin for rotor in rotors], dtype=float)
+
+    def thrusts(self, curve: ThrustCurve) -> Samples | None:
+        """Give shares of full thrust, shape (sample, rotor): of commands, or else of the largest measured speeds."""
+        if self.samples is None:
+            of_largest = self.speeds and as_shares(self.speeds)
+            return of_largest and of_largest._replace(values=of_largest.values**2)
+        asks_speeds = self.guess is not None and self.guess.columns.unit in SPEED_UNITS
+        values = self.samples.values**2 if asks_speeds else curve.thrust(self.samples.values)
+        return self.samples._replace(values=values)
+
+
+def as_shares(speeds: Samples) -> Samples:
+    """Give speeds of rotors as shares of the largest."""
+    most = float(np.quantile(speeds.values.max(axis=1), _LARGEST))
+    return speeds._replace(values=np.clip(speeds.values / most, 0.0, 1.0) if most > 0 else speeds.values)
 
 
 class Driving(NamedTuple):
@@ -76,21 +103,32 @@ class Driving(NamedTuple):
     spins: Array | None
 
 
-def find_driving(log: LookedLog, rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) -> Driving:
+def find_driving(
+    log: LookedLog, rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters, torque: Samples | None = None
+) -> Driving:
     """Find what acts about each axis: rotors that are logged fast, or else what the rate loop puts out.
 
     Rotors come first since they hold what limits make of the output.
+
+    Parameters
+    ----------
+    torque : Samples or None
+        That a controller asks for in a log of no known autopilot, N m.
     """
     output, (places, spins) = _output(log, autopilot), rotors.layout() or (None, None)
+    if output is None and torque is not None:
+        size = np.abs(torque.values)
+        output = Samples(torque.time, torque.values / size.max(), f"{torque.source} as shares of the largest")
     own = None
-    if rotors.samples is not None and places is not None and spins is not None:
+    if places is not None and spins is not None:
         own = _by_rotors(rotors, places, spins, autopilot, parameters)
     if own is not None and spins is not None and output is not None and along_each(own, output)[0][2] < -_FOLLOWS:
         # All propellers turn the other way than is usual.
         spins, own = -spins, own._replace(values=own.values * [1.0, 1.0, -1.0])
     fast = own is not None and own.rate_hz >= (_SLOWEST_HZ if output is None else _fast_beside(output))
     if own is not None and fast and (output is None or rotors.source == "logged"):
-        return Driving(own, f"{rotors.source} rotors, {own.source}", places, spins)
+        words = f"{rotors.source} rotors" if rotors.samples is not None else "speeds of rotors"
+        return Driving(own, f"{words}, {own.source}", places, spins)
     source = "" if output is None else f"output of the rate loop, {output.source}"
     return Driving(output, source, places, spins)
 
@@ -124,10 +162,10 @@ def _by_rotors(
     rotors: Rotors, places: Array, spins: Array, autopilot: Autopilot | None, parameters: Parameters
 ) -> Samples | None:
     columns = mixer_columns(places, spins, autopilot.mixer if autopilot else MixerRule("peak", 1.0, 1.0))
-    if columns is None or rotors.samples is None:
+    thrusts = rotors.thrusts(_curve(rotors, autopilot, parameters))
+    if columns is None or thrusts is None:
         return None
-    thrust = _curve(rotors, autopilot, parameters).thrust(rotors.samples.values)
-    return rotors.samples._replace(values=(thrust @ np.linalg.pinv(columns).T)[:, 1:])
+    return thrusts._replace(values=(thrusts.values @ np.linalg.pinv(columns).T)[:, 1:])
 
 
 def _curve(rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) -> ThrustCurve:
@@ -137,7 +175,9 @@ def _curve(rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) 
     straight = rotors.guess is not None and rotors.guess.columns.columns[0].startswith("actuator_motors")
     if autopilot is None or not known or straight:
         return ThrustCurve()
-    return autopilot.law(autopilot.of_log(known)).curve
+    curve = autopilot.law(autopilot.of_log(known)).curve
+    # The range that Betaflight's header states begins where motors idle.
+    return replace(curve, low=0.0, high=1.0) if autopilot.name == "betaflight" else curve
 
 
 def mixer_columns(places: Array, spins: Array, rule: MixerRule) -> Array | None:

@@ -134,7 +134,8 @@ def _rows(flight: LogFlight, log: LookedLog, recognition: Recognition) -> list[S
     for what, samples, asked in named:
         if samples is not None and what not in rows and len(samples.time) > 1:
             rows[what] = _row(flight, what, samples, asked)
-    for what in ("rotor commands", "setpoint body rate"):
+    asked = bool(np.isfinite(flight.rate_setpoint).any())
+    for what in ("rotor commands", *(() if asked else ("setpoint body rate",))):
         lacks = SignalRow(signal=what, source="", rate_hz=0.0, lost=0.0, longest_gap_s=0.0, asked_hz=_RATE_HZ)
         rows.setdefault(what, lacks)
     return list(rows.values())

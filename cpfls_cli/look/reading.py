@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot, version_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError, about
@@ -19,6 +20,7 @@ from cpfls_cli.flightlog.conversion import (
     attitude_from_quaternion,
     attitude_to_enu_flu,
 )
+from cpfls_cli.flightlog.crash import ALIVE
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
@@ -29,9 +31,9 @@ from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.flightlog.vehicle_kind import forward_flight
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
-from cpfls_cli.look.driving import Rotors, find_driving
+from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.units import known_unit
+from cpfls_cli.units import SPEED_UNITS, known_unit
 
 _DEGREES: Final = 180 / np.pi
 _MOST_HZ: Final = 1000.0
@@ -50,8 +52,9 @@ _FOLLOWS: Final = 0.6
 _DEBUG_GYRO: Final = 6
 """Of Betaflight's debug_mode: what the gyroscope reads before filters, in deg/s."""
 
-_LARGEST_V: Final = 100.0
-_BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration")
+_LEAST_V, _LARGEST_V = 2.0, 100.0
+"""Of any battery of a multirotor."""
+_BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
 
@@ -81,7 +84,10 @@ def read_flight(
     if recognition is None:
         with about(name, InputError):
             recognition = recognise(topics, units, parameters, system)
-    return _Reader(name, LookedLog(topics, units, system), recognition, parameters).flight()
+    # Commands that are rebuilt stand in a topic of their own.
+    rebuilt = getattr(recognition, "rebuilt", None)
+    held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
+    return _Reader(name, LookedLog(held, units, system), recognition, parameters).flight()
 
 
 class _Reader:
@@ -97,12 +103,20 @@ class _Reader:
         """Gather all signals on one clock."""
         gyroscope = self._gyroscope()
         rate = self._rate(gyroscope)
-        rotors = Rotors(self.signal("rotor_command"), self.recognition.signal("rotor_command"), self._airframe())
-        driving = find_driving(self.log, rotors, self.autopilot, self.parameters)
+        speeds = self.signal("rotor_speed")
+        guess = self.recognition.signal("rotor_command")
+        commands = self.signal("rotor_command")
+        if commands is not None and guess is not None and guess.columns.unit in SPEED_UNITS:
+            commands = as_shares(commands)
+        rotors = Rotors(commands, guess, self._airframe(), speeds)
+        driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
-        if driving.command is None and not any((rotors.samples, setpoint, asked, sticks)):
+        thrust = rotors.samples or next(self.log.found("thrust"), None) or rotors.thrusts(ThrustCurve())
+        if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
+        if thrust is not None and float(thrust.values.max()) < ALIVE:
+            raise InputError(f"{self.name}: no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
         clock = _clock(self.name, rate, driving.command)
         voltage, current = self._battery()
         height, climb = self._heights()
@@ -110,7 +124,6 @@ class _Reader:
         on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
         flown = self._flown(clock)
-        thrust = rotors.samples or next(self.log.found("thrust"), None)
         return LogFlight(
             name=self.name,
             autopilot=self.autopilot.name if self.autopilot else "",
@@ -135,7 +148,7 @@ class _Reader:
             usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
             rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
             rotors_source=rotors.source,
-            rotor_speed=self.signal("rotor_speed"),
+            rotor_speed=speeds,
             places=driving.places,
             spins=driving.spins,
             gyroscope=gyroscope,
@@ -185,11 +198,13 @@ class _Reader:
             return gyroscope
         if found.source.startswith("RATE."):
             # Old ones are in other units; the gyroscope of the same name is behind the same filters.
-            return gyroscope if gyroscope.rate_hz >= found.rate_hz else self._in_unit_of(found, gyroscope)
+            return gyroscope if gyroscope.rate_hz >= found.rate_hz else self._in_unit_of_rates(found, gyroscope)
         return found
 
-    def _in_unit_of(self, samples: Samples, gyroscope: Samples) -> Samples:
-        return samples._replace(values=_unit_by(samples, gyroscope) * samples.values)
+    def _in_unit_of_rates(self, samples: Samples, gyroscope: Samples) -> Samples:
+        """Scale columns of RATE by the unit of the rates beside them."""
+        rates = next(self.log.found("rate"), samples)
+        return samples._replace(values=_unit_by(rates, gyroscope) * samples.values)
 
     def _unfiltered(self, gyroscope: Samples, rate: Samples) -> Samples | None:
         found = [_fifo(self.log), *self.log.found("raw")]
@@ -207,7 +222,7 @@ class _Reader:
             return found
         found = next(self.log.found("setpoint"), None)
         if found is not None:
-            return self._in_unit_of(found, gyroscope) if found.source.startswith("RATE.") else found
+            return self._in_unit_of_rates(found, gyroscope) if found.source.startswith("RATE.") else found
         return self._setpoint_of_p_term(gyroscope)
 
     def _setpoint_of_p_term(self, gyroscope: Samples) -> Samples | None:
@@ -217,7 +232,7 @@ class _Reader:
         rows = self.autopilot.in_log(self.parameters) if self.autopilot else {}
         gains = [rows.get(f"p_{axis}", 0.0) for axis in ("roll", "pitch", "yaw")]
         throttle = self.log.samples(("rcCommand[3]",))
-        if term is None or version is None or version < (3, 0) or min(gains) <= 0 or throttle is None:
+        if term is None or version is None or not (3, 0) <= version < (4, 0) or min(gains) <= 0 or throttle is None:
             return None
         cut = float(self.parameters.get("tpa_rate", self.parameters.get("dynThrPID", 0)) or 0) / 100
         begin = float(self.parameters.get("tpa_breakpoint", 1650) or 1650)
@@ -233,15 +248,15 @@ class _Reader:
         return None if found is None else found._replace(values=found.values[:, :3] * sign)
 
     def _battery(self) -> tuple[Samples | None, Samples | None]:
-        """Give voltage and current; old logs have hundredths of both."""
+        """Give voltage and current; old logs have hundredths of both, and what is not measured is about 0."""
         voltage = self.signal("voltage") or next(self.log.found("voltage"), None)
         current = next(self.log.found("current"), None)
-        if voltage is not None and float(np.median(voltage.values)) > _LARGEST_V:
-            voltage = voltage._replace(values=voltage.values / 100)
-            current = None if current is None else current._replace(values=current.values / 100)
-        # What is not measured is -1 or stays 0.
-        measured = current is not None and float(current.values.max()) > 0
-        return voltage, current if measured else None
+        level = np.nan if voltage is None else float(np.median(voltage.values))
+        if level < _LEAST_V or (current is not None and not float(current.values.max()) > 0):
+            current = None
+        if level > _LARGEST_V:
+            voltage, current = (own and own._replace(values=own.values / 100) for own in (voltage, current))
+        return None if level < _LEAST_V else voltage, current
 
     # Where it is.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -31,7 +32,7 @@ _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
 """Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
 that make it one; and how long a rotor is there, s."""
 
-_UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.3, 0.17, 0.25, 0.15, 1.0
+_UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.2, 0.17, 0.25, 0.15, 1.0
 """How long it is on its back; shares of the voltage, from 4.2 to 3.5 V a cell, over s; and what is lost within s at the
 end of a log that stops in the air."""
 
@@ -44,7 +45,7 @@ _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 vehicle below which nothing does."""
 
 _TRAILS_S: Final = 3.0
-"""After a flight, while a rotor at its limit still matters."""
+"""After a flight that ended early, while what happens still belongs to it, s."""
 
 _MOST_OF_A_KIND: Final = 4
 """Events of one kind that are listed one by one."""
@@ -60,6 +61,7 @@ _COPTER_MODES: Final = """
 """
 """Modes in the order of their numbers, from 0; empty where a number has none."""
 
+_PX4_ARMED: Final = 2
 _LEVEL_MODES: Final = "acro, angle, horizon"
 _COPTER_EVENTS: Final[Mapping[int, tuple[str, str]]] = {
     10: ("armed", "armed"),
@@ -102,9 +104,12 @@ _COPTER_ERRORS: Final = {
 }
 _FAILSAFE_PHASES: Final = {1: "radio lost", 2: "landing", 3: "landed", 4: "radio awaited", 6: "rescue by GPS"}
 _BANNER: Final = re.compile(
-    r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New mission|Flight plan|GPS \d: (detected|probing)|u-blox|fmuv"
+    r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New (mission|rally|fence)|Flight plan|GPS \d: (detected|probing)"
+    r"|u-blox|fmuv|Param space|RC Protocol|RCOut:|(Arming|Disarming) motors|EKF\d IMU\d is using|[0-9a-f]{32}$"
     r"|\S+ [0-9A-F]{8} )"
 )
+"""What ArduPilot says at each start, and what its events say as well."""
+
 _LOUD: Final = {"EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "EMERG", "CRIT", "ERR"}
 _MOMENTS: Final[Mapping[str, tuple[str, Severity]]] = {
     "loss of control": ("loss of control", "danger"),
@@ -145,11 +150,13 @@ def timeline(
         *_flights(flight, topics, recognition),
         *_stated(flight.system, topics),
         *_told(messages),
-        *_limits(flight),
+        *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
-        *_on_its_back(flight),
+        *_on_its_back(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_battery(flight),
     ]
+    # What held before the log began is stamped before it.
+    found = [replace(event, time_s=max(event.time_s, 0.0)) for event in found]
     return tuple(sorted(_merged(found), key=lambda event: (event.time_s, event.kind)))
 
 
@@ -251,7 +258,11 @@ def _stated(system: str, topics: Topics) -> Iterator[Event]:
 
 def _of_px4(topics: Topics) -> Iterator[Event]:
     yield from _modes(_changes(*_field(topics, "vehicle_status", "nav_state")), _NAV_STATES)
-    yield from _arming(_changes(*_field(topics, "actuator_armed", "armed")))
+    time, armed = _field(topics, "actuator_armed", "armed")
+    if not len(time):
+        time, states = _field(topics, "vehicle_status", "arming_state")
+        armed = (states == _PX4_ARMED).astype(float)
+    yield from _arming(_changes(time, armed))
     for at, on in _changes(*_field(topics, "vehicle_status", "failsafe")):
         if on:
             yield Event(time_s=at, kind="failsafe", text="failsafe", severity="danger")
@@ -317,23 +328,20 @@ def _told(messages: Sequence[Message]) -> Iterator[Event]:
 # What signals show.
 
 
-def _limits(flight: LogFlight) -> Iterator[Event]:
+def _limits(flight: LogFlight, after_s: float) -> Iterator[Event]:
     yield from _clipped(flight.gyroscope_unfiltered or flight.gyroscope, _FULL_SCALES_RAD_S, "gyroscope")
     scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
     if flight.accelerometer is not None:
         yield from _clipped(flight.accelerometer, scales, "accelerometer")
     if len(flight.rotors.time) and flight.rotors_source == "logged":
-        yield from _at_limit(flight)
+        yield from _at_limit(flight, after_s)
 
 
-def _at_limit(flight: LogFlight) -> Iterator[Event]:
+def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
-    inside = np.zeros(len(time), dtype=bool)
-    for first, after in runs(flight.flown):
-        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + _TRAILS_S)
-    full = (values >= most - _ROUNDED) & inside[:, None]
+    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
     plateaus = sum(after - first >= 2 for column in full.T for first, after in runs(column))
     if most < _FULL and plateaus < _FEWEST_PLATEAUS:
         return
@@ -345,6 +353,14 @@ def _at_limit(flight: LogFlight) -> Iterator[Event]:
             more = "" if len(held) == 1 else f" in all, {longest:.2g} s at most"
             text = f"M{rotor + 1} at its upper limit {times}, {total:.2g} s{more}"
             yield Event(time_s=held[0][0], until_s=held[-1][1], kind="limit", text=text, severity="warning")
+
+
+def _flown_or_after(flight: LogFlight, time: Array, after_s: float) -> BoolArray:
+    """Mark where it flies, and right after, where a flight that failed goes on."""
+    inside = np.zeros(len(time), dtype=bool)
+    for first, after in runs(flight.flown):
+        inside |= (time >= flight.time[first]) & (time <= flight.time[after - 1] + after_s)
+    return inside
 
 
 def _held(time: Array, marked: BoolArray, least_s: float) -> Iterator[tuple[float, float]]:
@@ -404,10 +420,10 @@ def _counted(topics: Topics) -> Iterator[Event]:
             yield Event(time_s=begin, until_s=end, kind="clipping", text=text, severity="warning")
 
 
-def _on_its_back(flight: LogFlight) -> Iterator[Event]:
+def _on_its_back(flight: LogFlight, after_s: float) -> Iterator[Event]:
     up = np.cos(flight.attitude[:, 0]) * np.cos(flight.attitude[:, 1])
     with np.errstate(invalid="ignore"):
-        for begin, end in _held(flight.time, (up < 0) & flight.flown, _UPSIDE_DOWN_S):
+        for begin, end in _held(flight.time, (up < 0) & _flown_or_after(flight, flight.time, after_s), _UPSIDE_DOWN_S):
             yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
 
 

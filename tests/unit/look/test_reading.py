@@ -1,0 +1,219 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.look.columns import on_clock
+from cpfls_cli.look.flight import Samples
+from cpfls_cli.look.reading import read_flight
+from tests.builders import looked_logs as logs
+from tests.builders.topic_logs import topic
+from tests.builders.unknown_logs import FLIP, GRAVITY, flight, named
+
+OWN = flight(seconds=20.0)
+
+
+def read(contents):
+    return read_flight("log", contents.topics, contents.units, contents.parameters, contents.system)
+
+
+def on(found, values, time=OWN.time):
+    """What was made, on the clock of what is read."""
+    return np.column_stack([np.interp(found.time, time, own) for own in values.T])
+
+
+def turning(found):
+    """Correlate angular acceleration with the command, axis by axis, slow parts of both."""
+    kernel = np.hanning(round(0.2 * found.rate_hz))
+    rate, acts = (
+        np.column_stack([np.convolve(own, kernel / kernel.sum(), "valid") for own in values.T])
+        for values in (found.body_rate, found.command)
+    )
+    change = np.gradient(rate, axis=0)
+    return [np.corrcoef(change[:, axis], acts[:, axis])[0, 1] for axis in range(3)]
+
+
+@pytest.mark.parametrize("autopilot", logs.WRITERS)
+def test_one_flight_is_the_same_in_every_log(autopilot):
+    found = read(logs.WRITERS[autopilot](OWN))
+    assert found.autopilot == autopilot
+    assert found.rate_hz == pytest.approx(200.0, rel=1e-3)
+    # Linear between samples: of a sample every 0.01 s it is exact where there is one.
+    np.testing.assert_allclose(found.body_rate, on(found, OWN.rate @ FLIP), atol=1e-6)
+    np.testing.assert_allclose(found.gyroscope.values, OWN.rate @ FLIP, atol=1e-6)
+    np.testing.assert_allclose(found.specific_force, on(found, OWN.specific_force @ FLIP), atol=1e-6)
+    assert np.median(found.specific_force[:, 2]) == pytest.approx(-GRAVITY, rel=0.05)
+    # Without a word on the commands they are shares of speed.
+    made = logs.command(OWN, autopilot) if autopilot else None
+    if made is not None:
+        np.testing.assert_allclose(found.command, on(found, made), atol=2e-3)
+    assert min(turning(found)) > 0.9
+    assert found.rotors_source == "logged"
+    assert found.command_source.startswith("logged rotors")
+    assert found.usable.mean() > 0.99
+    assert sorted(found.spins) == [-1, -1, 1, 1]
+    forward, right = np.sign(found.places).T
+    assert {(x, y, s) for x, y, s in zip(forward, right, found.spins, strict=True)} == {
+        (x, -y, s) for x, y, s in ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
+    }
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot", ""])
+def test_attitude_height_and_battery(autopilot):
+    found = read(logs.WRITERS[autopilot](OWN))
+    known = np.isfinite(found.attitude).all(axis=1)
+    assert known.mean() > 0.9
+    roll, pitch, _ = on(found, OWN.angles).T
+    np.testing.assert_allclose(found.attitude[known, 0], roll[known], atol=0.02)
+    np.testing.assert_allclose(found.attitude[known, 1], -pitch[known], atol=0.02)
+    # Heading east is a quarter turn from north, clockwise.
+    yaw = np.pi / 2 - on(found, OWN.angles)[known, 2]
+    np.testing.assert_allclose(np.exp(1j * found.attitude[known, 2]), np.exp(1j * yaw), atol=0.04)
+    height = on(found, OWN.position)[:, 2] - OWN.position[0, 2]
+    assert np.nanmax(np.abs(found.height - height)) < 0.1
+    known = np.isfinite(found.climb_rate)
+    assert np.corrcoef(found.climb_rate[known], on(found, OWN.velocity)[known, 2])[0, 1] > 0.98
+    if autopilot:
+        assert np.nanmedian(found.voltage) == pytest.approx(15.9, abs=0.01)
+        assert np.nanmedian(found.current) == 9.0
+
+
+def test_slow_motors_leave_the_output_of_the_rate_loop():
+    found = read(logs.px4(OWN, motors=10, outputs=2))
+    assert found.command_source.startswith("output of the rate loop, vehicle_torque_setpoint")
+    assert found.rate_hz == pytest.approx(100.0, rel=1e-3)
+    np.testing.assert_allclose(found.command[2:-2:2], on(found, logs.command(OWN, "px4"))[2:-2:2], atol=5e-3)
+    assert found.rotors.rate_hz == pytest.approx(10.0)
+
+
+def test_stamps_of_samples_come_before_those_of_messages():
+    contents = logs.px4(OWN, motors=0)
+    late = {name: dict(fields) for name, fields in contents.topics.items()}
+    own = late["vehicle_torque_setpoint"]
+    own["timestamp_sample"], own["timestamp"] = own["timestamp"], own["timestamp"] + 0.013
+    contents.topics.update(late)
+    found = read(contents)
+    np.testing.assert_allclose(found.command, on(found, logs.command(OWN, "px4")), atol=2e-3)
+
+
+def test_rotors_are_not_needed():
+    asked = {"vehicle_rates_setpoint": topic(OWN, 2, named(OWN.rate @ FLIP, "roll", "pitch", "yaw"))}
+    found = read(logs.px4(OWN, motors=0, outputs=0, more=asked))
+    assert found.rotors.values.shape == (0, 0)
+    assert found.rotors_source == found.command_source == ""
+    assert np.isnan(found.command).all()
+    assert found.usable.mean() > 0.95
+    np.testing.assert_allclose(found.rate_setpoint[4:-4], on(found, OWN.rate @ FLIP)[4:-4], atol=0.2)
+
+
+def test_propellers_that_turn_the_other_way():
+    found = read(logs.betaflight(OWN, reversed_spins=True))
+    # Rear right, front right, rear left, front left: the usual ones are -1, 1, 1, -1.
+    assert found.spins.tolist() == [1, -1, -1, 1]
+    np.testing.assert_allclose(found.command, on(found, logs.command(OWN, "betaflight")), atol=2e-3)
+
+
+def test_setpoint_of_betaflight_3_follows_from_its_error():
+    gains, asked = np.array([45.0, 47.0, 45.0]), np.degrees(OWN.rate) + 20 * np.sin(OWN.time)[:, None]
+    throttle = 1200 + 700 * (0.5 + 0.5 * np.sin(0.7 * OWN.time))
+    # Roll and pitch weaken with the throttle beyond a breakpoint, yaw does not.
+    weaker = 1 - 0.4 * np.clip((throttle - 1500) / 500, 0, 1)
+    weaker = np.column_stack([weaker, weaker, np.ones_like(weaker)])
+    error = 0.032029 * gains * weaker * (asked - np.degrees(OWN.rate))
+    more = named(error, *(f"axisP[{k}]" for k in range(3))) | {"rcCommand[3]": throttle}
+    contents = logs.betaflight(OWN, version="3.1.3", more=more)
+    contents.parameters.update({"tpa_rate": 40.0, "tpa_breakpoint": 1500.0})
+    found = read(contents)
+    np.testing.assert_allclose(found.rate_setpoint, on(found, np.radians(asked) @ FLIP), atol=1e-4)
+
+
+def test_rates_in_hundredths_of_old_logs():
+    own = {name: 100 * np.degrees(value) for name, value in named(OWN.rate @ FLIP, "R", "P", "Y").items()}
+    own |= {f"{name}Des": value for name, value in own.items()}
+    found = read(logs.ardupilot(OWN, more={"RATE": topic(OWN, 1, own)}))
+    np.testing.assert_allclose(found.rate_setpoint, on(found, OWN.rate @ FLIP), atol=1e-6)
+
+
+def test_gyroscope_before_filters():
+    raw = np.degrees(OWN.rate) + 2 * np.sin(40 * OWN.time)[:, None]
+    found = read(logs.betaflight(OWN, more=named(raw, *(f"gyroUnfilt[{k}]" for k in range(3)))))
+    np.testing.assert_allclose(found.gyroscope_unfiltered.values, np.radians(raw) @ FLIP)
+    debug = named(raw, *(f"debug[{k}]" for k in range(3)))
+    contents = logs.betaflight(OWN, more=debug)
+    assert read(contents).gyroscope_unfiltered is None
+    contents.parameters["debug_mode"] = 6.0
+    np.testing.assert_allclose(read(contents).gyroscope_unfiltered.values, np.radians(raw) @ FLIP)
+    # Another quantity in the same columns is no gyroscope.
+    contents.topics[""].update({name: 3 * value for name, value in debug.items()})
+    assert read(contents).gyroscope_unfiltered is None
+
+
+def test_packets_of_a_gyroscope_are_laid_out_in_time():
+    fast = np.repeat(OWN.time, 4) + np.tile([-0.0075, -0.005, -0.0025, 0.0], len(OWN.time))
+    values = np.column_stack([np.interp(fast, OWN.time, axis) for axis in (OWN.rate @ FLIP).T])
+    packed = np.round(values / 1e-3).reshape(-1, 4, 3)
+    fields = {"dt": 2500 + 0 * OWN.time, "scale": 1e-3 + 0 * OWN.time, "samples": 4 + 0 * OWN.time}
+    fields |= {f"{axis}[{k}]": packed[:, k, index] for index, axis in enumerate("xyz") for k in range(4)}
+    found = read(logs.px4(OWN, more={"sensor_gyro_fifo": topic(OWN, 1, fields)}))
+    assert found.gyroscope_unfiltered.rate_hz == pytest.approx(400.0, rel=1e-3)
+    np.testing.assert_allclose(found.gyroscope_unfiltered.time, fast, atol=1e-9)
+    np.testing.assert_allclose(found.gyroscope_unfiltered.values, values, atol=6e-4)
+
+
+def test_a_gap_is_not_used():
+    contents = logs.betaflight(OWN)
+    kept = (OWN.time < 8.0) | (OWN.time >= 8.4)
+    contents.topics[""].update({name: value[kept] for name, value in contents.topics[""].items()})
+    found = read(contents)
+    np.testing.assert_allclose(found.gaps_s, [[7.99, 8.4]], atol=1e-6)
+    assert not found.usable[(found.time > 7.99) & (found.time < 8.4)].any()
+    assert found.usable[(found.time > 8.42) & (found.time < 9.0)].all()
+    assert found.flown[(found.time > 7.99) & (found.time < 8.4)].all()
+
+
+def test_what_is_faster_than_the_clock_is_not_folded():
+    time = np.arange(4000) / 1000
+    fast = Samples(time, np.sin(2 * np.pi * 3 * time)[:, None] + np.sin(2 * np.pi * 197 * time)[:, None])
+    clock = np.arange(0.0, 3.9, 0.01)
+    found = on_clock(fast, clock, 1)[:, 0]
+    # 197 Hz would be 3 Hz at 100 samples a second.
+    np.testing.assert_allclose(found[50:-50], np.sin(2 * np.pi * 3 * clock)[50:-50], atol=0.01)
+
+
+def test_sticks_are_positive_as_the_rate():
+    rate = OWN.rate @ FLIP / 4
+    # PX4's pitch stick is positive forward, which lowers the nose; Betaflight's columns are in the gyroscope's axes.
+    sticks = topic(OWN, 2, named(rate * [1, -1, 1], "roll", "pitch", "yaw") | {"throttle": 0 * OWN.time})
+    pulses = topic(OWN, 2, named(1500 + 500 * rate, "C1", "C2", "C4") | {"C3": 1400 + 0 * OWN.time})
+    flat = named(500 * rate @ FLIP, *(f"rcCommand[{k}]" for k in range(3)))
+    for contents in (
+        logs.px4(OWN, more={"manual_control_setpoint": sticks}),
+        logs.ardupilot(OWN, more={"RCIN": pulses}),
+        logs.betaflight(OWN, more=flat),
+    ):
+        found = read(contents)
+        known = np.isfinite(found.stick).all(axis=1)
+        assert known.mean() > 0.95
+        for axis in range(3):
+            assert np.corrcoef(found.stick[known, axis], found.body_rate[known, axis])[0, 1] > 0.9
+
+
+def test_motion_alone_is_not_enough():
+    with pytest.raises(InputError, match=r"neither rotors nor anything that was asked.*SDLOG_PROFILE"):
+        read(logs.px4(OWN, motors=0, outputs=0))
+
+
+def test_a_log_without_a_gyroscope():
+    contents = logs.px4(OWN)
+    for name in ("sensor_combined", "vehicle_angular_velocity"):
+        del contents.topics[name]
+    with pytest.raises(InputError, match=r"log: a log without a gyroscope.*SDLOG_PROFILE"):
+        read(contents)
+
+
+def test_thrust_that_stays_at_nothing_is_no_flight():
+    still = dict.fromkeys(("AOut", "RDes", "PDes", "YDes"), 0 * OWN.time)
+    asked = named(np.degrees(OWN.rate @ FLIP), "R", "P", "Y")
+    contents = logs.ardupilot(OWN, motors=0, more={"RATE": topic(OWN, 1, still | asked)})
+    contents.topics["ATT"] |= {f"Des{name}": contents.topics["ATT"][name] for name in ("Roll", "Pitch", "Yaw")}
+    with pytest.raises(InputError, match="stays at 0"):
+        read(contents)

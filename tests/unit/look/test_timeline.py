@@ -1,0 +1,190 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.logs.formats import log_contents
+from cpfls_cli.look.columns import LookedLog
+from cpfls_cli.look.logged import what_is_logged
+from cpfls_cli.look.reading import read_flight
+from cpfls_cli.look.timeline import timeline
+from tests.builders import ended_flights as ended
+from tests.builders import looked_logs as logs
+from tests.builders.dataflash_logs import dataflash
+from tests.builders.ulogs import message, ulog
+from tests.builders.unknown_logs import flight, with_ground
+
+OWN = flight(seconds=20.0)
+HOP = with_ground(flight(seconds=20.0))
+
+
+def read(contents):
+    recognition = recognise(contents.topics, contents.units, contents.parameters, contents.system)
+    given = (contents.topics, contents.units, contents.parameters, contents.system)
+    return read_flight("log", *given, recognition), recognition
+
+
+def events(contents, messages=()):
+    found, recognition = read(contents)
+    return timeline(found, contents.topics, recognition, messages)
+
+
+def of(found, kind):
+    return [(round(event.time_s, 1), event.text) for event in found if event.kind == kind]
+
+
+def state(times, **values):
+    return {"timestamp": np.array(times, dtype=float)} | {
+        name: np.array(own, dtype=float) for name, own in values.items()
+    }
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot", "betaflight"])
+def test_a_flight_between_the_ground(autopilot):
+    found = events(logs.WRITERS[autopilot](HOP))
+    assert {event.kind for event in found} == {"flown", "take-off", "landing"}
+    (lifts,), (lands,), (flies,) = (of(found, kind) for kind in ("take-off", "landing", "flown"))
+    # It stands to 5 s, flies to 25 s, and stands again; half a second at either end is near the ground.
+    assert abs(lifts[0] - 5.0) < 0.8
+    assert abs(lands[0] - 25.0) < 0.8
+    assert flies[0] == lifts[0]
+
+
+def test_what_px4_states():
+    more = {
+        "vehicle_land_detected": state([0, 5.9, 24.2], landed=[1, 0, 1]),
+        "vehicle_status": state([0, 8, 15], nav_state=[2, 3, 5], failsafe=[0, 0, 1]),
+        "actuator_armed": state([0, 4.5, 27], armed=[0, 1, 0]),
+    }
+    told = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
+    found = events(logs.px4(HOP, more=more), told)
+    assert of(found, "take-off") == [(5.9, "takes off")]
+    assert of(found, "landing") == [(24.2, "lands")]
+    assert of(found, "armed") == [(4.5, "armed"), (27.0, "disarmed")]
+    assert of(found, "mode") == [(0.0, "mode position"), (8.0, "mode mission"), (15.0, "mode return")]
+    assert of(found, "failsafe") == [(15.0, "failsafe")]
+    assert of(found, "message") == [(9.0, "“wind”")]
+    assert [event.time_s for event in found] == sorted(event.time_s for event in found)
+
+
+def test_what_ardupilot_states():
+    more = {
+        "MODE": state([0, 8], Mode=[0, 5], ModeNum=[0, 5]),
+        "EV": state([4.5, 5.6, 24.6, 27], Id=[10, 28, 18, 11]),
+        "ERR": state([10, 12], Subsys=[6, 6], ECode=[1, 0]),
+        "VIBE": state([6, 7, 8, 9], Clip0=[0, 0, 3, 4], Clip1=[2, 2, 2, 2]),
+    }
+    told = ((0.1, "", "ArduCopter V4.5.7 (abc)"), (11.0, "", "EKF3 lane switch 1"))
+    found = events(logs.ardupilot(HOP, more=more), told)
+    assert of(found, "mode") == [(0.0, "mode Stabilize"), (8.0, "mode Loiter")]
+    assert of(found, "take-off") == [(5.6, "takes off")]
+    assert of(found, "failsafe") == [(10.0, "failsafe: battery")]
+    assert of(found, "message") == [(11.0, "“EKF3 lane switch 1”")]
+    assert of(found, "clipping") == [(7.0, "accelerometers clip (VIBE: Clip0 4 times)")]
+
+
+def test_what_betaflight_states():
+    flags = np.where(HOP.time < 4.0, 0, np.where(HOP.time < 15.0, 1, 3)).astype(float)
+    phase = np.where((HOP.time > 18.0) & (HOP.time < 18.5), 1.0, 0.0)
+    found = events(logs.betaflight(HOP, more={"flightModeFlags": flags, "failsafePhase": phase}))
+    assert of(found, "armed") == [(4.0, "armed")]
+    assert of(found, "mode") == [(0.0, "mode acro"), (15.0, "mode angle")]
+    assert of(found, "failsafe") == [(18.0, "failsafe: radio lost")]
+
+
+def test_modes_that_change_often_are_one_line():
+    more = {"MODE": state(range(6, 16), ModeNum=[0, 5] * 5)}
+    assert of(events(logs.ardupilot(HOP, more=more)), "mode") == [(6.0, "the mode changes 9 times: Stabilize, Loiter")]
+
+
+def test_a_crash_tells_its_moments():
+    crashed = ended.hits(flight(seconds=40.0))
+    found = events(logs.px4(crashed))
+    assert [(kind, round(at)) for kind, at in ((e.kind, e.time_s) for e in found) if kind == "impact"] == [
+        ("impact", 40)
+    ]
+    assert not of(found, "landing")
+    assert of(found, "upside down")
+    assert next(event for event in found if event.kind == "impact").severity == "danger"
+    stops = events(logs.px4(ended.stops_in_the_air(flight(seconds=40.0))))
+    assert of(stops, "rotors stop in the air") == [(40.0, "rotors stop in the air")]
+
+
+def test_flips_are_no_crash():
+    own = ended.flips(flight(seconds=30.0))
+    own.rotation = Rotation.from_euler("ZYX", own.angles[:, ::-1])
+    found = events(logs.px4(own))
+    assert not {"impact", "loss of control", "free fall"} & {event.kind for event in found}
+    # Ten of them are one line.
+    assert [text for _, text in of(found, "upside down")] == ["upside down, 10 times"]
+
+
+def test_a_rotor_at_its_limit():
+    contents = logs.px4(OWN)
+    motors = contents.topics["actuator_motors"]
+    motors["control[2]"] = np.where((OWN.time > 6.0) & (OWN.time < 6.4), 1.0, motors["control[2]"])
+    (limit,) = of(events(contents), "limit")
+    assert limit[1].startswith("M3 at its upper limit once, 0.38 s")
+    # The largest of commands that have no limit is none.
+    assert not of(events(logs.px4(OWN)), "limit")
+
+
+def test_clipping_gaps_and_the_battery():
+    contents = logs.betaflight(OWN)
+    columns = contents.topics[""]
+    columns["gyroADC[0]"] = np.where((OWN.time > 6.0) & (OWN.time < 6.05), 1999.0, columns["gyroADC[0]"])
+    columns["vbatLatest"] = np.where((OWN.time > 9.0) & (OWN.time < 9.6), 12.5, columns["vbatLatest"])
+    kept = (OWN.time < 15.0) | (OWN.time > 15.3)
+    columns.update({name: value[kept] for name, value in columns.items()})
+    found = events(contents)
+    assert [at for at, _ in of(found, "clipping")] == [6.0]
+    ((at, text),) = of(found, "battery")
+    assert at == pytest.approx(9.3, abs=0.31)
+    assert text == "the battery sags to 12.5 V, from 16.0 V"
+    assert [(at, text) for at, text in of(found, "gap")] == [(15.0, "no samples for 0.32 s")]
+    assert not [e for e in events(logs.betaflight(OWN)) if e.kind in ("clipping", "gap", "battery")]
+
+
+def test_a_log_that_ends_in_the_air():
+    found = events(logs.px4(OWN))
+    assert [text for _, text in of(found, "end")] == ["the log ends in the air"]
+    assert not of(found, "landing")
+
+
+def test_what_is_logged_and_how_fast():
+    contents = logs.px4(HOP, motors=10, outputs=2)
+    # Every tenth sample of the output is lost.
+    output = contents.topics["vehicle_torque_setpoint"]
+    kept = np.arange(len(output["timestamp"])) % 10 != 4
+    output.update({name: value[kept] for name, value in output.items()})
+    found, recognition = read(contents)
+    log = LookedLog(contents.topics, contents.units, contents.system)
+    logged = what_is_logged(found, log, recognition, 1.7e9, ("one", "two"))
+    assert (logged.rotors, logged.frame, logged.system) == (4, "quad X", "PX4 1.15.0")
+    assert logged.date == "2023-11-14 22:13"
+    assert logged.flown_s == pytest.approx(19.0, abs=0.6)
+    assert logged.spans_s.shape == (1, 2)
+    assert logged.voltage_begin == pytest.approx(16 - 0.01 * logged.spans_s[0, 0], abs=0.01)
+    rows = {row.signal: row for row in logged.signals}
+    assert rows["rotor commands"].rate_hz == pytest.approx(10.0)
+    assert rows["rotor commands"].slow
+    assert rows["body rate"].rate_hz == pytest.approx(100.0)
+    assert not rows["body rate"].slow
+    assert rows["output of the rate loop"].lost == pytest.approx(0.1, abs=0.01)
+    assert rows["output of the rate loop"].longest_gap_s == pytest.approx(0.04)
+    assert rows["setpoint body rate"].source == ""
+    assert "SDLOG_PROFILE" in logged.faster
+    assert logged.warnings == "one\ntwo"
+
+
+def test_readers_give_messages(tmp_path):
+    rows = [("MSG", (2_000_000, b"Mode change")), ("X", (1_000_000, 1.0)), ("X", (3_000_000, 2.0))]
+    path = tmp_path / "log.bin"
+    path.write_bytes(dataflash({"X": ("Qf", "TimeUS,A")}, rows))
+    assert log_contents(path).messages == ((1.0, "", "Mode change"),)
+    path = tmp_path / "log.ulg"
+    said = b"\x34" + (3_600_000_000 + 1_500_000).to_bytes(8, "little") + b"\x1b[31mLow battery\x1b[0m\t"
+    path.write_bytes(
+        ulog([(0, 0, [1.0]), (10_000, 0, [2.0])], {"x": "uint64_t timestamp;float a"}) + message("L", said)
+    )
+    assert log_contents(path).messages == ((1.5, "WARNING", "Low battery"),)
