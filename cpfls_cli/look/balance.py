@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.blocks import half_width
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.look.steady import WINDOW_S, Known, StatedCurve, Windows, jackknifed, on_clock, stated_curve, windows_of
 from cpfls_cli.result import Estimate, about, part, result
@@ -15,8 +16,10 @@ _RATE, _TILT = np.radians(40.0), np.radians(15.0)
 """Most root mean square of the body rates about roll and pitch, and mean rate about yaw; most mean tilt."""
 _AT_LIMIT, _LIMITED = 0.01, 0.02
 """How near to a limit is at it, share of the range; most share of a window at it."""
-_RARE = 0.01
-"""Probability below which a cause does not explain a pattern."""
+_RARE, _NORMAL = 0.01, 1.96
+"""Probability below which a cause does not explain a pattern; half of the interval of a normal error of 1."""
+_MOST = 0.5
+"""Least share of the squared differences that one rotor explains to be listed though others differ too."""
 _TURNED = 0.2
 """Least of one minus the squared mean of the headings' unit vectors, for which the wind is told from the body."""
 _SIGNAL_TO_THRUST = (1.0, 2.0)
@@ -43,7 +46,7 @@ class RotorBalance:
 class Cause:
     """What may make the shares uneven."""
 
-    kind: str = about("rotor, centre of mass, yaw torque, or wind")
+    kind: str = about("rotor, centre of mass, yaw torque, or wind (or the vehicle's own speed)")
     rotor: int = about("number of the rotor where it is one; else 0", default=0)
     alone: bool = about("whether it explains all of the pattern")
     size: Estimate = part()
@@ -299,23 +302,25 @@ class _Trims:
         return tuple(found)
 
     def _single_rotors(self) -> list[Cause]:
-        """List the rotors each of which, weaker or stronger than the others, explains the pattern alone."""
+        """List the rotors each of which explains the pattern alone; else the one that explains most, if most of it."""
         rotors = len(self.expected)
         rows = np.column_stack([np.ones(rotors), self.columns])
         project = rows @ np.linalg.pinv(rows)
         found = []
         for k in range(rotors):
             pattern = project[:, k] - project[:, k].mean()
-            if not self._explained(pattern[:, None]):
-                continue
-            size = self.apart.moved(pattern[None] / (pattern @ pattern)).estimate()
-            if size.low * size.high > 0 and abs(size.value) > SOUND:
-                found.append(Cause(kind="rotor", rotor=k + 1, alone=True, size=size))
-        return found
+            known = self.apart.moved(pattern[None] / (pattern @ pattern))
+            size = known.estimate()
+            share = float(known.value[0] ** 2 * (pattern @ pattern) / (self.apart.value @ self.apart.value))
+            alone = self._explained(pattern[:, None])
+            if size.low * size.high > 0 and abs(size.value) > SOUND and (alone or share > _MOST):
+                found.append((share, Cause(kind="rotor", rotor=k + 1, alone=alone, size=size)))
+        found.sort(key=lambda each: -each[0])
+        return [cause for _, cause in found if cause.alone] or [cause for _, cause in found[:1]]
 
     def _explained(self, patterns: Array) -> bool:
         """Test whether patterns, shape (rotor, pattern), leave nothing but noise and what sound rotors differ by."""
-        from scipy.special import fdtrc
+        from scipy.special import chdtrc
 
         rotors = len(self.expected)
         flat = np.column_stack([np.ones(rotors), patterns])
@@ -323,9 +328,10 @@ class _Trims:
         left = basis.T @ self.apart.value
         if not len(left):
             return True
-        covariance = basis.T @ self.apart.covariance @ basis + SOUND**2 / 4 * np.eye(len(left))
-        statistic = float(left @ np.linalg.solve(covariance, left)) / len(left)
-        return bool(fdtrc(len(left), max(self.apart.blocks - 1, 1), statistic) > _RARE)
+        # As wide as the intervals, which know how few blocks there are.
+        wide = (float(half_width(np.ones(1), self.apart.blocks)[0]) / _NORMAL) ** 2
+        covariance = wide * basis.T @ self.apart.covariance @ basis + SOUND**2 * np.eye(len(left))
+        return bool(chdtrc(len(left), float(left @ np.linalg.solve(covariance, left))) > _RARE)
 
     def _as_thrust(self, given: Estimate, scale: float) -> Estimate:
         """Scale a share of commands to one of thrust, over all curves that may lie between them."""

@@ -18,13 +18,14 @@ from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
 
 _WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
-_ABOVE_HZ, _TELLS_HZ = 10.0, 50.0
+_ABOVE_HZ, _TELLS_HZ = 20.0, 50.0
 """Vibration is what is above the first; a log that ends below the second shows too little of it."""
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
 """A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
 mean of all windows, and so many standard errors."""
-_POWERS = np.arange(-1.0, 1.3, 0.125)
-"""Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded."""
+_POWERS, _FOLDS_HZ = np.arange(-1.0, 1.3, 0.125), 500.0
+"""Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded, which lines are that turn
+faster than half the logged rate; where that is above the second, there are none."""
 _BLOCKS, _BINS = 12, 16
 _ORDERS, _NEAR_ORDER, _PREFERRED_DB = 4, 0.05, 1.0
 """Multiples of a rotor's turns at which it shakes, how near a line is to one, and how much less a line along a rotor's
@@ -46,7 +47,7 @@ class Spectrum:
     signal: str = about("gyroscope before filters, gyroscope, accelerometer, or commands")
     source: str = about("columns of the log")
     rate_hz: float = about("as logged", unit="Hz")
-    rms: Array = about("root mean square above 10 Hz, by channel; rad/s, m/s^2 or share", "channel")
+    rms: Array = about("root mean square above 20 Hz, by channel; rad/s, m/s^2 or share", "channel")
     clipped: float = about("share of samples at the end of the sensor's range")
     frequency: Array = about("frequencies", "frequency", unit="Hz", brief=False)
     density: Array = about("single-sided, squared unit per Hz", "frequency", "channel", brief=False)
@@ -113,11 +114,13 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     if not flight.gyroscope.values.size:
         return None
     before, after = flight.gyroscope_unfiltered, flight.gyroscope
+    if before is not None and before.source == after.source:
+        after = before
     autopilot = AUTOPILOTS.get(flight.autopilot)
     filtered = before is not None or bool(autopilot and after.source.startswith(autopilot.filtered))
     given = [
         ("gyroscope before filters", before if before is not None else None if filtered else after),
-        ("gyroscope", after if filtered else None),
+        ("gyroscope", after if filtered and after is not before else None),
         ("accelerometer", flight.accelerometer),
         ("commands", flight.rotors if flight.rotors_source == "logged" else None),
     ]
@@ -135,7 +138,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         lines=lines,
         lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
         limit=LIMITS.get(flight.autopilot, ()),
-        folds=highest < 500.0,
+        folds=highest < _FOLDS_HZ,
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
         delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
@@ -175,14 +178,16 @@ class _Power(NamedTuple):
         at = windows.begin[:, None] + np.arange(count) / rate
         values = np.stack([np.interp(at, samples.time, channel) for channel in samples.values.T], axis=2)
         taper = np.hanning(count)[:, None]
-        power = np.abs(np.fft.rfft(taper * (values - values.mean(axis=1, keepdims=True)), axis=1)) ** 2
+        # A turn that speeds up leaks less where its straight line is taken off.
+        line = np.linspace(-1, 1, count)[:, None]
+        slope = (line * values).sum(axis=1, keepdims=True) / (line**2).sum()
+        flat = values - values.mean(axis=1, keepdims=True) - slope * line
+        power = np.abs(np.fft.rfft(taper * flat, axis=1)) ** 2
         frequency = np.asarray(np.fft.rfftfreq(count, 1 / rate), dtype=float)
         return cls(samples, windows, frequency, power * 2 / (rate * (taper**2).sum()))
 
     def spectrum(self, name: str) -> Spectrum:
         """Average over windows."""
-        density = self.density.mean(axis=0)
-        shown = self.frequency >= _ABOVE_HZ
         size = np.abs(self.samples.values).max(axis=1)
         ends = {"accelerometer": _CLIPPED_ACCELEROMETER, "commands": ()}.get(name, (_CLIPPED_GYROSCOPE,))
         # A range that is passed is not that of the sensor.
@@ -191,11 +196,21 @@ class _Power(NamedTuple):
             signal=name,
             source=self.samples.source,
             rate_hz=self.samples.rate_hz,
-            rms=np.sqrt(density[shown].sum(axis=0) * self.frequency[1]),
+            rms=self._above(),
             clipped=float(clipped[0]) if clipped else 0.0,
             frequency=self.frequency,
-            density=density,
+            density=self.density.mean(axis=0),
         )
+
+    def _above(self) -> Array:
+        """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
+        time, rate = self.samples.time, self.samples.rate_hz
+        even = np.arange(time[0], time[-1], 1 / rate)
+        values = np.stack([np.interp(even, time, channel) for channel in self.samples.values.T])
+        frequency = np.fft.rfftfreq(len(even), 1 / rate)
+        passed = np.fft.rfft(values, axis=1) / (1 + (_ABOVE_HZ / np.maximum(frequency, 1e-9)) ** 8)
+        quick = np.fft.irfft(passed, len(even), axis=1).T
+        return np.asarray(np.sqrt(np.nanmean(self.windows.means(Samples(even, quick**2)), axis=0)))
 
 
 def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
@@ -238,7 +253,8 @@ def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
             yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
     level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
     known = np.isfinite(level).any()
-    yield _Drive(0, level if known else np.ones(len(level)), _POWERS if known else np.zeros(1))
+    powers = _POWERS if power.frequency[-1] < _FOLDS_HZ else _POWERS[_POWERS > -0.3]
+    yield _Drive(0, level if known else np.ones(len(level)), powers if known else np.zeros(1))
 
 
 def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:

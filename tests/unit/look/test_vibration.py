@@ -78,7 +78,7 @@ def test_logged_speeds_name_the_rotor_and_the_multiple_of_its_turns():
 def test_spectra_have_the_power_of_the_signal():
     """White noise of 0.1 over all frequencies, and a sine of 0.5 about pitch."""
     (spectrum,) = (each for each in vibration_of(shaking()[0]).spectra if each.signal == "gyroscope before filters")
-    noise = 0.1 * np.sqrt(490 / 500)
+    noise = 0.1 * np.sqrt(482 / 500)
     assert spectrum.rms == pytest.approx([noise, np.hypot(noise, 0.5 / np.sqrt(2)), noise], rel=0.02)
 
 
