@@ -23,16 +23,20 @@ _ABOVE_HZ, _TELLS_HZ = 20.0, 50.0
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
 """A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
 mean of all windows, and so many standard errors."""
-_POWERS, _FOLDS_HZ = np.arange(-1.0, 1.3, 0.125), 500.0
+_POWERS, _FOLDS_HZ = np.arange(-1.0, 1.3, 0.125), 450.0
 """Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded, which lines are that turn
 faster than half the logged rate; where that is above the second, there are none."""
-_BLOCKS, _BINS = 12, 16
+_BLOCKS, _BINS, _MOST_WINDOWS = 12, 16, 600
 _ORDERS, _NEAR_ORDER, _PREFERRED_DB = 4, 0.05, 1.0
 """Multiples of a rotor's turns at which it shakes, how near a line is to one, and how much less a line along a rotor's
 turns may rise than along the collective."""
-_FIXED, _MOVES = 0.25, 0.15
+_FIXED, _MOVES = 0.25, 0.1
 _WIDE = 0.15
 """Relative half-width that a line takes with it."""
+_STRONG_DB, _DELAY_HZ = 10.0, 5.0
+"""Height of a line that filters are judged by, and where the delay of a filter is given."""
+_BY_SPEED = ("rpm_filter_harmonics", "gyro_rpm_notch_harmonics")
+"""Betaflight's notches at the speeds that motors report: with them, dynamic notches serve other lines."""
 _CLIPPED_GYROSCOPE, _CLIPPED_ACCELEROMETER = np.radians(1990.0), (78.0, 156.0, 313.0)
 """Ends of the range of usual sensors: 2000 deg/s; 8, 16, 32 g."""
 LIMITS = {"ardupilot": (30.0, 60.0), "px4": (4.905, 9.81)}
@@ -95,14 +99,14 @@ class Change:
 class Vibration:
     """Vibration of one flight."""
 
-    spectra: tuple[Spectrum, ...] = part()
+    spectra: dict[str, Spectrum] = part()
     lines: tuple[Line, ...] = part()
     lines_lack: str = about("why no line can be seen: empty, rate, or time")
     limit: tuple[float, ...] = about("of the autopilot for the accelerometer: doubtful, bad", "level", unit="m/s^2")
     folds: bool = about("whether what is above half the logged rate may be folded below")
     jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
     filters: tuple[StatedFilter, ...] = part()
-    delay_ms: float = about("of all filters of the gyroscope at 5 Hz", unit="ms", gaps=True)
+    delay_ms: float = about("of the static filters of the gyroscope together, at 5 Hz", unit="ms", gaps=True)
     changes: tuple[Change, ...] = part()
     map_collective: Array = about("middle of each bin", "bin", brief=False)
     map_hz: Array = about("frequencies", "map_frequency", unit="Hz", brief=False)
@@ -125,7 +129,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         ("commands", flight.rotors if flight.rotors_source == "logged" else None),
     ]
     parts = {name: _Power.of(flight, each) for name, each in given if each is not None and each.values.size}
-    spectra = tuple(power.spectrum(name) for name, power in parts.items() if power)
+    spectra = {name: power.spectrum(name) for name, power in parts.items() if power}
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
     law = _law(flight, autopilot)
@@ -142,7 +146,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
         delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
-        changes=tuple(_changes(flight, filters, lines)),
+        changes=() if highest < _FOLDS_HZ else tuple(_changes(flight, filters, lines)),
         map_collective=level,
         map_hz=hz,
         map_db=db,
@@ -204,13 +208,15 @@ class _Power(NamedTuple):
 
     def _above(self) -> Array:
         """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
+        from scipy.fft import irfft, next_fast_len, rfft
+
         time, rate = self.samples.time, self.samples.rate_hz
-        even = np.arange(time[0], time[-1], 1 / rate)
+        even = time[0] + np.arange(next_fast_len(int((time[-1] - time[0]) * rate) + 1, real=True)) / rate
         values = np.stack([np.interp(even, time, channel) for channel in self.samples.values.T])
         frequency = np.fft.rfftfreq(len(even), 1 / rate)
-        passed = np.fft.rfft(values, axis=1) / (1 + (_ABOVE_HZ / np.maximum(frequency, 1e-9)) ** 8)
-        quick = np.fft.irfft(passed, len(even), axis=1).T
-        return np.asarray(np.sqrt(np.nanmean(self.windows.means(Samples(even, quick**2)), axis=0)))
+        passed = rfft(values, axis=1) / (1 + (_ABOVE_HZ / np.maximum(frequency, 1e-9)) ** 8)
+        quick = irfft(passed, len(even), axis=1).T
+        return np.asarray(np.sqrt(np.mean(self.windows.means(Samples(even, quick**2)), axis=0)))
 
 
 def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
@@ -262,6 +268,8 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     from scipy.ndimage import median_filter
 
     rate, spacing = power.samples.rate_hz, power.frequency[1]
+    thinned = slice(None, None, len(power.windows.begin) // _MOST_WINDOWS + 1)
+    power = power._replace(windows=power.windows.keep(thinned), density=power.density[thinned])
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
     above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
@@ -379,55 +387,41 @@ class _Table:
 
 
 def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Line, ...]) -> Iterator[StatedFilter]:
-    """List the filters of the law about roll, or about the axis that alone has them."""
-    back = np.exp(-2j * np.pi * np.array([5.0]) * law.period)
-    fixed = [line for line in lines if line.kind == "fixed"]
-    seen: set[Filter] = set()
+    """List the filters of the law, one of several axes once."""
+    back = np.exp(-2j * np.pi * np.array([_DELAY_HZ]) * law.period)
+    fixed = [line.hz for line in lines if line.kind == "fixed"]
     stated = autopilot.of_log(autopilot.in_log(flight.parameters))
-    for axis, own in zip(AXES, law.axes, strict=True):
-        for stage in STAGES:
-            for each in getattr(own, stage):
-                names = [
-                    parameter.name
-                    for parameter in autopilot.parameters
-                    if parameter.role.partition(".")[2].startswith(f"{stage}.{each.kind}")
-                    and parameter.role.partition(".")[0] in (axis, "all", "tilt")
-                    and parameter.unit == "Hz"
-                    and stated[parameter.name] * parameter.scale == each.hz
-                ]
-                if each in seen or not names:
-                    continue
-                seen.add(each)
+    seen: set[tuple[str, Filter]] = set()
+    for parameter in autopilot.parameters:
+        group, stage, kind = (*parameter.role.split("."), "", "")[:3]
+        own = getattr(law.axes[AXES.index(group) if group in AXES else 0], stage) if stage in STAGES else ()
+        hz = stated[parameter.name] * parameter.scale
+        for each in (each for each in own if each.kind == kind.rstrip("2") and each.hz == hz):
+            if (stage, each) not in seen:
+                seen.add((stage, each))
+                phase = -float(np.angle(chain((each,), back, law.period))[0])
                 yield StatedFilter(
-                    parameter=names[0],
+                    parameter=parameter.name,
                     stage=stage,
                     kind=each.kind,
                     hz=each.hz,
                     width_hz=each.width_hz,
-                    delay_ms=float(-np.angle(chain((each,), back, law.period))[0] / (2 * np.pi * 5.0) * 1e3),
-                    line_hz=fixed[0].hz if fixed and each.kind == "notch" else np.nan,
+                    delay_ms=1e3 * phase / (2 * np.pi * _DELAY_HZ),
+                    line_hz=fixed[0] if fixed and each.kind == "notch" else np.nan,
                 )
 
 
 def _changes(flight: LogFlight, filters: tuple[StatedFilter, ...], lines: tuple[Line, ...]) -> Iterator[Change]:
-    """Propose what is sure: a notch beside the one fixed line, and ends of dynamic notches that leave a line out."""
+    """Propose what is sure: a notch beside the one fixed line, and dynamic notches that begin above a motor's line."""
     notches = [each for each in filters if each.kind == "notch" and each.stage == "measured"]
-    fixed = [line for line in lines if line.kind == "fixed" and line.above_db > 10]
-    if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0].hz) > 0.5 * notches[0].width_hz:
-        yield Change(
-            parameter=notches[0].parameter,
-            now=notches[0].hz,
-            proposed=float(round(fixed[0].hz)),
-            reason="notch beside the line",
-        )
-    moving = [line for line in lines if line.kind in ("moves", "rotor") and line.above_db > 10]
-    low, high = (number(flight, f"dyn_notch_{end}_hz") for end in ("min", "max"))
-    if moving and low and high and (number(flight, "dyn_notch_count") or 0) > 0:
-        least = min(line.lowest_hz for line in moving)
-        if least < low:
-            yield Change(
-                parameter="dyn_notch_min_hz",
-                now=low,
-                proposed=float(np.floor(least / 10) * 10),
-                reason="line outside the range of dynamic notches",
-            )
+    fixed = [line.hz for line in lines if line.kind == "fixed" and line.above_db > _STRONG_DB]
+    if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0]) > 0.5 * notches[0].width_hz:
+        now, proposed = notches[0].hz, float(round(fixed[0]))
+        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch beside the line")
+    moving = [line.lowest_hz for line in lines if line.kind in ("moves", "rotor") and line.above_db > _STRONG_DB]
+    count, low = (number(flight, f"dyn_notch_{name}") or 0.0 for name in ("count", "min_hz"))
+    by_speed = any(number(flight, name) for name in _BY_SPEED)
+    if moving and count > 0 and min(moving) < low and not by_speed:
+        proposed = float(np.floor(min(moving) / 10) * 10)
+        reason = "line outside the range of dynamic notches"
+        yield Change(parameter="dyn_notch_min_hz", now=low, proposed=proposed, reason=reason)
