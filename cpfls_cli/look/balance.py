@@ -62,7 +62,7 @@ class Balance:
     SHOWN = ("uneven",)
 
     measured_by: str = about("rotor speed (squared), thrust curve (of the autopilot), or command (thrust not known)")
-    lacks: str = about("why there are no shares: empty, steady flight, or places")
+    lacks: str = about("what is missing: empty, steady flight (no shares), or places of the rotors (no causes)")
     steady_s: float = about("steady flight that is used", unit="s")
     blocks: int = about("blocks of the jackknife")
     rotors: tuple[RotorBalance, ...] = part()
@@ -107,21 +107,23 @@ def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
     windows = _steady(flight, stated, source)
     thrust = windows.means(source)
     shares = thrust / thrust.mean(axis=1, keepdims=True)
-    heading = _heading(flight, windows)
+    yaw = flight.attitude[:, 2]
+    north, east = windows.means(on_clock(flight, np.stack([np.cos(yaw), np.sin(yaw)], axis=1))).T
+    heading = np.arctan2(east, north)
     expected = _expected(flight, shares.shape[1])
     means = jackknifed(lambda kept: shares[kept].mean(axis=0), len(shares))
-    trims = _Trims(flight, means, expected, measured_by) if means and flight.places is not None else None
+    placed = len(_columns(flight)) == len(expected)
+    trims = _Trims(flight, means, expected, measured_by) if means and placed else None
     lean = trims.leans(shares, heading) if trims else None
-    first = {"steady flight": means is None, "places": trims is None}
     return Balance(
         measured_by=measured_by,
-        lacks=next((what for what, lacking in first.items() if lacking), ""),
+        lacks="steady flight" if means is None else "places" if trims is None else "",
         steady_s=len(shares) * WINDOW_S,
         blocks=means.blocks if means else 0,
         rotors=_rows(flight, stated, windows, shares, means, expected),
         roll=trims.known.estimate(0) if trims else None,
         pitch=trims.known.estimate(1) if trims else None,
-        yaw=trims.known.estimate(2) if trims else None,
+        yaw=trims.known.estimate(2) if trims and flight.spins is not None else None,
         turned=_spread(heading),
         fixed_forward=lean.estimate(0) if lean else None,
         fixed_right=lean.estimate(1) if lean else None,
@@ -158,12 +160,6 @@ def _steady(flight: LogFlight, stated: StatedCurve, source: Samples) -> Windows:
         steady &= ~(windows.means(flight.rotors._replace(values=limited)).max(axis=1) > _LIMITED)
     thrust = windows.means(source)
     return windows.keep(steady & np.isfinite(thrust).all(axis=1) & (thrust > 0).all(axis=1))
-
-
-def _heading(flight: LogFlight, windows: Windows) -> Array:
-    """Average the heading over windows, rad; NaN where the log has none."""
-    parts = windows.means(on_clock(flight, np.stack([np.cos(flight.attitude[:, 2]), np.sin(flight.attitude[:, 2])], 1)))
-    return np.arctan2(parts[:, 1], parts[:, 0])
 
 
 def _spread(heading: Array) -> float:
@@ -255,8 +251,7 @@ class _Trims:
         columns, rotors = _columns(flight), len(expected)
         self.columns = columns
         self.measured_by, self.expected = measured_by, expected
-        apart = means.moved(np.eye(rotors))
-        self.apart = Known(apart.value - expected, apart.half, apart.covariance, apart.blocks)
+        self.apart = means._replace(value=means.value - expected)
         centred = columns - columns.mean(axis=0)
         # Right rotors push less to roll to the right.
         signs = np.array([0, -1, 0]), np.array([1, 0, 0]), np.array([0, 0, 1])
