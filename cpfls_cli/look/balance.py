@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.blocks import half_width
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.look.steady import WINDOW_S, Known, StatedCurve, Windows, jackknifed, on_clock, stated_curve, windows_of
 from cpfls_cli.result import Estimate, about, part, result
@@ -15,8 +16,10 @@ _RATE, _TILT = np.radians(40.0), np.radians(15.0)
 """Most root mean square of the body rates about roll and pitch, and mean rate about yaw; most mean tilt."""
 _AT_LIMIT, _LIMITED = 0.01, 0.02
 """How near to a limit is at it, share of the range; most share of a window at it."""
-_RARE = 0.01
-"""Probability below which a cause does not explain a pattern."""
+_RARE, _NORMAL = 0.01, 1.96
+"""Probability below which a cause does not explain a pattern; half of the interval of a normal error of 1."""
+_MOST = 0.5
+"""Least share of the squared differences that one rotor explains to be listed though others differ too."""
 _TURNED = 0.2
 """Least of one minus the squared mean of the headings' unit vectors, for which the wind is told from the body."""
 _SIGNAL_TO_THRUST = (1.0, 2.0)
@@ -43,7 +46,7 @@ class RotorBalance:
 class Cause:
     """What may make the shares uneven."""
 
-    kind: str = about("rotor, centre of mass, yaw torque, or wind")
+    kind: str = about("rotor, centre of mass, yaw torque, or wind (or the vehicle's own speed)")
     rotor: int = about("number of the rotor where it is one; else 0", default=0)
     alone: bool = about("whether it explains all of the pattern")
     size: Estimate = part()
@@ -59,7 +62,7 @@ class Balance:
     SHOWN = ("uneven",)
 
     measured_by: str = about("rotor speed (squared), thrust curve (of the autopilot), or command (thrust not known)")
-    lacks: str = about("why there are no shares: empty, steady flight, or places")
+    lacks: str = about("what is missing: empty, steady flight (no shares), or places of the rotors (no causes)")
     steady_s: float = about("steady flight that is used", unit="s")
     blocks: int = about("blocks of the jackknife")
     rotors: tuple[RotorBalance, ...] = part()
@@ -104,21 +107,23 @@ def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
     windows = _steady(flight, stated, source)
     thrust = windows.means(source)
     shares = thrust / thrust.mean(axis=1, keepdims=True)
-    heading = _heading(flight, windows)
+    yaw = flight.attitude[:, 2]
+    north, east = windows.means(on_clock(flight, np.stack([np.cos(yaw), np.sin(yaw)], axis=1))).T
+    heading = np.arctan2(east, north)
     expected = _expected(flight, shares.shape[1])
     means = jackknifed(lambda kept: shares[kept].mean(axis=0), len(shares))
-    trims = _Trims(flight, means, expected, measured_by) if means and flight.places is not None else None
+    placed = len(_columns(flight)) == len(expected)
+    trims = _Trims(flight, means, expected, measured_by) if means and placed else None
     lean = trims.leans(shares, heading) if trims else None
-    first = {"steady flight": means is None, "places": trims is None}
     return Balance(
         measured_by=measured_by,
-        lacks=next((what for what, lacking in first.items() if lacking), ""),
+        lacks="steady flight" if means is None else "places" if trims is None else "",
         steady_s=len(shares) * WINDOW_S,
         blocks=means.blocks if means else 0,
         rotors=_rows(flight, stated, windows, shares, means, expected),
         roll=trims.known.estimate(0) if trims else None,
         pitch=trims.known.estimate(1) if trims else None,
-        yaw=trims.known.estimate(2) if trims else None,
+        yaw=trims.known.estimate(2) if trims and flight.spins is not None else None,
         turned=_spread(heading),
         fixed_forward=lean.estimate(0) if lean else None,
         fixed_right=lean.estimate(1) if lean else None,
@@ -155,12 +160,6 @@ def _steady(flight: LogFlight, stated: StatedCurve, source: Samples) -> Windows:
         steady &= ~(windows.means(flight.rotors._replace(values=limited)).max(axis=1) > _LIMITED)
     thrust = windows.means(source)
     return windows.keep(steady & np.isfinite(thrust).all(axis=1) & (thrust > 0).all(axis=1))
-
-
-def _heading(flight: LogFlight, windows: Windows) -> Array:
-    """Average the heading over windows, rad; NaN where the log has none."""
-    parts = windows.means(on_clock(flight, np.stack([np.cos(flight.attitude[:, 2]), np.sin(flight.attitude[:, 2])], 1)))
-    return np.arctan2(parts[:, 1], parts[:, 0])
 
 
 def _spread(heading: Array) -> float:
@@ -252,8 +251,7 @@ class _Trims:
         columns, rotors = _columns(flight), len(expected)
         self.columns = columns
         self.measured_by, self.expected = measured_by, expected
-        apart = means.moved(np.eye(rotors))
-        self.apart = Known(apart.value - expected, apart.half, apart.covariance, apart.blocks)
+        self.apart = means._replace(value=means.value - expected)
         centred = columns - columns.mean(axis=0)
         # Right rotors push less to roll to the right.
         signs = np.array([0, -1, 0]), np.array([1, 0, 0]), np.array([0, 0, 1])
@@ -299,23 +297,25 @@ class _Trims:
         return tuple(found)
 
     def _single_rotors(self) -> list[Cause]:
-        """List the rotors each of which, weaker or stronger than the others, explains the pattern alone."""
+        """List the rotors each of which explains the pattern alone; else the one that explains most, if most of it."""
         rotors = len(self.expected)
         rows = np.column_stack([np.ones(rotors), self.columns])
         project = rows @ np.linalg.pinv(rows)
         found = []
         for k in range(rotors):
             pattern = project[:, k] - project[:, k].mean()
-            if not self._explained(pattern[:, None]):
-                continue
-            size = self.apart.moved(pattern[None] / (pattern @ pattern)).estimate()
-            if size.low * size.high > 0 and abs(size.value) > SOUND:
-                found.append(Cause(kind="rotor", rotor=k + 1, alone=True, size=size))
-        return found
+            known = self.apart.moved(pattern[None] / (pattern @ pattern))
+            size = known.estimate()
+            share = float(known.value[0] ** 2 * (pattern @ pattern) / (self.apart.value @ self.apart.value))
+            alone = self._explained(pattern[:, None])
+            if size.low * size.high > 0 and abs(size.value) > SOUND and (alone or share > _MOST):
+                found.append((share, Cause(kind="rotor", rotor=k + 1, alone=alone, size=size)))
+        found.sort(key=lambda each: -each[0])
+        return [cause for _, cause in found if cause.alone] or [cause for _, cause in found[:1]]
 
     def _explained(self, patterns: Array) -> bool:
         """Test whether patterns, shape (rotor, pattern), leave nothing but noise and what sound rotors differ by."""
-        from scipy.special import fdtrc
+        from scipy.special import chdtrc
 
         rotors = len(self.expected)
         flat = np.column_stack([np.ones(rotors), patterns])
@@ -323,9 +323,10 @@ class _Trims:
         left = basis.T @ self.apart.value
         if not len(left):
             return True
-        covariance = basis.T @ self.apart.covariance @ basis + SOUND**2 / 4 * np.eye(len(left))
-        statistic = float(left @ np.linalg.solve(covariance, left)) / len(left)
-        return bool(fdtrc(len(left), max(self.apart.blocks - 1, 1), statistic) > _RARE)
+        # As wide as the intervals, which know how few blocks there are.
+        wide = (float(half_width(np.ones(1), self.apart.blocks)[0]) / _NORMAL) ** 2
+        covariance = wide * basis.T @ self.apart.covariance @ basis + SOUND**2 * np.eye(len(left))
+        return bool(chdtrc(len(left), float(left @ np.linalg.solve(covariance, left))) > _RARE)
 
     def _as_thrust(self, given: Estimate, scale: float) -> Estimate:
         """Scale a share of commands to one of thrust, over all curves that may lie between them."""

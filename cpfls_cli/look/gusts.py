@@ -17,7 +17,7 @@ _BAND_HZ, _OF_RATE = (0.2, 6.0), 0.2
 """Band of the fit: above what a piece tells apart, and below where plant and sensors count; share of the sampling rate
 it stays below."""
 _MEMORY_S, _SEEN_S = (0.02, 5.0), (0.04, 0.8)
-"""Time constants that are tried, and those whose corner lies within the band: of others the size is not known."""
+"""Time constants that are tried, and what an interval of them has to lie within, for corners in the band."""
 
 
 class Driven(NamedTuple):
@@ -96,8 +96,13 @@ def _spectrum(frequency: Array, size: float, memory: float, noise: float) -> Arr
 
 
 def _fitted(frequency: Array, power: Array) -> Array:
-    """Fit size, memory and noise by the likelihood of a spectrum (Whittle); logarithms of these and of the size
-    within the band, shape (4,)."""
+    """Fit size, memory and noise by the likelihood of a spectrum (Whittle).
+
+    Returns
+    -------
+    array, shape (4,)
+        Logarithms of them, and of the size within the band.
+    """
     from scipy.optimize import minimize
 
     spacing = frequency[1] - frequency[0]
@@ -111,9 +116,10 @@ def _fitted(frequency: Array, power: Array) -> Array:
     begin = np.log([np.sqrt(whole), 0.3, 0.1 * floor])
     memory = np.log(_MEMORY_S)
     ends = [(begin[0] - 6, begin[0] + 3), (memory[0], memory[1]), (begin[2] - 12, begin[2] + 6)]
-    size, memory, noise = minimize(unlikely, begin, bounds=ends, method="L-BFGS-B").x
-    gusts = _spectrum(frequency, np.exp(size), np.exp(memory), 0.0).sum() * spacing
-    return np.array([size, memory, noise, 0.5 * np.log(gusts)])
+    logs = minimize(unlikely, begin, bounds=ends, method="L-BFGS-B").x
+    size, memory = np.exp(logs[:2])
+    gusts = _spectrum(frequency, float(size), float(memory), 0.0).sum() * spacing
+    return np.array([*logs, 0.5 * np.log(gusts)])
 
 
 def _described(axis: str, known: Known, frequency: Array, power: Array, moved: Array) -> AxisGusts:
@@ -121,7 +127,7 @@ def _described(axis: str, known: Known, frequency: Array, power: Array, moved: A
         Estimate(value=float(np.exp(each.value)), low=float(np.exp(each.low)), high=float(np.exp(each.high)))
         for each in (known.estimate(k) for k in (0, 1, 3))
     )
-    inside = _SEEN_S[0] < memory.value < _SEEN_S[1]
+    inside = _SEEN_S[0] < memory.low and memory.high < _SEEN_S[1]
     return AxisGusts(
         axis=axis,
         in_band=in_band,

@@ -44,8 +44,8 @@ class Windows(NamedTuple):
         whole = (finite[after] - finite[first] == count) & (count > _WHOLE * self.length_s * samples.rate_hz)
         return np.where(whole, (sums[after] - sums[first]) / np.maximum(count, 1), np.nan)
 
-    def keep(self, marked: BoolArray) -> Windows:
-        """Keep the windows that are marked, shape (window,)."""
+    def keep(self, marked: BoolArray | slice) -> Windows:
+        """Keep the windows that are marked, shape (window,), or in a slice."""
         return Windows(self.begin[marked], self.length_s)
 
 

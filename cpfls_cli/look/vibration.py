@@ -18,20 +18,25 @@ from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
 
 _WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
-_ABOVE_HZ, _TELLS_HZ = 10.0, 50.0
+_ABOVE_HZ, _TELLS_HZ = 20.0, 50.0
 """Vibration is what is above the first; a log that ends below the second shows too little of it."""
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
 """A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
 mean of all windows, and so many standard errors."""
-_POWERS = np.arange(-1.0, 1.3, 0.125)
-"""Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded."""
-_BLOCKS, _BINS = 12, 16
+_POWERS, _FOLDS_HZ = np.arange(-1.0, 1.3, 0.125), 450.0
+"""Powers of the collective that a line's frequency may go with: 0 stays, below 0 is folded, which lines are that turn
+faster than half the logged rate; where that is above the second, there are none."""
+_BLOCKS, _BINS, _MOST_WINDOWS = 12, 16, 600
 _ORDERS, _NEAR_ORDER, _PREFERRED_DB = 4, 0.05, 1.0
 """Multiples of a rotor's turns at which it shakes, how near a line is to one, and how much less a line along a rotor's
 turns may rise than along the collective."""
-_FIXED, _MOVES = 0.25, 0.15
+_FIXED, _MOVES = 0.25, 0.1
 _WIDE = 0.15
 """Relative half-width that a line takes with it."""
+_STRONG_DB, _DELAY_HZ = 10.0, 5.0
+"""Height of a line that filters are judged by, and where the delay of a filter is given."""
+_BY_SPEED = ("rpm_filter_harmonics", "gyro_rpm_notch_harmonics")
+"""Betaflight's notches at the speeds that motors report: with them, dynamic notches serve other lines."""
 _CLIPPED_GYROSCOPE, _CLIPPED_ACCELEROMETER = np.radians(1990.0), (78.0, 156.0, 313.0)
 """Ends of the range of usual sensors: 2000 deg/s; 8, 16, 32 g."""
 LIMITS = {"ardupilot": (30.0, 60.0), "px4": (4.905, 9.81)}
@@ -46,7 +51,7 @@ class Spectrum:
     signal: str = about("gyroscope before filters, gyroscope, accelerometer, or commands")
     source: str = about("columns of the log")
     rate_hz: float = about("as logged", unit="Hz")
-    rms: Array = about("root mean square above 10 Hz, by channel; rad/s, m/s^2 or share", "channel")
+    rms: Array = about("root mean square above 20 Hz, by channel; rad/s, m/s^2 or share", "channel")
     clipped: float = about("share of samples at the end of the sensor's range")
     frequency: Array = about("frequencies", "frequency", unit="Hz", brief=False)
     density: Array = about("single-sided, squared unit per Hz", "frequency", "channel", brief=False)
@@ -101,7 +106,7 @@ class Vibration:
     folds: bool = about("whether what is above half the logged rate may be folded below")
     jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
     filters: tuple[StatedFilter, ...] = part()
-    delay_ms: float = about("of all filters of the gyroscope at 5 Hz", unit="ms", gaps=True)
+    delay_ms: float = about("of the static filters of the gyroscope together, at 5 Hz", unit="ms", gaps=True)
     changes: tuple[Change, ...] = part()
     map_collective: Array = about("middle of each bin", "bin", brief=False)
     map_hz: Array = about("frequencies", "map_frequency", unit="Hz", brief=False)
@@ -113,11 +118,13 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     if not flight.gyroscope.values.size:
         return None
     before, after = flight.gyroscope_unfiltered, flight.gyroscope
+    if before is not None and before.source == after.source:
+        after = before
     autopilot = AUTOPILOTS.get(flight.autopilot)
     filtered = before is not None or bool(autopilot and after.source.startswith(autopilot.filtered))
     given = [
         ("gyroscope before filters", before if before is not None else None if filtered else after),
-        ("gyroscope", after if filtered else None),
+        ("gyroscope", after if filtered and after is not before else None),
         ("accelerometer", flight.accelerometer),
         ("commands", flight.rotors if flight.rotors_source == "logged" else None),
     ]
@@ -135,11 +142,11 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         lines=lines,
         lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
         limit=LIMITS.get(flight.autopilot, ()),
-        folds=highest < 500.0,
+        folds=highest < _FOLDS_HZ,
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
         delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
-        changes=tuple(_changes(flight, filters, lines)),
+        changes=() if highest < _FOLDS_HZ else tuple(_changes(flight, filters, lines)),
         map_collective=level,
         map_hz=hz,
         map_db=db,
@@ -175,14 +182,16 @@ class _Power(NamedTuple):
         at = windows.begin[:, None] + np.arange(count) / rate
         values = np.stack([np.interp(at, samples.time, channel) for channel in samples.values.T], axis=2)
         taper = np.hanning(count)[:, None]
-        power = np.abs(np.fft.rfft(taper * (values - values.mean(axis=1, keepdims=True)), axis=1)) ** 2
+        # A turn that speeds up leaks less where its straight line is taken off.
+        line = np.linspace(-1, 1, count)[:, None]
+        slope = (line * values).sum(axis=1, keepdims=True) / (line**2).sum()
+        flat = values - values.mean(axis=1, keepdims=True) - slope * line
+        power = np.abs(np.fft.rfft(taper * flat, axis=1)) ** 2
         frequency = np.asarray(np.fft.rfftfreq(count, 1 / rate), dtype=float)
         return cls(samples, windows, frequency, power * 2 / (rate * (taper**2).sum()))
 
     def spectrum(self, name: str) -> Spectrum:
         """Average over windows."""
-        density = self.density.mean(axis=0)
-        shown = self.frequency >= _ABOVE_HZ
         size = np.abs(self.samples.values).max(axis=1)
         ends = {"accelerometer": _CLIPPED_ACCELEROMETER, "commands": ()}.get(name, (_CLIPPED_GYROSCOPE,))
         # A range that is passed is not that of the sensor.
@@ -191,11 +200,23 @@ class _Power(NamedTuple):
             signal=name,
             source=self.samples.source,
             rate_hz=self.samples.rate_hz,
-            rms=np.sqrt(density[shown].sum(axis=0) * self.frequency[1]),
+            rms=self._above(),
             clipped=float(clipped[0]) if clipped else 0.0,
             frequency=self.frequency,
-            density=density,
+            density=self.density.mean(axis=0),
         )
+
+    def _above(self) -> Array:
+        """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
+        from scipy.fft import irfft, next_fast_len, rfft
+
+        time, rate = self.samples.time, self.samples.rate_hz
+        even = time[0] + np.arange(next_fast_len(int((time[-1] - time[0]) * rate) + 1, real=True)) / rate
+        values = np.stack([np.interp(even, time, channel) for channel in self.samples.values.T])
+        frequency = np.fft.rfftfreq(len(even), 1 / rate)
+        passed = rfft(values, axis=1) / (1 + (_ABOVE_HZ / np.maximum(frequency, 1e-9)) ** 8)
+        quick = irfft(passed, len(even), axis=1).T
+        return np.asarray(np.sqrt(np.mean(self.windows.means(Samples(even, quick**2)), axis=0)))
 
 
 def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
@@ -238,7 +259,8 @@ def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
             yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
     level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
     known = np.isfinite(level).any()
-    yield _Drive(0, level if known else np.ones(len(level)), _POWERS if known else np.zeros(1))
+    powers = _POWERS if power.frequency[-1] < _FOLDS_HZ else _POWERS[_POWERS > -0.3]
+    yield _Drive(0, level if known else np.ones(len(level)), powers if known else np.zeros(1))
 
 
 def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
@@ -246,6 +268,8 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     from scipy.ndimage import median_filter
 
     rate, spacing = power.samples.rate_hz, power.frequency[1]
+    thinned = slice(None, None, len(power.windows.begin) // _MOST_WINDOWS + 1)
+    power = power._replace(windows=power.windows.keep(thinned), density=power.density[thinned])
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
     above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
@@ -363,55 +387,41 @@ class _Table:
 
 
 def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Line, ...]) -> Iterator[StatedFilter]:
-    """List the filters of the law about roll, or about the axis that alone has them."""
-    back = np.exp(-2j * np.pi * np.array([5.0]) * law.period)
-    fixed = [line for line in lines if line.kind == "fixed"]
-    seen: set[Filter] = set()
+    """List the filters of the law, one of several axes once."""
+    back = np.exp(-2j * np.pi * np.array([_DELAY_HZ]) * law.period)
+    fixed = [line.hz for line in lines if line.kind == "fixed"]
     stated = autopilot.of_log(autopilot.in_log(flight.parameters))
-    for axis, own in zip(AXES, law.axes, strict=True):
-        for stage in STAGES:
-            for each in getattr(own, stage):
-                names = [
-                    parameter.name
-                    for parameter in autopilot.parameters
-                    if parameter.role.partition(".")[2].startswith(f"{stage}.{each.kind}")
-                    and parameter.role.partition(".")[0] in (axis, "all", "tilt")
-                    and parameter.unit == "Hz"
-                    and stated[parameter.name] * parameter.scale == each.hz
-                ]
-                if each in seen or not names:
-                    continue
-                seen.add(each)
+    seen: set[tuple[str, Filter]] = set()
+    for parameter in autopilot.parameters:
+        group, stage, kind = (*parameter.role.split("."), "", "")[:3]
+        own = getattr(law.axes[AXES.index(group) if group in AXES else 0], stage) if stage in STAGES else ()
+        hz = stated[parameter.name] * parameter.scale
+        for each in (each for each in own if each.kind == kind.rstrip("2") and each.hz == hz):
+            if (stage, each) not in seen:
+                seen.add((stage, each))
+                phase = -float(np.angle(chain((each,), back, law.period))[0])
                 yield StatedFilter(
-                    parameter=names[0],
+                    parameter=parameter.name,
                     stage=stage,
                     kind=each.kind,
                     hz=each.hz,
                     width_hz=each.width_hz,
-                    delay_ms=float(-np.angle(chain((each,), back, law.period))[0] / (2 * np.pi * 5.0) * 1e3),
-                    line_hz=fixed[0].hz if fixed and each.kind == "notch" else np.nan,
+                    delay_ms=1e3 * phase / (2 * np.pi * _DELAY_HZ),
+                    line_hz=fixed[0] if fixed and each.kind == "notch" else np.nan,
                 )
 
 
 def _changes(flight: LogFlight, filters: tuple[StatedFilter, ...], lines: tuple[Line, ...]) -> Iterator[Change]:
-    """Propose what is sure: a notch beside the one fixed line, and ends of dynamic notches that leave a line out."""
+    """Propose what is sure: a notch beside the one fixed line, and dynamic notches that begin above a motor's line."""
     notches = [each for each in filters if each.kind == "notch" and each.stage == "measured"]
-    fixed = [line for line in lines if line.kind == "fixed" and line.above_db > 10]
-    if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0].hz) > 0.5 * notches[0].width_hz:
-        yield Change(
-            parameter=notches[0].parameter,
-            now=notches[0].hz,
-            proposed=float(round(fixed[0].hz)),
-            reason="notch beside the line",
-        )
-    moving = [line for line in lines if line.kind in ("moves", "rotor") and line.above_db > 10]
-    low, high = (number(flight, f"dyn_notch_{end}_hz") for end in ("min", "max"))
-    if moving and low and high and (number(flight, "dyn_notch_count") or 0) > 0:
-        least = min(line.lowest_hz for line in moving)
-        if least < low:
-            yield Change(
-                parameter="dyn_notch_min_hz",
-                now=low,
-                proposed=float(np.floor(least / 10) * 10),
-                reason="line outside the range of dynamic notches",
-            )
+    fixed = [line.hz for line in lines if line.kind == "fixed" and line.above_db > _STRONG_DB]
+    if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0]) > 0.5 * notches[0].width_hz:
+        now, proposed = notches[0].hz, float(round(fixed[0]))
+        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch beside the line")
+    moving = [line.lowest_hz for line in lines if line.kind in ("moves", "rotor") and line.above_db > _STRONG_DB]
+    count, low = (number(flight, f"dyn_notch_{name}") or 0.0 for name in ("count", "min_hz"))
+    by_speed = any(number(flight, name) for name in _BY_SPEED)
+    if moving and count > 0 and min(moving) < low and not by_speed:
+        proposed = float(np.floor(min(moving) / 10) * 10)
+        reason = "line outside the range of dynamic notches"
+        yield Change(parameter="dyn_notch_min_hz", now=low, proposed=proposed, reason=reason)

@@ -134,6 +134,7 @@ def test_what_is_lacking_is_named():
     assert balance_of(fast).lacks == "steady flight"
     assert all(rotor.share is None for rotor in balance_of(fast).rotors)
     assert balance_of(replace(flight, places=None)).lacks == "places"
+    assert balance_of(replace(flight, spins=None)).yaw is None
     assert balance_of(replace(flight, rotors=Samples(np.empty(0), np.empty((0, 0))))) is None
 
 
