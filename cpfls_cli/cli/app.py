@@ -18,6 +18,7 @@ from cpfls_cli.cli.options import (
     OutputOption,
     SeveralAfterOption,
     moments,
+    refuse_overrides,
     seconds,
     sheet,
     with_common,
@@ -41,7 +42,7 @@ from cpfls_cli.cli.path_options import (
 )
 from cpfls_cli.cli.stages import AllCommands
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
@@ -549,10 +550,23 @@ def response(
 
 @_command()
 def tune(
-    config: ConfigArgument,
-    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Vehicle, made by `cpfls vehicle`.")],
-    output: OutputOption,
-    autopilot: Annotated[AutopilotChoice, typer.Option("--autopilot", help="Whose control law and parameters.")],
+    config: Annotated[
+        Path, typer.Argument(metavar="CONFIG|LOG", help="Study config (YAML); or a log, alone.", show_default=False)
+    ],
+    model: Annotated[
+        Path | None,
+        typer.Argument(metavar="VEHICLE", help="With CONFIG: vehicle, made by `cpfls vehicle`.", show_default=False),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="File to write; of a LOG parameters that change.", show_default=False
+        ),
+    ] = None,
+    autopilot: Annotated[
+        AutopilotChoice | None,
+        typer.Option("--autopilot", help="With CONFIG: whose control law and parameters; a LOG says it."),
+    ] = None,
     flights: Annotated[
         list[Path] | None,
         typer.Option(
@@ -572,13 +586,42 @@ def tune(
     *,
     common: Common,
 ) -> None:
-    """Find gains for an autopilot that keep their margins with every vehicle that the flights leave possible."""
+    """Find gains for an autopilot that keep their margins with every vehicle that flights, or a log, leave possible."""
+    asked = (gain_margin, phase_margin, disk_margin)
+    if model is None:
+        _tune_log(config, output, autopilot, flights, asked, common)
+        return
+    if output is None or autopilot is None:
+        raise typer.BadParameter("with a config and a vehicle, -o FILE and --autopilot are needed, too")
+    whose = autopilot.value
+    _run(
+        "tune",
+        config,
+        output,
+        common,
+        lambda command, job: command.run(job, model, whose, flights or (), command.AskedMargins(*asked)),
+    )
 
-    def call(command: Any, job: Job) -> Any:
-        asked = command.AskedMargins(gain_margin, phase_margin, disk_margin)
-        return command.run(job, model, autopilot.value, flights or (), asked)
 
-    _run("tune", config, output, common, call)
+def _tune_log(
+    log: Path,
+    output: Path | None,
+    autopilot: AutopilotChoice | None,
+    flights: list[Path] | None,
+    asked: tuple[float, float, float],
+    common: Common,
+) -> None:
+    """Find gains from a log alone."""
+    with messages_for_errors():
+        refuse_overrides(common)
+        if autopilot is not None or flights:
+            raise InputError(f"{log}: with a log alone leave --autopilot and --flight out; the log says both")
+        from cpfls_cli.cli.misplaced import refuse_misplaced_log
+
+        refuse_misplaced_log(log, "a config needs the vehicle that `cpfls vehicle` found, too")
+        command = _of("tune")
+        margins = command.AskedMargins(*asked)
+        tell(command.run_log(log, output, margins, force=common.force, dry_run=common.dry_run), common)
 
 
 @_command()

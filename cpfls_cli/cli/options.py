@@ -157,7 +157,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     def wrapped(*args: Any, **kwargs: Any) -> None:
         common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common) if f.name not in left_out})
         if "config" not in hints:
-            _refuse_overrides(common)
+            refuse_overrides(common)
         _check_order(command.__name__.rstrip("_"), {name: kwargs[name] for name in arguments}, kwargs.get("output"))
         command(*args, common=common, **kwargs)
 
@@ -193,7 +193,7 @@ def _left_out(command: str, hints: Mapping[str, Any]) -> tuple[str, ...]:
     return ("numbers",) if own else ()
 
 
-def _refuse_overrides(common: Common) -> None:
+def refuse_overrides(common: Common) -> None:
     """Refuse what overrides a config where none is read."""
     from cpfls_cli.cli.terminal import messages_for_errors
     from cpfls_cli.errors import InputError
@@ -210,9 +210,10 @@ def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None
     from cpfls_cli.cli.misplaced import refuse_misplaced_config, refuse_misplaced_log
     from cpfls_cli.cli.terminal import messages_for_errors
 
-    if arguments.get("config") is None:
+    given = [path for value in arguments.values() for path in (value if isinstance(value, list) else [value]) if path]
+    # Of a log alone gains are found too.
+    if arguments.get("config") is None or (command == "tune" and len(given) == 1):
         return
-    given = [path for value in arguments.values() for path in (value if isinstance(value, list) else [value])]
     with messages_for_errors():
         refuse_misplaced_config(command, given, output)
         if "log" in arguments:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup
+from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup, ParameterRow
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.output import refuse_own, write_text
+from cpfls_cli.artifacts.output import check_output, refuse_own, write_text
 from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -23,11 +24,14 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.parameter_files import parameter_file
+from cpfls_cli.export.parameter_files import file_of, parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
 from cpfls_cli.logs.formats import log_contents, read_log
+from cpfls_cli.look.flight import LogFlight
+from cpfls_cli.look.gains import Plant, TunedGains, tuned_gains
 from cpfls_cli.pages.gains import answer
+from cpfls_cli.pages.look_gains import answer as answer_of_log
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.pages.vehicle_model import slow_words
@@ -35,6 +39,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
 from cpfls_cli.report.outcome import Outcome, command_line, nothing_written
+from cpfls_cli.result import plain
 from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
 from cpfls_cli.tuning.noise import LEAST, Line, Noise, noise_of
@@ -105,6 +110,61 @@ def run(
     blocks = (*answer(source_of(job, whole)), Text(f"{file}: written, for the ground station"))
     to_report = ("cpfls", "report", job.config, job.output, "-o", job.output.with_suffix(".html"))
     return Outcome(whole.summary | {"file": str(file)}, blocks, next=(to_report,))
+
+
+def run_log(
+    log: Path, output: Path | None, asked: AskedMargins, *, force: bool = False, dry_run: bool = False
+) -> Outcome:
+    """Find gains from one log alone, and write those that change where a file is named."""
+    contents = log_contents(log)
+    reading, effectiveness = (import_module(f"cpfls_cli.look.{name}") for name in ("reading", "effectiveness"))
+    flight = reading.read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
+    if dry_run:
+        return Outcome({"dry_run": True}, (Text(f"{log}: is a log of a multirotor; nothing is computed"),))
+    return of_flight(flight, effectiveness.effectiveness(flight), output, asked, force=force)
+
+
+def of_flight(
+    flight: LogFlight, plants: Sequence[Plant], output: Path | None, asked: AskedMargins, *, force: bool = False
+) -> Outcome:
+    """Find gains from what a log shows of a vehicle."""
+    gains = tuned_gains(flight, plants, asked)
+    blocks = [*answer_of_log(gains)]
+    if output is None or not gains.changes:
+        said = [Text(f"{output}: not written, nothing changes")] if output else []
+        return Outcome(plain(gains), (*blocks, *said))
+    autopilot = AUTOPILOTS[gains.autopilot]
+    suffix, text = file_of(
+        autopilot, gains.version, f"gains of cpfls from {flight.name}", _changed(autopilot, gains, flight)
+    )
+    file = output.with_suffix(suffix)
+    check_output(file, force)
+    write_text(file, text)
+    return Outcome(
+        plain(gains) | {"file": str(file)}, (*blocks, Text(f"{file}: written, for the ground station")), written=file
+    )
+
+
+def _changed(autopilot: Autopilot, gains: TunedGains, flight: LogFlight) -> list[ParameterRow]:
+    """Give the parameters that change as a file has them."""
+    names = autopilot.firmware.names(flight.system)
+    known = {names.get(each.name, each.name): each for each in autopilot.parameters}
+    return [
+        ParameterRow(
+            name=row.parameter,
+            meaning=own.meaning,
+            unit=own.unit,
+            today=row.today,
+            default=own.default,
+            proposed=row.proposed,
+            wanted=row.proposed,
+            low=own.low,
+            high=own.high,
+            clipped=False,
+        )
+        for row in gains.changes
+        for own in (known[row.parameter],)
+    ]
 
 
 @dataclass(frozen=True)

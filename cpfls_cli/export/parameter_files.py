@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.artifacts.gains import GainsRecord, ParameterRow
+from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 
 _FLOAT = 9
@@ -32,19 +33,35 @@ def parameter_file(record: GainsRecord, name: str) -> tuple[str, str]:
     ----------
     QGroundControl, Parameters; Mission Planner, parameter files; Betaflight CLI; cflib, param_file_helper.
     """
-    form = _FORMS[record.autopilot]
+    about = f"gains of cpfls for {record.vehicle_name}, see {name}"
+    return file_of(AUTOPILOTS[record.autopilot], record.firmware or "", about, record.rows)
+
+
+def file_of(autopilot: Autopilot, version: str, about: str, rows: Sequence[ParameterRow]) -> tuple[str, str]:
+    """Write parameters for the ground station of an autopilot: the suffix of such files, and the text.
+
+    Parameters
+    ----------
+    version : str
+        Of the firmware; empty for the one whose documented ranges are known.
+    """
+    form = _FORMS[autopilot.name]
     head = [
-        f"# For {_version(record)}.",
-        f"# {record.title}: gains of cpfls for {record.vehicle_name}, see {name}",
+        f"# For {_version(autopilot, version)}.",
+        f"# {autopilot.title}: {about}",
         *(f"# {each}" for each in form.how),
     ]
-    return form.suffix, "\n".join([*head, *form.lines(record.rows)]) + "\n"
+    lines = form.lines(rows)
+    if autopilot.firmware.too_old(version):
+        # Older versions have no sliders.
+        lines = (each for each in lines if each not in _SLIDERS)
+    return form.suffix, "\n".join([*head, *lines]) + "\n"
 
 
-def _version(record: GainsRecord) -> str:
+def _version(autopilot: Autopilot, version: str) -> str:
     """Name the version of the firmware that the file is for, and whose documented ranges it has."""
-    known = AUTOPILOTS[record.autopilot].firmware.title
-    own = record.firmware or known
+    known = autopilot.firmware.title
+    own = version or known
     return own if own == known else f"{own}, as the log says; documented ranges and defaults are those of {known}"
 
 
@@ -72,9 +89,11 @@ def _mission_planner(rows: Sequence[ParameterRow]) -> Iterator[str]:
     yield from _comments(rows, lambda row: f"{row.name},{_value(row)}")
 
 
+_SLIDERS = ("# own values in place of the sliders", "set simplified_pids_mode = OFF")
+
+
 def _betaflight(rows: Sequence[ParameterRow]) -> Iterator[str]:
-    yield "# own values in place of the sliders"
-    yield "set simplified_pids_mode = OFF"
+    yield from _SLIDERS
     yield from _comments(rows, lambda row: f"set {row.name} = {round(row.proposed)}")
     yield "save"
 

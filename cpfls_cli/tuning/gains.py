@@ -200,7 +200,7 @@ def _valued(values: Mapping[str, float], raised: Mapping[str, Proposal], paramet
 def _jitter(law: Law, axis: int, noise: Noise | None) -> float:
     """Give how much noise makes the command jitter, by a spectrum or, in any unit, by white noise."""
     if noise is not None:
-        return float(noise.of_commands(law)[axis])
+        return noise.of_command(law, axis)
     frequency = np.linspace(_NOISE_HZ, 0.49 * law.rate_hz, _NOISE_POINTS)
     return float(np.sqrt(np.mean(np.abs(law.response(axis, frequency).feedback) ** 2)))
 

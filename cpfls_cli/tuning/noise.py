@@ -45,11 +45,14 @@ class Noise:
 
         In shares of the full command, from 10 Hz on and as far as the flights show, without the answer of the vehicle.
         """
+        return np.array([self.of_command(law, axis) for axis in range(3)])
+
+    def of_command(self, law: Law, axis: int) -> float:
+        """Compute the same about one axis."""
         shown = (self.frequency >= 10.0) & (self.frequency < 0.49 * law.rate_hz)
-        frequency = self.frequency[shown]
-        gains = np.stack([np.abs(law.response(axis, frequency).feedback) for axis in range(3)], axis=1)
+        gain = np.abs(law.response(axis, self.frequency[shown]).feedback)
         spacing = float(self.frequency[1] - self.frequency[0])
-        return np.asarray(np.sqrt((gains**2 * self.density[shown]).sum(axis=0) * spacing))
+        return float(np.sqrt((gain**2 * self.density[shown, axis]).sum() * spacing))
 
     def before_filters(self, law: Law) -> Noise:
         """Give the noise in front of the law's filters of the gyroscope, from what was logged behind them."""

@@ -1,0 +1,237 @@
+"""Gains from one log: what is sure of them, over plants whose loops are computed here by their formula."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from control import FRD, stability_margins
+
+import cpfls_cli.look.gains
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.commands.tune import of_flight
+from cpfls_cli.look.flight import AXES, LogFlight, Samples
+from cpfls_cli.look.gains import tuned_gains
+from cpfls_cli.tuning.gains import AskedMargins
+from cpfls_cli.tuning.margins import crossing_margins
+
+SYSTEMS = {"px4": "PX4 1.15.0", "ardupilot": "ArduCopter 4.5", "betaflight": "Betaflight 4.5.1"}
+PLANTS = {"px4": (130.0, 0.02, 0.03), "ardupilot": (150.0, 0.02, 0.03), "betaflight": (900.0, 0.008, 0.02)}
+"""Effectiveness, delay, lag."""
+NARROW = (0.03, 0.002, 0.1)
+HELD_DISK = 2 * np.tan(np.radians(45) / 2)
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch):
+    """Tune for fewer plants one by one, which takes a quarter of the time."""
+    monkeypatch.setattr(cpfls_cli.look.gains, "DRAWS", 10)
+
+
+def plant(gain, delay, lag, spread=NARROW, axis="roll", seed=1):
+    """A plant as a log shows it, with draws of effectiveness, delay and lag."""
+    own, scale, late, slow = np.random.default_rng(seed).standard_normal((3, 200)), *spread
+    draws = np.stack(
+        [
+            gain * np.exp(scale * own[0]),
+            delay * np.exp(late / delay * own[1]),
+            lag * np.exp(slow * own[2]),
+            np.ones(200),
+            np.zeros(200),
+        ],
+        axis=1,
+    )
+    found = np.array([gain, delay, lag, 1.0, 0.0])
+    band = np.array([0.5, 100.0])
+    return SimpleNamespace(axis=axis, identified=True, reason="", parameters=found, draws=draws, band_hz=band)
+
+
+def weak(axis):
+    return SimpleNamespace(axis=axis, identified=False, reason="sticks rest", parameters=None, draws=None, band_hz=None)
+
+
+def flight(autopilot, values=None, system=None, *, noise=0.02, attitude=False):
+    """A log with the parameters of an autopilot, in which nothing but noise of the gyroscope is there."""
+    count = 4000
+    nothing, one, every = np.full((count, 3), np.nan), np.full(count, np.nan), np.ones(count, dtype=bool)
+    time = np.arange(count) / 500
+    rates = noise * np.random.default_rng(0).standard_normal((count, 3))
+    return LogFlight(
+        name="log",
+        autopilot=autopilot,
+        system=SYSTEMS[autopilot] if system is None else system,
+        parameters=AUTOPILOTS[autopilot].defaults() | (values or {}),
+        rate_hz=500.0,
+        time=time,
+        **dict.fromkeys(("body_rate", "command", "rate_setpoint", "stick", "attitude", "specific_force"), nothing),
+        attitude_setpoint=np.zeros((count, 3)) if attitude else nothing,
+        **dict.fromkeys(("collective", "voltage", "current", "height", "climb_rate"), one),
+        flown=every,
+        usable=every,
+        rotors=Samples(np.zeros(0), np.zeros((0, 4))),
+        gyroscope=Samples(time, rates),
+        gaps_s=np.zeros((0, 2)),
+    )
+
+
+def found(autopilot, values=None, own=None, **options):
+    plants = [own or plant(*PLANTS[autopilot]), weak("pitch"), weak("yaw")]
+    return tuned_gains(flight(autopilot, values, **options), plants)
+
+
+def loops(autopilot, values, draws):
+    """Rate loops about roll by the formula of the plant, of which a log's delay has all of the law's steps."""
+    law = AUTOPILOTS[autopilot].law(values)
+    frequency = np.geomspace(0.2, 0.45 * law.rate_hz, 600)
+    s = 2j * np.pi * frequency
+    gain, delay, lag, damping, _ = draws.T[:, :, None]
+    moved = gain * np.exp(-s * delay) / ((1 + s * lag) * (s + damping))
+    return frequency, moved * law.response(0, frequency).feedback
+
+
+def by_term(gains):
+    return {row.term: row for row in gains.rows}
+
+
+@pytest.mark.parametrize("autopilot", PLANTS)
+def test_proposed_gains_hold_the_asked_margin_with_nineteen_of_twenty_plants(autopilot):
+    own = plant(*PLANTS[autopilot], (0.1, 0.003, 0.2))
+    gains = found(autopilot, own=own)
+    values = AUTOPILOTS[autopilot].defaults()
+    named = {AUTOPILOTS[autopilot].firmware.names(SYSTEMS[autopilot]).get(name, name): name for name in values}
+    new = values | {named[row.parameter]: row.proposed for row in gains.rows}
+    frequency, loop = loops(autopilot, new, own.draws)
+    disk = 1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max(axis=-1)
+    assert np.mean(disk > 0.97 * HELD_DISK) > 0.94
+    # Nor are they far slower than that margin needs.
+    assert np.quantile(disk, 0.05) < 1.25 * HELD_DISK
+    after = gains.axes[0].after
+    exact = [stability_margins(FRD(each, 2 * np.pi * frequency))[1] for each in loop[:60]]
+    assert after.phase_deg.value == pytest.approx(np.median(exact), abs=1.0)
+    assert after.holds > 0.94
+
+
+def test_gains_go_with_the_inverse_of_effectiveness():
+    usual, stronger = (by_term(found("px4", own=plant(scale * 130.0, 0.02, 0.03))) for scale in (1, 2))
+    for term in ("P", "I", "D"):
+        assert usual[term].proposed / stronger[term].proposed == pytest.approx(2, rel=0.02)
+        assert usual[term].low / stronger[term].low == pytest.approx(2, rel=0.02)
+
+
+def test_the_interval_is_that_of_the_plants():
+    sure, open_ = (by_term(found("px4", own=plant(*PLANTS["px4"], spread))) for spread in (NARROW, (0.15, 0.002, 0.1)))
+    # Ten of a normal spread of 15 % reach over some three times as much.
+    assert np.log(open_["P"].high / open_["P"].low) > 0.3
+    assert 0.05 < np.log(sure["P"].high / sure["P"].low) < 0.4
+    assert open_["P"].low <= open_["P"].proposed < sure["P"].proposed
+
+
+def test_gains_that_suit_are_kept():
+    gains = found("px4")
+    assert {row.direction for row in gains.rows} != {"keep"}
+    middle = {row.parameter: 0.5 * (row.low + row.high) for row in gains.rows}
+    again = found("px4", middle)
+    assert [row.direction for row in again.rows] == ["keep"] * 3
+    assert again.axes[0].before.phase_deg.value == again.axes[0].after.phase_deg.value
+    assert not again.axes[0].changed
+    assert again.changes == ()
+
+
+@pytest.mark.parametrize(("factor", "direction"), [(0.3, "raise"), (1.6, "lower")])
+def test_what_is_far_off_is_moved(factor, direction):
+    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    rows = by_term(found("px4", {name: factor * value for name, value in suited.items()}))
+    assert rows["P"].direction == direction
+    assert {row.direction for row in rows.values()} <= {direction, "keep"}
+
+
+def test_the_factor_on_all_gains_stays():
+    once, twice = (by_term(found("px4", {"MC_ROLLRATE_K": factor})) for factor in (1.0, 2.0))
+    assert "MC_ROLLRATE_K" not in {row.parameter for row in twice.values()}
+    assert twice["P"].low == pytest.approx(0.5 * once["P"].low, rel=0.02)
+
+
+def test_noise_gives_one_end_only():
+    quiet = {"p_roll": 8.0, "i_roll": 8.0, "d_roll": 2.0, "d_max_roll": 0.0}
+    row = by_term(found("betaflight", quiet, own=plant(300.0, 0.003, 0.006)))["P"]
+    assert (row.direction, row.why) == ("raise", "noise")
+    assert row.high == np.inf
+    assert 8 < row.low <= row.proposed
+
+
+def test_a_loop_that_would_not_fly_is_of_another_law():
+    gains = found("px4", {"MC_ROLLRATE_P": 0.5, "MC_ROLLRATE_D": 0.01})
+    assert gains.axes[0].reason == "law"
+    assert gains.rows == ()
+
+
+def test_gains_do_not_go_beyond_the_band():
+    own = plant(*PLANTS["px4"])
+    own.band_hz = np.array([0.3, 0.8])
+    assert found("px4", own=own).axes[0].reason == "band"
+
+
+def test_a_weak_axis_gets_sticks_to_move():
+    gains = found("betaflight")
+    assert [(axis.axis, axis.reason) for axis in gains.axes[1:]] == [("pitch", "weak"), ("yaw", "weak")]
+    assert [(each.axis, each.mode) for each in gains.fly] == [("pitch", "acro"), ("yaw", "acro")]
+    assert {row.axis for row in gains.rows} == {"roll"}
+
+
+def test_the_angle_is_tuned_where_one_is_flown():
+    assert "P of the angle" not in by_term(found("px4"))
+    row = by_term(found("px4", attitude=True))["P of the angle"]
+    assert row.parameter == "MC_ROLL_P"
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "system", "reason"),
+    [
+        ("betaflight", "Betaflight 3.0.1", "version"),
+        ("ardupilot", "ArduCopter 3.3", "version"),
+        ("ardupilot", "ArduPlane 4.3", "autopilot"),
+        ("betaflight", "Betaflight 3.5.0", ""),
+    ],
+)
+def test_versions_whose_gains_count(autopilot, system, reason):
+    assert found(autopilot, system=system).reason == reason
+
+
+def test_names_are_those_of_the_version():
+    new = {row.parameter for row in found("betaflight").rows}
+    assert {"d_min_roll", "d_roll"} <= new
+    assert {row.parameter for row in found("betaflight", system="Betaflight 3.5.0").rows} == {
+        "p_roll",
+        "i_roll",
+        "d_roll",
+    }
+
+
+def test_only_what_changes_is_written(tmp_path):
+    own, plants = flight("betaflight"), [plant(*PLANTS["betaflight"]), weak("pitch"), weak("yaw")]
+    outcome = of_flight(own, plants, tmp_path / "gains", AskedMargins())
+    text = (tmp_path / "gains.txt").read_text()
+    changes = {row.parameter: row.proposed for row in tuned_gains(own, plants).changes}
+    lines = [line.split() for line in text.splitlines() if line.startswith("set ") and "simplified" not in line]
+    assert {words[1]: float(words[3]) for words in lines} == changes
+    assert outcome.summary["changes"]
+    kept = flight("betaflight", system="Betaflight 3.0.1")
+    assert of_flight(kept, plants, tmp_path / "none", AskedMargins()).written is None
+
+
+def test_crossings_are_those_of_python_control():
+    frequency = np.geomspace(0.1, 100, 400)
+    s = 2j * np.pi * frequency
+    loop = np.stack([12 * gain * np.exp(-0.02 * s) / (s * (1 + 0.03 * s)) * (1 + 1 / s) for gain in (0.4, 1.0, 1.6)])
+    gain, phase, crossover = crossing_margins(frequency, loop)
+    for each in range(3):
+        exact = stability_margins(FRD(loop[each], 2 * np.pi * frequency))
+        assert gain[each] == pytest.approx(20 * np.log10(exact[0]), abs=0.05)
+        assert phase[each] == pytest.approx(exact[1], abs=0.2)
+        assert crossover[each] == pytest.approx(exact[4] / (2 * np.pi), rel=0.02)
+
+
+def test_axes_are_in_their_order():
+    gains = tuned_gains(flight("px4"), [plant(*PLANTS["px4"], axis=axis) for axis in AXES])
+    assert [axis.axis for axis in gains.axes] == list(AXES)
+    assert replace(gains, rows=()).changes == ()
