@@ -12,6 +12,9 @@ from cpfls_cli.words import joined
 
 FAST_HZ = 100.0
 """At which motors are to be logged, which respond within some 50 ms."""
+SLOW_HZ = 25.0
+"""Below which they are logged too slowly for what they drive to be told from what drives them: two samples in the 50 ms
+within which they follow, and a half."""
 _DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
 _SETTINGS: Final[Mapping[str, tuple[tuple[tuple[int, int], str], ...]]] = {
     "PX4": (((0, 0), "SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate), then restart"),),
@@ -85,6 +88,7 @@ def _of_copter(system: str, parameters: Parameters) -> str:
     names = joined(f"{bit} ({_BITS[bit]})" for bit in bits)
     return (
         f"log motor speeds with bidirectional DShot ({'' if new else 'ArduPilot 4: '}SERVO_BLH_BDMASK), for {system} "
-        f"logs outputs (RCOU) 10 times a second at most; body rates come faster with "
+        f"logs outputs (RCOU) 10 times a second at most; body rates, and RATE from which outputs are rebuilt, come faster"
+        f" with "
         f"{'LOG_FILE_RATEMAX = 0 and ' if new else ''}LOG_BITMASK {named} bits {names}"
     )

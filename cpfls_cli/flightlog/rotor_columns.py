@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
 from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
+from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
@@ -26,9 +26,6 @@ _FEWEST = 3
 
 FASTER = 2.0
 """Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones."""
-
-_SLOW_HZ = 25.0
-"""Two samples in the 50 ms within which motors follow, and a half."""
 
 _USUAL_POLE_PAIRS = 7
 _RPM_FROM = 4000.0
@@ -205,7 +202,7 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
 
 def too_slow(guess: RotorGuess, system: str, parameters: Parameters) -> Iterator[str]:
     """Say of rotors that are logged too slowly how to log them faster."""
-    if guess.rate_hz < _SLOW_HZ:
+    if guess.rate_hz < SLOW_HZ:
         yield (
             f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
             f" respond within some 50 ms; {log_faster('them', FAST_HZ, system, parameters=parameters)}"

@@ -35,7 +35,7 @@ from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.flightlog.logging_rates import log_faster
+from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
@@ -56,8 +56,6 @@ from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listin
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
 from cpfls_cli.rounding import levelled
-from cpfls_cli.trajectory.consistency import coarsest_excited
-from cpfls_cli.trajectory.settings import ExciteSettings
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
@@ -103,9 +101,6 @@ _OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was fo
 
 _LIVELY_RAD_S = 1.0
 """Body rate, root mean square, above which larger turns show no more of the vehicle."""
-
-_LEAST_HZ = 1 / coarsest_excited(ExciteSettings())
-"""At which rotors have to be logged for what a flight is asked to show."""
 
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
@@ -357,8 +352,8 @@ def _share_words(share: Array, error: Array) -> str:
 
 def slow_words(record: VehicleRecord) -> Iterator[str]:
     """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster, and how."""
-    if record.rotors_told is not None and round(record.rotors_told) < round(_LEAST_HZ):
-        faster = log_faster("rotors and body rates", _LEAST_HZ, *(record.logged_by or ()))
+    if record.rotors_told is not None and record.rotors_told < SLOW_HZ:
+        faster = log_faster("rotors and body rates", FAST_HZ, *(record.logged_by or ()))
         yield f"{_slowly_logged(record.rotors_told)} Flights logged so say no more; first {faster}."
 
 

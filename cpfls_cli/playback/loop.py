@@ -16,6 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
+from cpfls_cli.flightlog.logging_rates import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
@@ -32,8 +33,6 @@ Together they span what an autopilot answers late and what it answers in time, w
 """
 _FASTER = (0.05, 0.15)
 """Of the same kind, about 6 to 20 Hz: shown beside the others, and in no bound, for rotors and frames answer there."""
-_FASTEST_HZ = 6.0
-"""Top of the fastest band."""
 _LAGS = (0.0, 0.01, 0.02, 0.05, 0.1)
 """Lags of rotors that are tried where none is known, s."""
 _OVERLAP = 0.75
@@ -138,15 +137,15 @@ def loop_beside_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Se
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], told_hz: float) -> bool:
     """Tell before any search whether no body can be found, because the rotors are logged too slowly.
 
-    They are where two updates do not fit into a period of the fastest band, and with no lag of the rotors the torque
-    explains the rotation about roll and pitch. Neither depends on the size of the inertia.
+    They are where motors are logged below `SLOW_HZ`, and with no lag of the rotors the torque explains the rotation
+    about roll and pitch. Neither depends on the size of the inertia.
 
     Parameters
     ----------
     told_hz : float, Hz
         How often the logs tell the rotors.
     """
-    if told_hz >= 2 * _FASTEST_HZ:
+    if told_hz >= SLOW_HZ:
         return False
     return all(bounds.shows_loop for bounds in _plain_bounds(vehicle, flights))
 

@@ -102,6 +102,11 @@ CA = {"CA_ROTOR_COUNT": 4.0} | {
     )
 }
 
+AP = {"MOT_THST_EXPO": 0.6, "MOT_SPIN_MIN": 0.12, "MOT_SPIN_MAX": 0.9}
+COPTER = AP | {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
+COPTER |= {"MOT_YAW_HEADROOM": 200.0, "MOT_THST_HOVER": 0.35}
+BF = {"motorOutput": "48,2047", "pidsum_limit": 1000.0, "pidsum_limit_yaw": 1000.0}
+
 
 class Flown:
     """A flight: the law's steps on its own clock, with what it asked of its mixer, and the motion with its rotors.

@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.rebuilt import rebuilt_rotors
-from tests.builders.thinned_logs import CA, Flown
-
-AP = {"MOT_THST_EXPO": 0.6, "MOT_SPIN_MIN": 0.12, "MOT_SPIN_MAX": 0.9}
-COPTER = AP | {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
-COPTER |= {"MOT_YAW_HEADROOM": 200.0, "MOT_THST_HOVER": 0.35}
-ARDUCOPTER = "ArduCopter 4.5.1"
-BF = {"motorOutput": "48,2047", "pidsum_limit": 1000.0, "pidsum_limit_yaw": 1000.0}
+from tests.builders.thinned_logs import AP, BF, CA, COPTER, Flown
 
 
 @cache
@@ -28,7 +22,7 @@ def rebuilt(autopilot, **rates):
     if autopilot == "px4":
         return rebuilt_rotors(own.px4_topics(**rates), CA, "PX4 1.15.0")
     if autopilot == "ardupilot":
-        return rebuilt_rotors(own.ardupilot_topics(**rates), COPTER, ARDUCOPTER)
+        return rebuilt_rotors(own.ardupilot_topics(**rates), COPTER, "ArduCopter 4.5.1")
     return rebuilt_rotors({"": own.betaflight_columns()}, BF, "Betaflight 4.5.1")
 
 
@@ -81,7 +75,7 @@ def test_outputs_that_are_read_back_late_do_not_matter():
     ],
 )
 def test_another_mixer_or_curve_is_refused(change, why):
-    found = rebuilt_rotors(flown("ardupilot").ardupilot_topics(), COPTER | change, ARDUCOPTER)
+    found = rebuilt_rotors(flown("ardupilot").ardupilot_topics(), COPTER | change, "ArduCopter 4.5.1")
     assert not found.faster
     assert re.search(why, found.refused)
 

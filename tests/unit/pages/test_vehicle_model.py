@@ -188,14 +188,14 @@ def test_logs_too_slow_for_what_is_flown_are_to_be_faster_before_another_flight(
     (said,) = [line for line in cautions(replace(record, rotors_told=9.9)) if "rotors" in line]
     assert said == (
         "The rotors are logged 9.9 times a second, which shows no motion above 5.0 Hz. Flights logged so say no more; "
-        "first log rotors and body rates at 50 Hz or more."
+        "first log rotors and body rates at 100 Hz or more."
     )
     (own,) = slow_words(replace(record, rotors_told=9.9, logged_by=("Betaflight 4.5.1",)))
     assert own.endswith(
-        "first log rotors and body rates at 50 Hz or more (Betaflight: blackbox_sample_rate = 1/4 and blackbox_device "
+        "first log rotors and body rates at 100 Hz or more (Betaflight: blackbox_sample_rate = 1/4 and blackbox_device "
         "= SDCARD or SPIFLASH)."
     )
-    assert not any("logged" in line for line in cautions(replace(record, rotors_told=49.9)))
+    assert not any("logged" in line for line in cautions(replace(record, rotors_told=25.1)))
 
 
 def test_a_moment_that_no_body_has_is_said_with_its_reason():
