@@ -6,6 +6,7 @@ autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing o
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio
 from cpfls_cli.estimation.spectra import (
     SHARED_BINS,
+    SMOOTHED_BINS,
     BlockSpectra,
     block_spectra,
     cut_blocks,
@@ -53,6 +55,9 @@ _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 _LEAD_S, _LEAD_SPREAD = 0.01, 1.0
 """Before: lead of yaw by the rotors' own angular momentum."""
 _FLOOR = 1e-6
+_BY_CHANCE = 4.0
+"""F statistic of one frequency that chance reaches once in fifty."""
+_TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _YAW = 2
 
@@ -237,6 +242,20 @@ def _window_s(flight: LogFlight) -> tuple[float, float]:
     return _SLOW_WINDOW_S if flight.rate_hz < _SLOW_HZ else _WINDOW_S
 
 
+def _kept(spectra: Numbers, instrument: int, windows: int) -> Array:
+    """Give the share of what an instrument says of the command that is not chance, shape (..., frequency)."""
+    cross = np.abs(smoothed(spectra[..., instrument, U])) ** 2
+    parts = smoothed(spectra[..., instrument, instrument].real) * smoothed(spectra[..., U, U].real)
+    coherence = np.minimum(cross / np.maximum(parts, _TINY), 1 - 1e-9)
+    statistic = coherence / (1 - coherence) * windows * SMOOTHED_BINS / SHARED_BINS
+    return np.asarray(np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0))
+
+
+def _outer(cross: Numbers, power: Numbers) -> Numbers:
+    """Give what one signal explains of the spectra of others, shape (frequency, signal, signal)."""
+    return np.asarray(cross.conj()[:, :, None] * cross[:, None, :] / np.maximum(power.real, _TINY)[:, None, None])
+
+
 class _Equations:
     """Equations of one axis by frequency: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
 
@@ -247,14 +266,19 @@ class _Equations:
     def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float, instrument: int = Z) -> None:
         self.spectra, self.filters, self.at_hz, self.instrument = spectra, filters, at_hz, instrument
         self._seen = spectra.cross[:, :, instrument, U:]
-        power = (spectra.total[:, instrument, instrument] - spectra.cross[:, :, instrument, instrument]).real
-        others = np.moveaxis(self._seen.sum(axis=0) - self._seen, 2, 1)
-        predicted = smoothed(others) / np.maximum(smoothed(power), np.finfo(float).tiny)[:, None]
+        self._windows = int(spectra.windows.sum())
+        others = spectra.total - spectra.cross
+        cross, power = others[:, :, instrument, U:], others[:, :, instrument, instrument].real
+        predicted = smoothed(cross, axis=1) / np.maximum(smoothed(power, axis=1), _TINY)[..., None]
+        # Where the instrument moves the command no more than by chance it says nothing.
+        kept = _kept(others, instrument, self._windows)
         if instrument == U:
             # Least squares takes the command as it is.
-            predicted[:, 0] = 1.0
-        self._predicted = np.moveaxis(predicted, 1, 2)
-        self._windows = int(spectra.windows.sum())
+            predicted[..., 0], kept = 1.0, np.ones_like(kept)
+        self._predicted = predicted * kept[..., None]
+        rest = spectra.total[:, U:, U:] - _outer(spectra.total[:, instrument, U:], spectra.total[:, instrument, instrument])
+        shared = SHARED_BINS / SMOOTHED_BINS / self._windows
+        self._chance = rest * (shared * (kept**2).mean(axis=0))[:, None, None]
 
     def terms(self, values: Array) -> Numbers:
         """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
@@ -268,10 +292,12 @@ class _Equations:
         moved = values + step * np.concatenate([np.zeros((1, numbers)), np.eye(numbers), -np.eye(numbers)])
         terms = self.terms(moved)
         slopes = (terms[1 + numbers :] - terms[1 : 1 + numbers]) / (2 * step)
-        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * self._weight(terms[0])
+        weight = self._weight(terms[0])
+        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * weight
         return Normal(
             np.einsum("bpf,qfs,bfs->bpq", predicted, slopes, self._seen, optimize=True).real,
             np.einsum("bpf,bf->bp", predicted, (terms[0] * self._seen).sum(axis=2)).real,
+            np.einsum("f,pfs,fst,qft->pq", weight, slopes.conj(), self._chance, slopes, optimize=True).real,
         )
 
     def _weight(self, terms: Numbers) -> Array:
@@ -294,9 +320,9 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
     seen = equations.spectra.total[:, equations.instrument, U:]
-    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny)
-    for delay in np.arange(1.0, 16.0, 1.5):
-        values = np.concatenate([[0.0, delay], prior.mean[2:]])
+    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, _TINY)
+    for delay, share in product(np.arange(1.0, 16.0, 1.5), (-1.0, 0.5, 2.0)):
+        values = np.concatenate([[0.0, delay, share], prior.mean[3:]])
         terms = equations.terms(values)
         follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
         weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
