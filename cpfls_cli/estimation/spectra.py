@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
 
-_FEWEST_IN_BLOCK = 4
+_FEWEST_IN_BLOCK = 3
 """Windows of a block: those of its ends share samples with the neighbours."""
 _MOST_BLOCKS = 24
 SHARED_BINS = 1.5

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, Numbers
-from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio
+from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio, solve
 from cpfls_cli.estimation.spectra import (
     SHARED_BINS,
     SMOOTHED_BINS,
@@ -52,11 +52,15 @@ _LAG_SHARE, _LAG_SPREAD = 0.5, 1.0
 """Before: logarithm of lag over delay behind the rotors' commands, rotors of all sizes with their filters."""
 _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 """Before: damping of multirotors, 1/s, and spread of its logarithm."""
+_TIGHT = 0.05
 _LEAD_S, _LEAD_SPREAD = 0.01, 1.0
 """Before: lead of yaw by the rotors' own angular momentum."""
 _FLOOR = 1e-6
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
+_SEEN = 1e-4
+"""Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
+_USUAL_DELAY_S = 0.012
 _TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _YAW = 2
@@ -182,7 +186,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
-        spectra = plant_spectra(flight, axis, values, known)
+        spectra = plant_spectra(flight, axis, values, known, _USUAL_DELAY_S)
         if spectra is None:
             continue
         filters = gyroscope_filters(law, axis, spectra.frequency)
@@ -198,7 +202,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
 
 
 def plant_spectra(
-    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float = 0.0
+    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float
 ) -> BlockSpectra | None:
     """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
 
@@ -228,7 +232,7 @@ def plant_spectra(
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
     if not power.sum() > 0:
         return None
-    spectra = block_spectra(parts, cut_blocks(power), frequency, inside)
+    spectra = block_spectra(parts, cut_blocks(np.sqrt(power)), frequency, inside)
     return spectra if len(spectra.windows) >= FEWEST_BLOCKS else None
 
 
@@ -248,7 +252,9 @@ def _kept(spectra: Numbers, instrument: int, windows: int) -> Array:
     parts = smoothed(spectra[..., instrument, instrument].real) * smoothed(spectra[..., U, U].real)
     coherence = np.minimum(cross / np.maximum(parts, _TINY), 1 - 1e-9)
     statistic = coherence / (1 - coherence) * windows * SMOOTHED_BINS / SHARED_BINS
-    return np.asarray(np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0))
+    moves = smoothed(spectra[..., instrument, instrument].real)
+    moves = moves >= _SEEN * moves.max(axis=-1, keepdims=True)
+    return np.asarray(np.where(moves, np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0), 0.0))
 
 
 def _outer(cross: Numbers, power: Numbers) -> Numbers:
@@ -333,14 +339,16 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     low, high = np.full(len(prior.mean), -np.inf), np.full(len(prior.mean), np.inf)
     low[1], high[1] = _LEAST_DELAY, _MOST_DELAY_S / _DELAY_UNIT_S
     low[2:], high[2:] = prior.mean[2:] - 4 * prior.spread[2:], prior.mean[2:] + 4 * prior.spread[2:]
-    return estimate(equations, best[1], prior, (low, high))
+    # First with the shape all but held, so that gain and delay are about right when it is let go.
+    tight = Prior(prior.mean, np.where(np.isfinite(prior.spread), _TIGHT, np.inf))
+    return estimate(equations, solve(equations, best[1], tight, (low, high)).values, prior, (low, high))
 
 
 def _reference(spectra: BlockSpectra) -> float:
     """Choose the frequency where the log knows effectiveness best: in the middle of what the instrument moves."""
     clear = spectra.coherence(Z, U) * spectra.coherence(Z, Y)
-    weight = clear / np.maximum(1 - clear, 0.02)
-    middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), 1e-300)))
+    weight = _kept(spectra.total, Z, int(spectra.windows.sum())) * clear / np.maximum(1 - clear, 0.02)
+    middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), _TINY)))
     return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
 
 
@@ -350,7 +358,7 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
     fit, plain = _fitted(equations, yaw), _fitted(_Equations(spectra, filters, at_hz, U), yaw)
     first = np.eye(len(fit.values))[0]
     half_gain, total = float(np.hypot(fit.half(first), GAIN_FLOOR)), _delay_at(fit, at_hz)
-    verdict, reason = _judged(fit, half_gain, total.half)
+    verdict, reason = _judged(fit, half_gain, total)
     return AxisPlant(
         axis=axis,
         verdict=verdict,
@@ -390,12 +398,12 @@ def _delay_at(fit: Fit, at_hz: float) -> Estimate:
     return Estimate(value=value, low=value - half, high=value + half)
 
 
-def _judged(fit: Fit, half_gain: float, half_delay: float) -> tuple[str, str]:
+def _judged(fit: Fit, half_gain: float, total: Estimate) -> tuple[str, str]:
     if fit.strength[0] < STRONG:
         return "weak", "the instrument moves the vehicle too little"
-    if not fit.settled:
+    if not fit.settled or total.high < 0:
         return "weak", "no model of a multirotor fits"
-    if half_gain > NARROW or half_delay > NARROW_DELAY_S:
+    if half_gain > NARROW or total.half > NARROW_DELAY_S:
         return "weak", "the interval is too wide"
     return "identified", ""
 
