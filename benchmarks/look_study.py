@@ -30,7 +30,7 @@ VEHICLES = {
 GUSTS = {"none": 0.0, "light": 1.0, "strong": 2.0}
 GUST_SIZE, GUST_S = np.array([3.4, 5.1, 2.0]), np.array([0.31, 1.18, 0.5])
 """Standard deviation, rad/s^2, and time constant about each axis; strong gusts have twice the size."""
-WASH, WASH_S = 2.0, 0.04
+WASH, WASH_S = 0.5, 0.05
 """Size over that of gusts, and time constant, of what a vehicle meets in its own wake."""
 LOGGED_HZ = {"betaflight": (1000.0, 1000.0), "px4": (50.0, 250.0), "ardupilot": (400.0, 400.0), "crazyflie": (100.0, 100.0)}
 """Of commands and of body rates."""

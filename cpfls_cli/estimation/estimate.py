@@ -15,11 +15,14 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import half_width, jackknife_covariance
 
-_STEPS, _STEPS_LEFT_OUT = 40, 3
+_STEPS, _STEPS_LEFT_OUT = 60, 4
 _SETTLED, _FARTHEST = 1e-5, 0.7
 """Length of a step that is none any more, and of the longest."""
+_LEAST_SHARE = 0.1
 _NEARLY = 1e-2
 """Length of the last step from which the numbers were not found."""
+_RIDGE = 1e-9
+"""Information where there is none at all: nothing is divided by 0."""
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -32,10 +35,13 @@ class Normal(NamedTuple):
         ``Z' W X``.
     score : array, shape (block, number)
         ``Z' W r``.
+    chance : array, shape (number, number), or None
+        Information that instruments without strength would show, all blocks together; None: as the blocks scatter.
     """
 
     information: Array
     score: Array
+    chance: Array | None = None
 
 
 Equations = Callable[[Array], Normal]
@@ -115,78 +121,103 @@ class Fit:
         return float(half_width(np.array(error), np.array(self.blocks)))
 
 
-def estimate(
-    equations: Equations, start: Array, prior: Prior | None = None, bounds: tuple[Array, Array] | None = None
-) -> Fit:
-    """Solve equations by Gauss-Newton steps, and again without each block.
+Bounds = tuple[Array, Array]
+"""Lowest and highest values of numbers, shape (number,) each."""
 
-    The error of a number with a prior has two parts: that of the data, which the jackknife shows, and that of the
-    prior, ``(S + P)^-1 P (S + P)^-1`` for an information S and a precision P.
+
+class Solved(NamedTuple):
+    """Values at which equations hold, the equations there, and whether the steps came to an end."""
+
+    values: Array
+    normal: Normal
+    settled: bool
+
+
+def solve(
+    equations: Equations,
+    start: Array,
+    prior: Prior,
+    bounds: Bounds | None = None,
+    leave_out: int | None = None,
+    steps: int = _STEPS,
+) -> Solved:
+    """Solve equations by Gauss-Newton steps, all blocks or all but one.
 
     Parameters
     ----------
     start : array, shape (number,)
-    bounds : tuple of array, shape (number,), or None
-        Lowest and highest values.
+    """
+    values, share, before = np.asarray(start, dtype=float), 1.0, np.zeros(len(start))
+    for _ in range(steps):
+        normal = equations(values)
+        information, score = normal.information.sum(axis=0), normal.score.sum(axis=0)
+        if leave_out is not None:
+            information = information - normal.information[leave_out]
+            score = score - normal.score[leave_out]
+        known = np.where(prior.precision > 0, prior.mean - values, 0.0) * prior.precision
+        step = np.linalg.solve(information + np.diag(prior.precision + _RIDGE), score + known)
+        # One that turns back has gone too far.
+        share = max(share / 2, _LEAST_SHARE) if step @ before < 0 else min(1.5 * share, 1.0)
+        before, moved = step, values + step * min(share, _FARTHEST / max(float(np.abs(step).max()), _TINY))
+        moved = moved if bounds is None else np.clip(moved, *bounds)
+        step, values = moved - values, moved
+        if np.abs(step).max() < _SETTLED:
+            break
+    return Solved(values, normal, bool(np.abs(step).max() < _NEARLY))
+
+
+def estimate(equations: Equations, start: Array, prior: Prior | None = None, bounds: Bounds | None = None) -> Fit:
+    """Solve equations, and again without each block.
+
+    The error of a number with a prior has two parts: that of the data, which the jackknife shows, and that of the
+    prior, ``(S + P)^-1 P (S + P)^-1`` for an information S and a precision P.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Efron and Tibshirani 1993 (jackknife).
     """
     prior = Prior.none(len(start)) if prior is None else prior
-    low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else bounds
-
-    def solve(values: Array, leave_out: int | None, steps: int) -> tuple[Array, Normal, bool]:
-        for _ in range(steps):
-            normal = equations(values)
-            information, score = normal.information.sum(axis=0), normal.score.sum(axis=0)
-            if leave_out is not None:
-                information = information - normal.information[leave_out]
-                score = score - normal.score[leave_out]
-            known = np.where(prior.precision > 0, prior.mean - values, 0.0) * prior.precision
-            step = np.linalg.solve(information + np.diag(prior.precision), score + known)
-            moved = np.clip(values + np.clip(step, -_FARTHEST, _FARTHEST), low, high)
-            step, values = moved - values, moved
-            if np.abs(step).max() < _SETTLED:
-                break
-        return values, normal, bool(np.abs(step).max() < _NEARLY)
-
-    values, normal, settled = solve(np.asarray(start, dtype=float), None, _STEPS)
-    left_out = np.array([solve(values, block, _STEPS_LEFT_OUT)[0] for block in range(len(normal.score))])
+    values, normal, settled = solve(equations, start, prior, bounds)
+    left_out = np.array(
+        [solve(equations, values, prior, bounds, block, _STEPS_LEFT_OUT).values for block in range(len(normal.score))]
+    )
     total = normal.information.sum(axis=0)
-    inverse = np.linalg.inv(total + np.diag(prior.precision))
+    inverse = np.linalg.inv(total + np.diag(prior.precision + _RIDGE))
     held = inverse @ np.diag(prior.precision) @ inverse.T
     return Fit(
         values=values,
         covariance=jackknife_covariance(left_out) + held,
         left_out=left_out,
-        strength=conditional_strength(normal.information),
-        blocks=effective_blocks(np.trace(normal.information / np.diag(total), axis1=1, axis2=2)),
+        strength=conditional_strength(normal, prior),
+        blocks=effective_blocks(
+            np.trace(normal.information / np.maximum(np.diag(total), _RIDGE), axis1=1, axis2=2)
+        ),
         settled=settled,
     )
 
 
-def conditional_strength(information: Array) -> Array:
+def conditional_strength(normal: Normal, prior: Prior) -> Array:
     """Compute the F statistic of each number jointly with all others, shape (number,).
 
-    What a block tells of a number, cleared of what tells the others, is a mean over blocks and a scatter about it; an
-    instrument without strength has the mean 0.
-
-    Parameters
-    ----------
-    information : array, shape (block, number, number)
-        Of instruments that were found without the block.
+    What the instruments tell of a number, cleared of what tells the others as far as the prior does not, over what
+    chance would show of it; where that is not stated, over its scatter over blocks, with instruments that were found
+    without the block.
 
     References
     ----------
-    Sanderson and Windmeijer 2016.
+    Sanderson and Windmeijer 2016; Stock and Yogo 2005 (below 10 the estimate falls back to least squares).
     """
-    inverse = np.linalg.pinv(information.sum(axis=0))
+    inverse = np.linalg.inv(normal.information.sum(axis=0) + np.diag(prior.precision + _RIDGE))
     alone = np.where(np.diag(inverse) == 0, _TINY, np.diag(inverse))
-    each = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], information, inverse / alone)
-    blocks = len(each)
-    scatter = np.sqrt(blocks) * each.std(axis=0, ddof=1)
-    return np.asarray((np.maximum(each.sum(axis=0), 0.0) / np.maximum(scatter, _TINY)) ** 2)
+    # Columns: what is left of each number when the others have moved with it.
+    cleared = inverse / alone
+    each = np.einsum("ji,bjk,ki->bi", inverse.T / alone, normal.information, cleared)
+    told = np.maximum(each.sum(axis=0), 0.0)
+    if normal.chance is not None:
+        chance = np.einsum("ji,jk,ki->i", cleared, normal.chance, cleared)
+        return np.asarray(told / np.maximum(chance, _TINY))
+    scatter = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
+    return np.asarray((told / np.maximum(scatter, _TINY)) ** 2)
 
 
 def effective_blocks(information: Array) -> float:

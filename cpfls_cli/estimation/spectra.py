@@ -11,11 +11,13 @@ from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
 
-_FEWEST_IN_BLOCK = 4
+_FEWEST_IN_BLOCK = 3
 """Windows of a block: those of its ends share samples with the neighbours."""
 _MOST_BLOCKS = 24
 SHARED_BINS = 1.5
 """Neighbouring frequencies of Hann's window for one independent."""
+SMOOTHED_BINS = 5
+"""Over which spectra are averaged where they are smooth."""
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -53,12 +55,12 @@ class BlockSpectra:
         return np.asarray(self.total[:, instrument, second] / np.where(below == 0, _TINY, below))
 
 
-def smoothed(values: Numbers, width: int = 5) -> Numbers:
-    """Average neighbouring frequencies, shape (..., frequency), fewer at the ends."""
-    kernel = np.ones(min(width, values.shape[-1]))
-    counts = np.convolve(np.ones(values.shape[-1]), kernel, "same")
-    flat = values.reshape(-1, values.shape[-1])
-    return np.asarray(np.array([np.convolve(row, kernel, "same") for row in flat]) / counts).reshape(values.shape)
+def smoothed(values: Numbers, width: int = SMOOTHED_BINS, axis: int = -1) -> Numbers:
+    """Average neighbouring frequencies, along an axis, fewer at the ends."""
+    count = values.shape[axis]
+    near = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) <= width // 2
+    mean = near / near.sum(axis=1, keepdims=True)
+    return np.asarray(np.moveaxis(np.tensordot(mean, values, (1, axis)), 0, axis))
 
 
 def window_starts(usable: BoolArray, length: int) -> IntArray:

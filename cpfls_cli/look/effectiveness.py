@@ -6,14 +6,16 @@ autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing o
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, Numbers
-from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio
+from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio, solve
 from cpfls_cli.estimation.spectra import (
     SHARED_BINS,
+    SMOOTHED_BINS,
     BlockSpectra,
     block_spectra,
     cut_blocks,
@@ -50,9 +52,16 @@ _LAG_SHARE, _LAG_SPREAD = 0.5, 1.0
 """Before: logarithm of lag over delay behind the rotors' commands, rotors of all sizes with their filters."""
 _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 """Before: damping of multirotors, 1/s, and spread of its logarithm."""
+_TIGHT = 0.05
 _LEAD_S, _LEAD_SPREAD = 0.01, 1.0
 """Before: lead of yaw by the rotors' own angular momentum."""
 _FLOOR = 1e-6
+_BY_CHANCE = 4.0
+"""F statistic of one frequency that chance reaches once in fifty."""
+_SEEN = 1e-4
+"""Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
+_USUAL_DELAY_S = 0.012
+_TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _YAW = 2
 
@@ -135,9 +144,7 @@ class AxisPlant:
     least_squares: Estimate | None = part(default=None)
     bound: Estimate | None = part(default=None)
     frequency: Array = about("of the curves", "frequency", unit="Hz", brief=False)
-    gain: Array = about(
-        "angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False
-    )
+    gain: Array = about("angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False)
     phase: Array = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
     gain_error: Array = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
     model_gain: Array = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
@@ -179,7 +186,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
-        spectra = plant_spectra(flight, axis, values, known)
+        spectra = plant_spectra(flight, axis, values, known, _USUAL_DELAY_S)
         if spectra is None:
             continue
         filters = gyroscope_filters(law, axis, spectra.frequency)
@@ -195,7 +202,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
 
 
 def plant_spectra(
-    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float = 0.0
+    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float
 ) -> BlockSpectra | None:
     """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
 
@@ -219,16 +226,13 @@ def plant_spectra(
     if len(begins) < 2 or inside.sum() < 6:
         return None
     period = 1 / flight.rate_hz
-    parts = [
-        *transforms(instrument, begins, length, period),
-        *transforms(np.roll(command, early), begins, length, period),
-    ]
+    parts = [*transforms(instrument, begins, length, period), *transforms(np.roll(command, early), begins, length, period)]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
     parts += transforms(rate, begins, length, period, 2)
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
     if not power.sum() > 0:
         return None
-    spectra = block_spectra(parts, cut_blocks(power), frequency, inside)
+    spectra = block_spectra(parts, cut_blocks(np.sqrt(power)), frequency, inside)
     return spectra if len(spectra.windows) >= FEWEST_BLOCKS else None
 
 
@@ -242,6 +246,22 @@ def _window_s(flight: LogFlight) -> tuple[float, float]:
     return _SLOW_WINDOW_S if flight.rate_hz < _SLOW_HZ else _WINDOW_S
 
 
+def _kept(spectra: Numbers, instrument: int, windows: int) -> Array:
+    """Give the share of what an instrument says of the command that is not chance, shape (..., frequency)."""
+    cross = np.abs(smoothed(spectra[..., instrument, U])) ** 2
+    parts = smoothed(spectra[..., instrument, instrument].real) * smoothed(spectra[..., U, U].real)
+    coherence = np.minimum(cross / np.maximum(parts, _TINY), 1 - 1e-9)
+    statistic = coherence / (1 - coherence) * windows * SMOOTHED_BINS / SHARED_BINS
+    moves = smoothed(spectra[..., instrument, instrument].real)
+    moves = moves >= _SEEN * moves.max(axis=-1, keepdims=True)
+    return np.asarray(np.where(moves, np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0), 0.0))
+
+
+def _outer(cross: Numbers, power: Numbers) -> Numbers:
+    """Give what one signal explains of the spectra of others, shape (frequency, signal, signal)."""
+    return np.asarray(cross.conj()[:, :, None] * cross[:, None, :] / np.maximum(power.real, _TINY)[:, None, None])
+
+
 class _Equations:
     """Equations of one axis by frequency: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
 
@@ -252,14 +272,19 @@ class _Equations:
     def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float, instrument: int = Z) -> None:
         self.spectra, self.filters, self.at_hz, self.instrument = spectra, filters, at_hz, instrument
         self._seen = spectra.cross[:, :, instrument, U:]
-        power = (spectra.total[:, instrument, instrument] - spectra.cross[:, :, instrument, instrument]).real
-        others = np.moveaxis(self._seen.sum(axis=0) - self._seen, 2, 1)
-        predicted = smoothed(others) / np.maximum(smoothed(power), np.finfo(float).tiny)[:, None]
+        self._windows = int(spectra.windows.sum())
+        others = spectra.total - spectra.cross
+        cross, power = others[:, :, instrument, U:], others[:, :, instrument, instrument].real
+        predicted = smoothed(cross, axis=1) / np.maximum(smoothed(power, axis=1), _TINY)[..., None]
+        # Where the instrument moves the command no more than by chance it says nothing.
+        kept = _kept(others, instrument, self._windows)
         if instrument == U:
             # Least squares takes the command as it is.
-            predicted[:, 0] = 1.0
-        self._predicted = np.moveaxis(predicted, 1, 2)
-        self._windows = int(spectra.windows.sum())
+            predicted[..., 0], kept = 1.0, np.ones_like(kept)
+        self._predicted = predicted * kept[..., None]
+        rest = spectra.total[:, U:, U:] - _outer(spectra.total[:, instrument, U:], spectra.total[:, instrument, instrument])
+        shared = SHARED_BINS / SMOOTHED_BINS / self._windows
+        self._chance = rest * (shared * (kept**2).mean(axis=0))[:, None, None]
 
     def terms(self, values: Array) -> Numbers:
         """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
@@ -273,10 +298,12 @@ class _Equations:
         moved = values + step * np.concatenate([np.zeros((1, numbers)), np.eye(numbers), -np.eye(numbers)])
         terms = self.terms(moved)
         slopes = (terms[1 + numbers :] - terms[1 : 1 + numbers]) / (2 * step)
-        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * self._weight(terms[0])
+        weight = self._weight(terms[0])
+        predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * weight
         return Normal(
             np.einsum("bpf,qfs,bfs->bpq", predicted, slopes, self._seen, optimize=True).real,
             np.einsum("bpf,bf->bp", predicted, (terms[0] * self._seen).sum(axis=2)).real,
+            np.einsum("f,pfs,fst,qft->pq", weight, slopes.conj(), self._chance, slopes, optimize=True).real,
         )
 
     def _weight(self, terms: Numbers) -> Array:
@@ -299,11 +326,9 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
     seen = equations.spectra.total[:, equations.instrument, U:]
-    scale = np.maximum(
-        equations.spectra.total[:, equations.instrument, equations.instrument].real, np.finfo(float).tiny
-    )
-    for delay in np.arange(1.0, 16.0, 1.5):
-        values = np.concatenate([[0.0, delay], prior.mean[2:]])
+    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, _TINY)
+    for delay, share in product(np.arange(1.0, 16.0, 1.5), (-1.0, 0.5, 2.0)):
+        values = np.concatenate([[0.0, delay, share], prior.mean[3:]])
         terms = equations.terms(values)
         follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
         weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
@@ -314,14 +339,16 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
     low, high = np.full(len(prior.mean), -np.inf), np.full(len(prior.mean), np.inf)
     low[1], high[1] = _LEAST_DELAY, _MOST_DELAY_S / _DELAY_UNIT_S
     low[2:], high[2:] = prior.mean[2:] - 4 * prior.spread[2:], prior.mean[2:] + 4 * prior.spread[2:]
-    return estimate(equations, best[1], prior, (low, high))
+    # First with the shape all but held, so that gain and delay are about right when it is let go.
+    tight = Prior(prior.mean, np.where(np.isfinite(prior.spread), _TIGHT, np.inf))
+    return estimate(equations, solve(equations, best[1], tight, (low, high)).values, prior, (low, high))
 
 
 def _reference(spectra: BlockSpectra) -> float:
     """Choose the frequency where the log knows effectiveness best: in the middle of what the instrument moves."""
     clear = spectra.coherence(Z, U) * spectra.coherence(Z, Y)
-    weight = clear / np.maximum(1 - clear, 0.02)
-    middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), 1e-300)))
+    weight = _kept(spectra.total, Z, int(spectra.windows.sum())) * clear / np.maximum(1 - clear, 0.02)
+    middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), _TINY)))
     return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
 
 
@@ -331,7 +358,7 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
     fit, plain = _fitted(equations, yaw), _fitted(_Equations(spectra, filters, at_hz, U), yaw)
     first = np.eye(len(fit.values))[0]
     half_gain, total = float(np.hypot(fit.half(first), GAIN_FLOOR)), _delay_at(fit, at_hz)
-    verdict, reason = _judged(fit, half_gain, total.half)
+    verdict, reason = _judged(fit, half_gain, total)
     return AxisPlant(
         axis=axis,
         verdict=verdict,
@@ -371,12 +398,12 @@ def _delay_at(fit: Fit, at_hz: float) -> Estimate:
     return Estimate(value=value, low=value - half, high=value + half)
 
 
-def _judged(fit: Fit, half_gain: float, half_delay: float) -> tuple[str, str]:
+def _judged(fit: Fit, half_gain: float, total: Estimate) -> tuple[str, str]:
     if fit.strength[0] < STRONG:
         return "weak", "the instrument moves the vehicle too little"
-    if not fit.settled:
+    if not fit.settled or total.high < 0:
         return "weak", "no model of a multirotor fits"
-    if half_gain > NARROW or half_delay > NARROW_DELAY_S:
+    if half_gain > NARROW or total.half > NARROW_DELAY_S:
         return "weak", "the interval is too wide"
     return "identified", ""
 
