@@ -59,7 +59,7 @@ FRD: Final = np.array([1.0, -1.0, -1.0])
 _AHEAD_S: Final = 0.1
 """By which a sample is taken before the message that holds it is stamped, at most."""
 
-_THINNED, _PASSED = 1.25, 0.4
+_THINNED, _PASSED = 1.5, 0.4
 """Times as fast as a clock from which on a signal is filtered before it is put on it, and up to which share of the
 clock's rate it passes."""
 

@@ -30,8 +30,8 @@ _FOLLOWS: Final = 0.6
 _LARGEST: Final = 0.999
 """Quantile of speeds that is taken for the largest."""
 
-_OLD_FULL, _FULL = 4500.0, 1.5
-"""Full command of ArduCopter before 3.4, and the largest of the versions since."""
+_OLD_FULL, _FULL = 4500.0, 3.0
+"""Full command of ArduCopter before 3.4, and the root mean square that no commands of the versions since have."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _output(log: LookedLog, autopilot: Autopilot | None) -> Samples | None:
     if autopilot is not None and autopilot.name == "betaflight":
         return _sum_of_terms(log)
     found = next(log.found("output"), None)
-    if found is not None and found.source.startswith("RATE.") and float(np.abs(found.values).max()) > _FULL:
+    if found is not None and found.source.startswith("RATE.") and float(np.sqrt(np.mean(found.values**2))) > _FULL:
         found = found._replace(values=found.values / _OLD_FULL)
     return found if found is not None and float(np.ptp(found.values)) > 0 else None
 

@@ -116,10 +116,11 @@ def _gyroscope(flight: LogFlight) -> str:
 
 def _rows(flight: LogFlight, log: LookedLog, recognition: Recognition) -> list[SignalRow]:
     """List signals with their own clocks, what is needed most first."""
+    rotors = f"rotor commands{', rebuilt' if flight.rotors_source == 'rebuilt' else ''}"
     named: list[tuple[str, Samples | None, float]] = [
         ("body rate", flight.gyroscope, _RATE_HZ),
         ("unfiltered gyroscope", flight.gyroscope_unfiltered, _GYROSCOPE_HZ),
-        ("rotor commands", flight.rotors if len(flight.rotors.time) else None, _ROTORS_HZ),
+        (rotors, flight.rotors if len(flight.rotors.time) else None, _ROTORS_HZ),
         ("rotor speeds", flight.rotor_speed, np.nan),
         ("accelerometer", flight.accelerometer, np.nan),
     ]
@@ -135,7 +136,7 @@ def _rows(flight: LogFlight, log: LookedLog, recognition: Recognition) -> list[S
         if samples is not None and what not in rows and len(samples.time) > 1:
             rows[what] = _row(flight, what, samples, asked)
     asked = bool(np.isfinite(flight.rate_setpoint).any())
-    for what in ("rotor commands", *(() if asked else ("setpoint body rate",))):
+    for what in (rotors, *(() if asked else ("setpoint body rate",))):
         lacks = SignalRow(signal=what, source="", rate_hz=0.0, lost=0.0, longest_gap_s=0.0, asked_hz=_RATE_HZ)
         rows.setdefault(what, lacks)
     return list(rows.values())

@@ -217,3 +217,36 @@ def test_thrust_that_stays_at_nothing_is_no_flight():
     contents.topics["ATT"] |= {f"Des{name}": contents.topics["ATT"][name] for name in ("Roll", "Pitch", "Yaw")}
     with pytest.raises(InputError, match="stays at 0"):
         read(contents)
+
+
+def test_output_in_counts_of_old_copters():
+    acts = 4500 * logs.command(OWN, "ardupilot")
+    output = topic(OWN, 2, named(acts, "ROut", "POut", "YOut") | {"AOut": 0.4 + 0.01 * np.sin(OWN.time)})
+    found = read(logs.ardupilot(OWN, motors=10, more={"RATE": output}))
+    assert found.command_source.startswith("output of the rate loop, RATE.ROut")
+    np.testing.assert_allclose(found.command[2:-2:2], on(found, acts / 4500)[2:-2:2], atol=5e-3)
+
+
+@pytest.mark.parametrize(("names", "source"), [("rpm{}", "speeds of rotors"), ("omcmd{}", "logged rotors")])
+def test_speeds_of_rotors_act_by_their_squares(names, source):
+    columns = dict(logs.plain(OWN).topics[""])
+    speeds = [columns.pop(f"motor_cmd_{number}") * logs.FULL for number in range(1, 5)]
+    factor = 30 / np.pi if "rpm" in names else 1.0
+    columns |= {names.format(number): factor * own for number, own in enumerate(speeds, start=1)}
+    found = read(logs.LogContents({"": columns}))
+    assert found.command_source.startswith(source)
+    # Shares of the largest speed, whatever that is.
+    made = on(found, logs.command(OWN, ""))
+    largest = np.quantile(np.array(speeds).max(axis=0), 0.999) / logs.FULL
+    np.testing.assert_allclose(found.command, made / largest**2, atol=0.02)
+    assert 0.3 < np.nanmedian(found.collective) < 1.0
+
+
+def test_a_torque_that_is_asked_for_acts():
+    columns = dict(logs.plain(OWN).topics[""])
+    columns = {name: own for name, own in columns.items() if not name.startswith("motor_cmd")}
+    torque = logs.command(OWN, "") * [0.1, 0.1, 0.02] @ FLIP
+    found = read(logs.LogContents({"": columns | named(torque, "torque_x", "torque_y", "torque_z")}))
+    assert "shares of the largest" in found.command_source
+    assert min(turning(found)) > 0.9
+    assert np.abs(found.command).max() == pytest.approx(1.0)
