@@ -89,6 +89,10 @@ class Chart:
         Unique on the page.
     title : str
         What it shows, for who does not see it.
+    table : bool
+        Whether its numbers stand below it, folded away.
+    least_left : float
+        Room for the words of the y axis, px; charts one above the other have the same.
     """
 
     name: str
@@ -98,6 +102,7 @@ class Chart:
     width: int = 380
     height: int = 240
     table: bool = True
+    least_left: float = 0.0
     _parts: list[str] = field(default_factory=list)
     _marks: list[tuple[float, str]] = field(default_factory=list)
     _legend: list[tuple[str, Style, str]] = field(default_factory=list)
@@ -105,7 +110,7 @@ class Chart:
 
     @property
     def _left(self) -> float:
-        return 14 + _LETTER * max((len(each) for each in self.y.ticks().values()), default=1)
+        return max(self.least_left, 14 + _LETTER * max((len(each) for each in self.y.ticks().values()), default=1))
 
     def _px(self, x: Any) -> Array:
         return np.asarray(self._left + self.x.share(x) * (self.width - self._left - _RIGHT))
@@ -262,7 +267,7 @@ class Chart:
         for at, label in sorted(self._marks):
             half = _LETTER * len(label) / 2
             x = min(max(at, free + half), self.width - half)
-            if label and abs(x - at) <= half and x + half <= self.width:
+            if label and abs(x - at) <= half and x - half >= free:
                 yield f'<text x="{x:.1f}" y="{_TOP - 8}" text-anchor="middle">{_text(label)}</text>'
                 free = x + half + 6
 

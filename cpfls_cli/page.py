@@ -43,7 +43,7 @@ TONES = ("good", "note", "warning", "unsure")
 _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
-_SPECIAL = re.compile(r"[\\`*_{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
+_SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _LONG = 36
 """Characters from which the words of a cell are a sentence, which a terminal breaks."""
 _NEAR = 0.1
@@ -295,7 +295,7 @@ def _table(node: SyntaxTreeNode) -> Table:
 
 def markdown(text: str) -> str:
     """Write a page as Markdown that every reader of Markdown knows; figures by their captions."""
-    return "".join(_markdown_of(tree(text)))
+    return "".join(_markdown_of(tree(text))).rstrip() + "\n"
 
 
 def _markdown_of(nodes: Iterable[Node]) -> Iterator[str]:

@@ -6,21 +6,24 @@ command line finds both by the name of the module (`cli/stages.py`).
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Progress, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, write_text
+from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError, visible
-from cpfls_cli.report.content import Text
+from cpfls_cli.report.content import Facts, Folded, Table, Text
+from cpfls_cli.report.forms import Form
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
-from cpfls_cli.result import plain
+from cpfls_cli.result import datasets, plain
 
 _INDEX = "index"
 """File of the page over several results, and the end of the name of its template."""
@@ -69,6 +72,8 @@ class Run:
         """Check inputs, and take note of what they hold: those of all results, or of the one of this name."""
         own = self._of(of)
         own.files.update(take_inputs(own, roles))
+        if self.output is not None:
+            refuse_inputs(self.output, self.inputs)
         return own.files
 
     def caution(self, text: str, of: str = "") -> None:
@@ -159,6 +164,34 @@ class Stage:
             written=run.output,
         )
 
+    def info(self, path: Path) -> Outcome:
+        """Say again what a file answers, where it comes from and what it holds."""
+        given, origin = store.read(path, self.kind)
+        seed = "" if origin.seed is None else f", seed {origin.seed}"
+        made = [("made by", f"cpfls {origin.version}{seed}")]
+        made += [(role, f"{own.name} (sha256 {own.sha256[:12]})") for role, own in origin.inputs.items()]
+        rows = [(path, own.about.unit, own.about.text) for path, own in datasets(self.kind) if own.about]
+        table = Table("datasets", "", ("Dataset", "Unit", "What it holds"), rows, frozenset({0, 1, 2}), frozenset({2}))
+        inputs = {role: vars(own) for role, own in origin.inputs.items()}
+        summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "inputs": inputs}
+        return Outcome(
+            {**summary, "cautions": list(origin.cautions), "result": plain(given)},
+            (
+                *page.blocks(self.text(given)),
+                *caution_texts(origin.cautions),
+                Folded("where it comes from", [Facts(made)]),
+                Folded(f"what its {len(rows)} datasets hold", [table]),
+            ),
+            next=(("cpfls", "check", path),),
+        )
+
+    def report(self, path: Path, form: Form) -> str:
+        """Write the page of a file in any form."""
+        given, _ = store.read(path, self.kind)
+        if form is Form.JSON:
+            return json.dumps(plain(given), allow_nan=False, indent=2) + "\n"
+        return page.markdown(self.text(given)) if form is Form.MARKDOWN else self.page(path.stem, given)
+
     def _check(self, run: Run, output: Path) -> None:
         if not self.folder:
             check_output(output, run.force, run.inputs)
@@ -174,12 +207,20 @@ class Stage:
             store.write(output, results[""], run.origin())
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
-        with filled_folder(output, [*several, *(name + end for name in results for end in (".h5", ".html"))]) as folder:
+        names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
+        for name in names:
+            refuse_inputs(output / name, run.inputs)
+        with filled_folder(output, names) as folder:
             for name, each in results.items():
                 store.write(folder / f"{name}.h5", each, run.origin(name))
                 write_text(folder / f"{name}.html", self.page(name, each))
             for name, every in several.items():
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
+
+
+def loaded(module: str) -> Stage:
+    """Load the stage of a module of `stages`."""
+    return next(each for each in vars(import_module(f"cpfls_cli.stages.{module}")).values() if isinstance(each, Stage))
 
 
 def stage(

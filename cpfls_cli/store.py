@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from cpfls_cli.artifacts.check import dataset_of, opened_file
+from cpfls_cli.artifacts.formats import stage_of_format
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, InputFile
@@ -158,10 +159,13 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
     return given, origin, findings(given)
 
 
-def format_of(path: Path) -> str:
-    """Tell the format of a file that ends in its seal."""
-    with opened_file(path) as file:
-        return str(file.attrs.get("format"))
+def stage_of(path: Path) -> str:
+    """Name the module of the stage whose result a file is; empty where it is none, as who reads it then says."""
+    try:
+        with opened_file(path) as file:
+            return stage_of_format(str(file.attrs.get("format")))
+    except InputError:
+        return ""
 
 
 def _origin(file: h5py.File) -> Origin:

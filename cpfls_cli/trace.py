@@ -27,14 +27,17 @@ class Track:
 def track(
     labels: tuple[str, ...], time: Array, values: Array, *, dashed: bool = False, most: int = MOST_SAMPLES
 ) -> Track:
-    """Take signals, shape (sample,) or (sample, channel), of increasing time; gaps and long signals are thinned out."""
-    held = np.asarray(values, np.float32).reshape(len(time), -1)
+    """Take signals, shape (sample,) or (sample, channel), of increasing time; those without a value are left out."""
+    held = np.asarray(values, np.float32).reshape(len(time), len(labels))
+    known = np.atleast_1d(np.isfinite(held).any(axis=0))
+    held = held[:, known]
     steps = np.diff(time)
     behind = np.flatnonzero(steps > _PAUSE * np.median(steps)) + 1 if len(steps) else np.empty(0, int)
     # Between the last sample before a gap and the first behind it no line leads.
     whole_time = np.insert(np.asarray(time, float), behind, 0.5 * (time[behind - 1] + time[behind]))
     kept_time, kept = thinned(whole_time, np.insert(held, behind, np.nan, axis=0), most)
-    return Track(labels=labels, dashed=dashed, time=kept_time, values=kept)
+    named = tuple(label for label, one in zip(labels, known, strict=True) if one)
+    return Track(labels=named, dashed=dashed, time=kept_time, values=kept)
 
 
 def thinned(time: Array, values: NDArray[np.float32], most: int) -> tuple[Array, NDArray[np.float32]]:

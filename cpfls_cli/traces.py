@@ -67,7 +67,7 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = 
     str
         HTML, with scripts and styles of its own; one such part is on a page. Empty where there is no signal.
     """
-    held = {title: [each for each in tracks if len(each.time)] for title, tracks in panels.items()}
+    held = {title: [each for each in tracks if each.values.size] for title, tracks in panels.items()}
     shown = {title: tracks for title, tracks in held.items() if tracks}
     every = [each for tracks in shown.values() for each in tracks]
     if not every:
@@ -148,7 +148,7 @@ def _still(
         last = at == len(panels) - 1
         drawn = [(own, *thinned(own.time, own.values, _STILL)) for own in tracks]
         x, y = Axis("s" if last else "", *ends), Axis(title, *span(*(values for *_, values in drawn)))
-        chart = Chart(f"still-{at}", title, x, y, width=1000, height=170, table=False)
+        chart = Chart(f"still-{at}", title, x, y, width=1000, height=170, least_left=64, table=False)
         for event in events:
             chart.mark(event.text if at == 0 and event.severity != _SEVERITIES[0] else "", x=event.time_s)
         for own, time, values in drawn:

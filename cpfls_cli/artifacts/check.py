@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import h5py
 import numpy as np
 
-from cpfls_cli.artifacts.formats import record_of_format
+from cpfls_cli.artifacts.formats import record_of_format, stage_of_format
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import (
     CONFIG,
@@ -290,7 +290,8 @@ def _identify(path: Path, file: h5py.File) -> Format:
         )
     known = record_of_format(name, _text_attribute(file, "kind") or "")
     if known is None:
-        raise InputError(f"{path}: format = '{name}': not known to this cpfls")
+        where = "command; `cpfls info` shows what it holds" if stage_of_format(name) else "cpfls"
+        raise InputError(f"{path}: format = '{name}': not known to this {where}")
     return known.spec()
 
 

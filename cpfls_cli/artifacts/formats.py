@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
+from pathlib import Path
 from textwrap import fill
 
 from cpfls_cli.artifacts.spec import DatasetSpec, Format, Record
@@ -46,6 +48,13 @@ def record_of_format(name: str, kind: str = "") -> type[Record] | None:
     module, record = place.split(".")
     found: type[Record] = getattr(import_module(f"cpfls_cli.artifacts.{module}"), record)
     return found
+
+
+def stage_of_format(name: str) -> str:
+    """Name the module of the stage whose results have this format, which is no record's; empty where there is none."""
+    module = name.removeprefix("cpfls/").replace("-", "_")
+    found = re.fullmatch(r"[a-z]\w*", module) and (Path(__file__).parents[1] / "stages" / f"{module}.py").is_file()
+    return module if found else ""
 
 
 def records() -> list[type[Record]]:

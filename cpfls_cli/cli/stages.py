@@ -41,7 +41,7 @@ class StageCommand(TyperCommand):
     @cached_property
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        app.command(self.name)(with_common(command_of(load(self._file))))
+        app.command(self.name)(with_common(command_of(import_module("cpfls_cli.stage").loaded(self._file.stem))))
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -79,14 +79,6 @@ def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
     files = {file.stem.replace("_", "-"): file for file in sorted(folder.glob("[a-z]*.py"))}
     names = [*(name for name in _FIRST if name in files), *(name for name in files if name not in _FIRST)]
     return {name: StageCommand(files[name]) for name in names}
-
-
-def load(file: Path) -> Stage:
-    """Load the stage of a module."""
-    module = import_module(f"cpfls_cli.stages.{file.stem}")
-    kind = import_module("cpfls_cli.stage").Stage
-    found: Stage = next(each for each in vars(module).values() if isinstance(each, kind))
-    return found
 
 
 def command_of(own: Stage) -> Callable[..., None]:

@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import resolved
+from cpfls_cli.errors import InputError
 from cpfls_cli.pages.comparison import model_verdicts
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
@@ -19,11 +20,15 @@ from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.stage import loaded
+from cpfls_cli.store import stage_of
 from cpfls_cli.version import __version__
 
 
 def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
     """Write a report about artifacts."""
+    if of_stages := [path for path in artifacts if stage_of(path)]:
+        return _of_result(job, of_stages[0], artifacts, form or form_of(job.output))
     inputs = begin(job, {str(path): path for path in artifacts})
     files = {path: inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
@@ -37,6 +42,19 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
     equal = [f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept]
     return _outcome(job.output, page, given, [*again, *equal])
+
+
+def _of_result(job: Job, path: Path, given: Sequence[Path], form: Form) -> Outcome:
+    """Write the page that a result has by itself."""
+    if len(given) > 1:
+        raise InputError(f"{path}: has a page of its own, which no other artifact goes into; report on it alone")
+    begin(job, {str(path): path})
+    text = loaded(stage_of(path)).report(path, form)
+    if job.dry_run:
+        return nothing_written(job)
+    write_text(job.output, text)
+    size = len(text.encode())
+    return Outcome({"output": str(job.output), "bytes": size}, (Text(f"{size} bytes"),))
 
 
 def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:

@@ -18,6 +18,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.pages.trust import stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.store import examine, stage_of
 
 _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
@@ -42,6 +43,9 @@ _PAGES = {
 
 def info(path: Path) -> Outcome:
     """Describe an artifact: where it comes from and what it holds."""
+    if name := stage_of(path):
+        made: Outcome = import_module("cpfls_cli.stage").loaded(name).info(path)
+        return made
     artifact = read_outline(path)
     header = artifact.header
     datasets = {name: _describe_dataset(artifact, name) for name in artifact.shapes}
@@ -121,11 +125,15 @@ def _dataset_row(name: str, entry: dict[str, Any]) -> list[str]:
 
 def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
-    spec, findings = findings_of(path)
-    summary = {"file": str(path), "format": spec.name, "good": not findings, "findings": findings}
-    kind = None if findings else record_of_format(spec.name, spec.kind)
+    if stage := stage_of(path):
+        made = import_module("cpfls_cli.stage").loaded(stage).kind
+        name, kind, findings = made.FORMAT, None, examine(path, made)[2]
+    else:
+        spec, findings = findings_of(path)
+        name, kind = spec.name, None if findings else record_of_format(spec.name, spec.kind)
+    summary = {"file": str(path), "format": name, "good": not findings, "findings": findings}
     stopped = stopped_words(read_record(path, kind)) if kind is not None and issubclass(kind, ModelRecord) else ""
-    good = f"keeps to its format ({spec.name}), but its search was {stopped}" if stopped else f"good ({spec.name})"
+    good = f"keeps to its format ({name}), but its search was {stopped}" if stopped else f"good ({name})"
     summary |= {"stopped": stopped} if stopped else {}
     said = [Text(f"{path}: {finding}") for finding in findings] or [Text(f"{path}: {good}")]
     rest = said[_FINDINGS_SHOWN:]

@@ -1,0 +1,250 @@
+"""A file with a stage and a template is a command."""
+
+import importlib
+import json
+import sys
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import typer
+
+import cpfls_cli.stages
+from cpfls_cli.cli.stages import AllCommands, stage_commands
+from cpfls_cli.result import about, result
+from cpfls_cli.stage import Run, stage, unique_names
+from tests.builders.studies import TINY, VEHICLE
+
+STAGE = '''\
+"""Weigh a craft.
+
+More of it.
+"""
+
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import typer
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.result import about, result
+from cpfls_cli.stage import stage
+
+
+@result
+class Weighed:
+    """What a craft weighs."""
+
+    FORMAT: ClassVar = "cpfls/weigh-it"
+
+    mass: float = about("of the craft", unit="kg")
+    seed: int = about("that the config has", default=0)
+
+
+@stage(Weighed, figures={"scale": lambda r: f"<svg><title>{r.mass}</title></svg>"}, study=STUDY)
+def weigh(
+    run,
+    craft: Annotated[Path, typer.Argument(metavar="CRAFT")],
+    factor: Annotated[float, typer.Option("--factor", help="Times as much.")] = 1.0,
+) -> Weighed | None:
+    """Weigh."""
+    run.take({"craft": craft})
+    if run.dry_run:
+        return None
+    words = craft.read_text().split()
+    if not words:
+        raise ComputationError(f"{craft}: weighs nothing")
+    run.progress(1, 1)
+    run.caution("a rough scale")
+    run.next.append(("cpfls", "info", run.output))
+    return Weighed(mass=factor * float(words[0]), seed=run.study.seed if run.study else 0)
+'''
+TEMPLATE = """\
+# It weighs {{ r.mass | number(2) }} kg {good}
+![A scale](scale)
+::: More
+Seed {{ r.seed }}.
+:::
+"""
+
+
+@pytest.fixture(params=[False, True], ids=["alone", "with a study"])
+def house(request, tmp_path, monkeypatch):
+    """A folder with a stage and its template, and the commands of it."""
+    stages, templates = tmp_path / "house" / "stages", tmp_path / "house" / "templates"
+    stages.mkdir(parents=True)
+    templates.mkdir()
+    (stages / "weigh_it.py").write_text(STAGE.replace("STUDY", str(request.param)))
+    (templates / "weigh_it.md.j2").write_text(TEMPLATE)
+    (tmp_path / "craft.txt").write_text("1.25")
+    (tmp_path / "study.yaml").write_text(TINY + VEHICLE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cpfls_cli.stages, "__path__", [str(stages)])
+    importlib.invalidate_caches()
+    yield stages, ["study.yaml"] if request.param else []
+    importlib.sys.modules.pop("cpfls_cli.stages.weigh_it", None)
+
+
+def called(house, capsys, *words):
+    """Run the command; give its exit code and what it printed."""
+    stages, config = house
+    command = stage_commands(stages)["weigh-it"]
+    try:
+        command.main([*config, *map(str, words)], prog_name="cpfls weigh-it", standalone_mode=True)
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr()
+    return code or 0, said.out, said.err
+
+
+def test_it_is_listed_without_being_loaded(house):
+    command = stage_commands(house[0])["weigh-it"]
+    assert command.get_short_help_str() == "Weigh a craft."
+    assert "cpfls_cli.stages.weigh_it" not in importlib.sys.modules
+    assert {"craft", "factor", "output", "as_json", "dry_run"} <= {own.name for own in command.params}
+    assert "cpfls_cli.stages.weigh_it" in importlib.sys.modules
+
+
+def test_it_computes_writes_and_answers(house, capsys, tmp_path):
+    code, out, err = called(house, capsys, "craft.txt", "-o", "w.h5", "--factor", "2")
+    assert code == 0, err
+    assert out.splitlines() == ["It weighs 2.5 kg", "next:", "  cpfls info w.h5", "more with -v: More"]
+    assert err == "cpfls: note: a rough scale\n"
+    first = (tmp_path / "w.h5").read_bytes()
+    code, out, _ = called(house, capsys, "craft.txt", "-o", "w.h5", "--factor", "2", "--force", "--json")
+    told = json.loads(out)
+    assert (told["mass"], told["cautions"]) == (2.5, ["a rough scale"])
+    assert (tmp_path / "w.h5").read_bytes() == first
+
+
+def test_common_options(house, capsys, tmp_path):
+    assert "Seed" in called(house, capsys, "craft.txt", "-o", "w.h5", "-v")[1]
+    code, _, err = called(house, capsys, "craft.txt", "-o", "w.h5")
+    assert (code, err) == (2, "cpfls: error: w.h5: exists already; --force replaces it\n")
+    assert called(house, capsys, "craft.txt", "-o", "w.h5", "--force", "-q") == (0, "", "")
+    code, out, _ = called(house, capsys, "craft.txt", "-o", "x.h5", "--dry-run")
+    assert (code, out) == (0, "x.h5: would be written; all inputs are good\n")
+    assert not (tmp_path / "x.h5").exists()
+    code, _, err = called(house, capsys, "craft.txt", "-o", "x.h5", "--set", "seed=9")
+    assert code == (0 if house[1] else 2)
+    assert ("this command reads no config" in err) != bool(house[1])
+
+
+def test_what_a_user_can_cause_ends_in_one_sentence(house, capsys, tmp_path):
+    (tmp_path / "empty.txt").write_text("")
+    assert called(house, capsys, "empty.txt", "-o", "x.h5")[::2] == (1, "cpfls: error: empty.txt: weighs nothing\n")
+    assert called(house, capsys, "none.txt", "-o", "x.h5")[::2] == (2, "cpfls: error: none.txt: no such file\n")
+    assert called(house, capsys, "craft.txt", "-o", "craft.txt", "--force")[0] == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["craft.txt", "empty.txt", "house", "study.yaml"]
+
+
+def test_look_stands_first_and_help_loads_no_stage(cpfls):
+    commands = typer.main.get_command(importlib.import_module("cpfls_cli.cli.app").app)
+    assert isinstance(commands, AllCommands)
+    assert next(iter(commands.commands)) == "look"
+    assert "\nCommands:\n  look  " in cpfls("--help").stdout
+
+
+@result
+class Named:
+    """A thing."""
+
+    FORMAT: ClassVar = "cpfls/look"
+
+    name: str = about("of it")
+    system: str = about("that wrote it", default="")
+
+
+@stage(Named, folder=True)
+def several(run, names):
+    """Give a thing for each name."""
+    run.progress(0, len(names))
+    return {name: Named(name=name) for name in names}
+
+
+@pytest.fixture
+def at_home(monkeypatch, tmp_path):
+    """Templates of the stage above."""
+    folder = tmp_path / "templates"
+    folder.mkdir()
+    (folder / "look.md.j2").write_text("# A {{ r.name }}\n")
+    (folder / "look_index.md.j2").write_text("# {{ r | length | plural('thing') }}\n")
+    monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
+
+
+@pytest.mark.usefixtures("at_home")
+def test_several_results_have_a_page_each_and_an_index(tmp_path):
+    run = Run(output=tmp_path / "out")
+    run.caution("all")
+    run.caution("of b", "b")
+    outcome = several.run(run, names=["a", "b"])
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "a.h5",
+        "a.html",
+        "b.h5",
+        "b.html",
+        "index.html",
+    ]
+    assert "<h1>2 things</h1>" in (tmp_path / "out" / "index.html").read_text()
+    assert "<h1>A b</h1>" in (tmp_path / "out" / "b.html").read_text()
+    assert [block.text for block in outcome.blocks] == ["2 things", "A a", "A b", "all", "of b"]
+    assert outcome.summary["b"]["name"] == "b"
+    assert run.origin("a").cautions == ("all",)
+    assert run.origin("b").cautions == ("all", "of b")
+
+
+@pytest.mark.usefixtures("at_home")
+def test_one_result_is_the_answer_and_without_output_nothing_is_written(tmp_path):
+    outcome = several.run(Run(), names=["a"])
+    assert outcome.summary == {"name": "a", "system": ""}
+    several.run(Run(output=tmp_path / "out"), names=["a"])
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.h5", "a.html"]
+
+
+def test_names_of_files_are_unique(tmp_path):
+    paths = [
+        tmp_path / "1" / "a.bbl",
+        tmp_path / "2" / "a.bbl",
+        tmp_path / "b.csv.gz",
+        tmp_path / "3" / "a.ulg",
+        tmp_path / ".x",
+    ]
+    assert list(unique_names(paths)) == ["a", "a-2", "b", "a-3", ".x"]
+    assert np.array_equal(list(unique_names(paths).values()), paths)
+
+
+@pytest.fixture
+def looked(cpfls, tmp_path, monkeypatch):
+    """What `look` wrote of a log."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("t,wx,wy,wz\n" + "".join(f"{0.01 * k},0,{k % 7},0\n" for k in range(300)))
+    (tmp_path / "study.yaml").write_text(TINY + VEHICLE)
+    assert cpfls("look", "log.csv", "-o", "out").exit_code == 0
+    return tmp_path / "out" / "log.h5"
+
+
+def test_info_check_and_report_know_results(cpfls, looked):
+    told = json.loads(cpfls("info", looked, "--json").stdout)
+    assert (told["format"], told["result"]["name"]) == ("cpfls/look", "log.csv")
+    said = cpfls("info", looked, "-v").stdout
+    assert "log.csv (sha256 " in said
+    assert cpfls("check", looked).stdout.startswith(f"{looked}: good (cpfls/look)\n")
+    for name in ("r.html", "r.md", "r.json"):
+        assert cpfls("report", "study.yaml", looked, "-o", name).exit_code == 0
+        assert "log.csv" in (looked.parents[1] / name).read_text()
+    assert (looked.parents[1] / "r.html").read_text() == looked.with_suffix(".html").read_text()
+
+
+def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
+    log = looked.parents[1] / "log.csv"
+    for words, message in (
+        (("report", "study.yaml", looked, looked, "-o", "x.html"), "has a page of its own"),
+        (("export", looked, "-o", "x.json"), "`cpfls info` shows what it holds"),
+        (("look", looked), "is an artifact of this program"),
+        (("look", log, "-o", "x.html"), "-o x\n"),
+        (("look", log, "-o", "out"), "--force"),
+    ):
+        result = cpfls(*words)
+        assert result.exit_code == 2
+        assert message in result.stderr
+        assert result.stderr.count("\n") == 1
