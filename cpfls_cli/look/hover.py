@@ -9,7 +9,6 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.steady import (
     WINDOW_S,
-    Known,
     StatedCurve,
     Windows,
     jackknifed,
@@ -105,23 +104,21 @@ def hover_of(flight: LogFlight) -> Hover | None:
         return None
     stated = stated_curve(flight)
     found_by, windows, throttle = _hovering(flight, stated)
-    known = jackknifed(lambda kept: np.array([throttle[kept].mean()]), len(throttle))
+    both = np.stack([throttle, stated.thrusts(throttle)], axis=1)
+    known = jackknifed(lambda kept: both[kept].mean(axis=0), len(both))
     voltage = windows.means(on_clock(flight, flight.voltage))[:, 0]
     time = windows.begin - windows.begin[0] if len(windows.begin) else windows.begin
     drift = jackknifed(lambda kept: _slope(time[kept], throttle[kept]) * np.ptp(time), len(time))
-    thrust = stated.thrusts(throttle)
-    of_thrust = jackknifed(lambda kept: np.array([thrust[kept].mean()]), len(thrust))
-    shape, hover = _shape(flight, stated), known.estimate() if known else None
     return Hover(
         found_by=found_by if known else "",
-        throttle=hover,
+        throttle=known.estimate(0) if known else None,
         scatter=float(throttle.std(ddof=1)) if known else np.nan,
         hover_s=len(throttle) * WINDOW_S,
         drift=drift.estimate() if drift else None,
         voltage_drift=float(_slope(time, voltage)[0] * np.ptp(time)) if drift else np.nan,
-        shape=shape,
+        shape=_shape(flight, stated),
         battery=_battery(flight, throttle),
-        stated=_compared(flight, of_thrust),
+        stated=_compared(flight, known.estimate(1)) if known else None,
     )
 
 
@@ -189,12 +186,12 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     )
 
 
-def _compared(flight: LogFlight, thrust: Known | None) -> Stated | None:
+def _compared(flight: LogFlight, thrust: Estimate) -> Stated | None:
     """Compare the thrust that hovers with what the autopilot was given, or learned."""
     autopilot = AUTOPILOTS.get(flight.autopilot)
     hover = autopilot.by_role("motors.hover") if autopilot else None
     value = number(flight, hover.name) if hover else None
-    return Stated(parameter=hover.name, value=value, measured=thrust.estimate()) if hover and value and thrust else None
+    return Stated(parameter=hover.name, value=value, measured=thrust) if hover and value else None
 
 
 def _battery(flight: LogFlight, throttle: Array) -> Battery | None:

@@ -161,5 +161,7 @@ def stated_curve(flight: LogFlight) -> StatedCurve:
     name, expo = found.get("expo", ("", np.nan))
     low, high = found.get("low", ("", 0.0))[1], found.get("high", ("", 1.0))[1]
     curve = ThrustCurve(expo if name else 0.0, low, high if high > low else 1.0, bool(autopilot and autopilot.series))
-    # PX4 applies its curve behind what it logs there.
-    return StatedCurve(curve, name, expo, "actuator_motors" in flight.rotors.source)
+    # PX4 applies its curve behind what it logs there; what is asked of the mixer is thrust.
+    asked = "actuator_motors" in flight.rotors.source or not flight.rotors.values.size
+    rebuilt = flight.autopilot == "px4" and flight.rotors_source == "rebuilt"
+    return StatedCurve(curve, name, expo, asked or rebuilt)
