@@ -102,7 +102,9 @@ class Vibration:
     spectra: dict[str, Spectrum] = part()
     lines: tuple[Line, ...] = part()
     lines_lack: str = about("why no line can be seen: empty, rate, or time")
-    limit: tuple[float, ...] = about("of the autopilot for the accelerometer: doubtful, bad", "level", unit="m/s^2")
+    limit: tuple[float, ...] = about(
+        "of the autopilot for an unfiltered accelerometer: doubtful, bad", "level", unit="m/s^2"
+    )
     folds: bool = about("whether what is above half the logged rate may be folded below")
     jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
     filters: tuple[StatedFilter, ...] = part()
@@ -137,11 +139,13 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     filters = tuple(_filters(flight, autopilot, law, lines)) if autopilot and law else ()
     level, hz, db = _map(flight, main) if main else (np.empty(0), np.empty(0), np.empty((0, 0)))
     highest = 0.5 * (before or after).rate_hz
+    # What ArduPilot logs as IMU is behind its low-pass of 20 Hz.
+    smooth = flight.accelerometer is not None and flight.accelerometer.source.startswith("IMU")
     return Vibration(
         spectra=spectra,
         lines=lines,
         lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
-        limit=LIMITS.get(flight.autopilot, ()),
+        limit=() if smooth else LIMITS.get(flight.autopilot, ()),
         folds=highest < _FOLDS_HZ,
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
