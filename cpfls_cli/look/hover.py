@@ -11,6 +11,7 @@ from cpfls_cli.look.steady import (
     WINDOW_S,
     StatedCurve,
     Windows,
+    calm,
     jackknifed,
     number,
     on_clock,
@@ -20,10 +21,10 @@ from cpfls_cli.look.steady import (
 from cpfls_cli.result import Estimate, about, part, result
 
 GRAVITY = 9.80665
-_HOVERS, _CLIMBS, _TILTS = 0.05, 0.3, np.radians(10.0)
-"""Most difference of the vertical specific force from gravity, share; climb rate, m/s; and tilt, rad."""
-_STANDS = 0.5
-"""Share of the median thrust below which a vehicle that shows gravity stands on the ground."""
+_HOVERS, _CLIMBS = 0.05, 0.3
+"""Most difference of the vertical specific force from gravity, share, and climb rate, m/s."""
+_ON_GROUND = 0.5
+"""Share of the median thrust below which a vehicle that shows gravity is on the ground."""
 _CURVE_S, _SPREAD, _LEAST_FORCE, _SHARPEST = 0.5, 1.25, 0.2, 0.5
 """Windows of the thrust curve; least ratio of the 95th to the 5th percentile of the collective; least specific force
 along the thrust, in g: below, drag and inflow count as much as the rotors; half-width of the exponent of thrust above
@@ -129,13 +130,12 @@ def _hovering(flight: LogFlight, stated: StatedCurve) -> tuple[str, Windows, Arr
         windows.means(on_clock(flight, each))[:, 0]
         for each in (flight.collective, flight.climb_rate, -flight.specific_force[:, 2])
     )
-    tilt = windows.means(on_clock(flight, np.hypot(flight.attitude[:, 0], flight.attitude[:, 1])))[:, 0]
-    level = ~(np.abs(climb) > _CLIMBS) & ~(tilt > _TILTS) & np.isfinite(collective)
+    level = calm(flight, windows) & ~(np.abs(climb) > _CLIMBS) & np.isfinite(collective)
     by_force = level & (np.abs(up / GRAVITY - 1) < _HOVERS)
-    by_climb = level & np.isfinite(climb) & np.isfinite(tilt)
+    by_climb = level & np.isfinite(climb) & np.isfinite(windows.means(on_clock(flight, flight.attitude))[:, 0])
     found_by, at = ("specific force", by_force) if np.isfinite(up).any() else ("climb rate", by_climb)
     thrust = stated.thrusts(collective)
-    at &= thrust > _STANDS * np.median(thrust[at]) if at.any() else at
+    at &= thrust > _ON_GROUND * np.median(thrust[at]) if at.any() else at
     return found_by, windows.keep(at), collective[at]
 
 

@@ -18,7 +18,7 @@ from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
 
 _WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
-_ABOVE_HZ, _TELLS_HZ = 20.0, 50.0
+_ABOVE_HZ, _SHOWS_HZ = 20.0, 50.0
 """Vibration is what is above the first; a log that ends below the second shows too little of it."""
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
 """A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
@@ -92,7 +92,7 @@ class Change:
     parameter: str = about("its name")
     now: float = about("as the log states it")
     proposed: float = about("value")
-    reason: str = about("notch beside the line, or line outside the range of dynamic notches")
+    reason: str = about("notch off the line, or line outside the range of dynamic notches")
 
 
 @result
@@ -144,7 +144,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     return Vibration(
         spectra=spectra,
         lines=lines,
-        lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
+        lines_lack="" if main else "rate" if highest < _SHOWS_HZ else "time",
         limit=() if smooth else LIMITS.get(flight.autopilot, ()),
         folds=highest < _FOLDS_HZ,
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
@@ -176,7 +176,7 @@ class _Power(NamedTuple):
     @classmethod
     def of(cls, flight: LogFlight, samples: Samples) -> _Power | None:
         rate = samples.rate_hz
-        if rate < 2 * _TELLS_HZ:
+        if rate < 2 * _SHOWS_HZ:
             return None
         windows = windows_of(flight, max(_WINDOW_S, _LEAST_SAMPLES / rate))
         windows = windows.keep(np.asarray(np.isfinite(windows.means(samples)).all(axis=1)))
@@ -416,12 +416,12 @@ def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Lin
 
 
 def _changes(flight: LogFlight, filters: tuple[StatedFilter, ...], lines: tuple[Line, ...]) -> Iterator[Change]:
-    """Propose what is sure: a notch beside the one fixed line, and dynamic notches that begin above a motor's line."""
+    """Propose what is sure: a notch off the one fixed line, and dynamic notches that begin above a motor's line."""
     notches = [each for each in filters if each.kind == "notch" and each.stage == "measured"]
     fixed = [line.hz for line in lines if line.kind == "fixed" and line.above_db > _STRONG_DB]
     if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0]) > 0.5 * notches[0].width_hz:
         now, proposed = notches[0].hz, float(round(fixed[0]))
-        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch beside the line")
+        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch off the line")
     moving = [line.lowest_hz for line in lines if line.kind in ("moves", "rotor") and line.above_db > _STRONG_DB]
     count, low = (number(flight, f"dyn_notch_{name}") or 0.0 for name in ("count", "min_hz"))
     by_speed = any(number(flight, name) for name in _BY_SPEED)
