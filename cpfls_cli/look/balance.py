@@ -29,7 +29,7 @@ _RARE, _NORMAL = 0.01, 1.96
 _MOST = 0.5
 """Least share of the squared differences that one rotor explains to be listed though others differ too."""
 _TURNED = 0.2
-"""Least of one minus the squared mean of the headings' unit vectors, for which wind and what turns with the body are parted."""
+"""Least of one minus the squared mean of the headings' unit vectors, that parts wind from what turns with the body."""
 _SIGNAL_TO_THRUST = (1.0, 2.0)
 """Share of thrust over that of commands, where the curve between them is unknown: straight to square."""
 
