@@ -106,7 +106,9 @@ class Vibration:
         "of the autopilot for an unfiltered accelerometer: doubtful, bad", "level", unit="m/s^2"
     )
     folds: bool = about("whether what is above half the logged rate may be folded below")
-    jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
+    jitter: tuple[float, ...] = about(
+        "command about roll, pitch, yaw that noise above 20 Hz makes, rms", "command_axis"
+    )
     filters: tuple[StatedFilter, ...] = part()
     delay_ms: float = about("of the static filters of the gyroscope together, at 5 Hz", unit="ms", gaps=True)
     changes: tuple[Change, ...] = part()
@@ -135,7 +137,9 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
     law = _law(flight, autopilot)
-    noise = _noise(main, law, filtered and before is None) if main and law else None
+    noise = main.noise() if main and law else None
+    if noise and law and filtered and before is None:
+        noise = noise.before_filters(law)
     filters = tuple(_filters(flight, autopilot, law, lines)) if autopilot and law else ()
     level, hz, db = _map(flight, main) if main else (np.empty(0), np.empty(0), np.empty((0, 0)))
     highest = 0.5 * (before or after).rate_hz
@@ -210,6 +214,11 @@ class _Power(NamedTuple):
             density=self.density.mean(axis=0),
         )
 
+    def noise(self) -> Noise:
+        """Give the spectrum of vibration."""
+        shown = self.frequency >= _ABOVE_HZ
+        return Noise(self.frequency[shown], self.density[:, shown].mean(axis=0))
+
     def _above(self) -> Array:
         """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
         from scipy.fft import irfft, next_fast_len, rfft
@@ -228,11 +237,6 @@ def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
         return None
     values = autopilot.in_log(flight.parameters)
     return autopilot.law(autopilot.of_log(values)) if values else None
-
-
-def _noise(power: _Power, law: Law, filtered: bool) -> Noise:
-    noise = Noise(power.frequency[1:], power.density.mean(axis=0)[1:])
-    return noise.before_filters(law) if filtered else noise
 
 
 def _map(flight: LogFlight, power: _Power) -> tuple[Array, Array, Array]:
@@ -257,14 +261,17 @@ class _Drive(NamedTuple):
 
 
 def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
-    if flight.rotor_speed is not None:
-        turns = power.windows.means(flight.rotor_speed) / (2 * np.pi)
-        for rotor in range(turns.shape[1]):
-            yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
-    level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
-    known = np.isfinite(level).any()
     powers = _POWERS if power.frequency[-1] < _FOLDS_HZ else _POWERS[_POWERS > -0.3]
-    yield _Drive(0, level if known else np.ones(len(level)), powers if known else np.zeros(1))
+    levels = [(0, power.windows.means(Samples(flight.time, flight.collective))[:, 0], powers)]
+    if flight.rotor_speed is not None:
+        turns = power.windows.means(flight.rotor_speed).T / (2 * np.pi)
+        levels += [(rotor + 1, level, np.ones(1)) for rotor, level in enumerate(turns)]
+    for rotor, level, tried in levels:
+        known = level > 0
+        if known.any():
+            yield _Drive(rotor, np.where(known, level, np.median(level[known])), tried)
+        elif not rotor:
+            yield _Drive(0, np.ones(len(level)), np.zeros(1))
 
 
 def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
@@ -277,7 +284,7 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
     above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
-    drives = [_usable(each) for each in _drives(flight, power)]
+    drives = list(_drives(flight, power))
     for _ in range(_MOST_LINES):
         tables = [_Table(above, drive, rate, spacing) for drive in drives]
         best = max(tables, key=lambda table: table.height + (_PREFERRED_DB if table.drive.rotor else 0.0))
@@ -285,11 +292,6 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
             return
         yield best.line(power)
         best.remove(above)
-
-
-def _usable(drive: _Drive) -> _Drive:
-    level = np.where(np.isfinite(drive.level) & (drive.level > 0), drive.level, np.nan)
-    return drive._replace(level=np.where(np.isfinite(level), level, np.nanmedian(level)))
 
 
 class _Table:
