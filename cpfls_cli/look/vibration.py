@@ -216,7 +216,7 @@ class _Power(NamedTuple):
 
     def noise(self) -> Noise:
         """Give the spectrum of vibration."""
-        shown = self.frequency >= _ABOVE_HZ
+        shown = self.frequency > _ABOVE_HZ - 0.5 * self.frequency[1]
         return Noise(self.frequency[shown], self.density[:, shown].mean(axis=0))
 
     def _above(self) -> Array:
@@ -283,7 +283,7 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     power = power._replace(windows=power.windows.keep(thinned), density=power.density[thinned])
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
-    above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
+    above[:, power.frequency < _LOWEST_LINE_HZ - 0.5 * spacing] = 0.0
     drives = list(_drives(flight, power))
     for _ in range(_MOST_LINES):
         tables = [_Table(above, drive, rate, spacing) for drive in drives]
@@ -307,7 +307,9 @@ class _Table:
         self.drive, self.rate, self.spacing = drive, rate, spacing
         self.middle = float(np.median(drive.level))
         self.relative = drive.level / self.middle
-        self.starts = np.arange(_LOWEST_LINE_HZ, 0.5 * rate - spacing, 0.5 * spacing)
+        # Off the edges of bins, so that no rounding decides.
+        steps = np.arange(2 * round(_LOWEST_LINE_HZ / spacing), above.shape[1] * 2 - 3)
+        self.starts = spacing * (0.5 * steps + 0.25)
         if drive.rotor:
             steps = np.arange(-_NEAR_ORDER, _NEAR_ORDER, 0.5 * spacing / self.middle)
             self.starts = self.middle * (np.arange(1, _ORDERS + 1)[:, None] + steps).ravel()
