@@ -7,13 +7,21 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.blocks import half_width
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.look.steady import WINDOW_S, Known, StatedCurve, Windows, jackknifed, on_clock, stated_curve, windows_of
+from cpfls_cli.look.steady import (
+    WINDOW_S,
+    Known,
+    StatedCurve,
+    Windows,
+    calm,
+    jackknifed,
+    on_clock,
+    stated_curve,
+    windows_of,
+)
 from cpfls_cli.result import Estimate, about, part, result
 
 SOUND = 0.03
 """Shares of thrust by which sound motors, propellers and batteries differ from the mean; smaller is no finding."""
-_RATE, _TILT = np.radians(40.0), np.radians(15.0)
-"""Most root mean square of the body rates about roll and pitch, and mean rate about yaw; most mean tilt."""
 _AT_LIMIT, _LIMITED = 0.01, 0.02
 """How near to a limit is at it, share of the range; most share of a window at it."""
 _RARE, _NORMAL = 0.01, 1.96
@@ -21,7 +29,7 @@ _RARE, _NORMAL = 0.01, 1.96
 _MOST = 0.5
 """Least share of the squared differences that one rotor explains to be listed though others differ too."""
 _TURNED = 0.2
-"""Least of one minus the squared mean of the headings' unit vectors, for which the wind is told from the body."""
+"""Least of one minus the squared mean of the headings' unit vectors, that parts wind from what turns with the body."""
 _SIGNAL_TO_THRUST = (1.0, 2.0)
 """Share of thrust over that of commands, where the curve between them is unknown: straight to square."""
 
@@ -151,10 +159,7 @@ def _limited(stated: StatedCurve, command: Array) -> tuple[BoolArray, BoolArray]
 
 def _steady(flight: LogFlight, stated: StatedCurve, source: Samples) -> Windows:
     windows = windows_of(flight)
-    rate = windows.means(on_clock(flight, flight.body_rate))
-    moving = windows.means(on_clock(flight, flight.body_rate**2))
-    tilt = windows.means(on_clock(flight, np.hypot(flight.attitude[:, 0], flight.attitude[:, 1])))[:, 0]
-    steady = (moving[:, :2].sum(axis=1) < _RATE**2) & (np.abs(rate[:, 2]) < _RATE) & ~(tilt > _TILT)
+    steady = calm(flight, windows)
     if flight.rotors.values.size:
         limited = np.any(_limited(stated, flight.rotors.values), axis=0).astype(float)
         steady &= ~(windows.means(flight.rotors._replace(values=limited)).max(axis=1) > _LIMITED)

@@ -14,7 +14,7 @@ from cpfls_cli.result import Estimate, about, part, result
 
 _PIECE_S = 8.0
 _BAND_HZ, _OF_RATE = (0.2, 6.0), 0.2
-"""Band of the fit: above what a piece tells apart, and below where plant and sensors count; share of the sampling rate
+"""Band of the fit: above what a piece resolves, and below where plant and sensors count; share of the sampling rate
 it stays below."""
 _MEMORY_S, _SEEN_S = (0.02, 5.0), (0.04, 0.8)
 """Time constants that are tried, and what an interval of them has to lie within, for corners in the band."""

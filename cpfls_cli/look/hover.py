@@ -9,9 +9,9 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.steady import (
     WINDOW_S,
-    Known,
     StatedCurve,
     Windows,
+    calm,
     jackknifed,
     number,
     on_clock,
@@ -21,10 +21,10 @@ from cpfls_cli.look.steady import (
 from cpfls_cli.result import Estimate, about, part, result
 
 GRAVITY = 9.80665
-_HOVERS, _CLIMBS, _TILTS = 0.05, 0.3, np.radians(10.0)
-"""Most difference of the vertical specific force from gravity, share; climb rate, m/s; and tilt, rad."""
-_STANDS = 0.5
-"""Share of the median thrust below which a vehicle that shows gravity stands on the ground."""
+_HOVERS, _CLIMBS = 0.05, 0.3
+"""Most difference of the vertical specific force from gravity, share, and climb rate, m/s."""
+_ON_GROUND = 0.5
+"""Share of the median thrust below which a vehicle that shows gravity is on the ground."""
 _CURVE_S, _SPREAD, _LEAST_FORCE, _SHARPEST = 0.5, 1.25, 0.2, 0.5
 """Windows of the thrust curve; least ratio of the 95th to the 5th percentile of the collective; least specific force
 along the thrust, in g: below, drag and inflow count as much as the rotors; half-width of the exponent of thrust above
@@ -105,23 +105,21 @@ def hover_of(flight: LogFlight) -> Hover | None:
         return None
     stated = stated_curve(flight)
     found_by, windows, throttle = _hovering(flight, stated)
-    known = jackknifed(lambda kept: np.array([throttle[kept].mean()]), len(throttle))
+    both = np.stack([throttle, stated.thrusts(throttle)], axis=1)
+    known = jackknifed(lambda kept: both[kept].mean(axis=0), len(both))
     voltage = windows.means(on_clock(flight, flight.voltage))[:, 0]
     time = windows.begin - windows.begin[0] if len(windows.begin) else windows.begin
     drift = jackknifed(lambda kept: _slope(time[kept], throttle[kept]) * np.ptp(time), len(time))
-    thrust = stated.thrusts(throttle)
-    of_thrust = jackknifed(lambda kept: np.array([thrust[kept].mean()]), len(thrust))
-    shape, hover = _shape(flight, stated), known.estimate() if known else None
     return Hover(
         found_by=found_by if known else "",
-        throttle=hover,
+        throttle=known.estimate(0) if known else None,
         scatter=float(throttle.std(ddof=1)) if known else np.nan,
         hover_s=len(throttle) * WINDOW_S,
         drift=drift.estimate() if drift else None,
         voltage_drift=float(_slope(time, voltage)[0] * np.ptp(time)) if drift else np.nan,
-        shape=shape,
+        shape=_shape(flight, stated),
         battery=_battery(flight, throttle),
-        stated=_compared(flight, of_thrust),
+        stated=_compared(flight, known.estimate(1)) if known else None,
     )
 
 
@@ -132,13 +130,12 @@ def _hovering(flight: LogFlight, stated: StatedCurve) -> tuple[str, Windows, Arr
         windows.means(on_clock(flight, each))[:, 0]
         for each in (flight.collective, flight.climb_rate, -flight.specific_force[:, 2])
     )
-    tilt = windows.means(on_clock(flight, np.hypot(flight.attitude[:, 0], flight.attitude[:, 1])))[:, 0]
-    level = ~(np.abs(climb) > _CLIMBS) & ~(tilt > _TILTS) & np.isfinite(collective)
+    level = calm(flight, windows) & ~(np.abs(climb) > _CLIMBS) & np.isfinite(collective)
     by_force = level & (np.abs(up / GRAVITY - 1) < _HOVERS)
-    by_climb = level & np.isfinite(climb) & np.isfinite(tilt)
+    by_climb = level & np.isfinite(climb) & np.isfinite(windows.means(on_clock(flight, flight.attitude))[:, 0])
     found_by, at = ("specific force", by_force) if np.isfinite(up).any() else ("climb rate", by_climb)
     thrust = stated.thrusts(collective)
-    at &= thrust > _STANDS * np.median(thrust[at]) if at.any() else at
+    at &= thrust > _ON_GROUND * np.median(thrust[at]) if at.any() else at
     return found_by, windows.keep(at), collective[at]
 
 
@@ -189,12 +186,12 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     )
 
 
-def _compared(flight: LogFlight, thrust: Known | None) -> Stated | None:
+def _compared(flight: LogFlight, thrust: Estimate) -> Stated | None:
     """Compare the thrust that hovers with what the autopilot was given, or learned."""
     autopilot = AUTOPILOTS.get(flight.autopilot)
     hover = autopilot.by_role("motors.hover") if autopilot else None
     value = number(flight, hover.name) if hover else None
-    return Stated(parameter=hover.name, value=value, measured=thrust.estimate()) if hover and value and thrust else None
+    return Stated(parameter=hover.name, value=value, measured=thrust) if hover and value else None
 
 
 def _battery(flight: LogFlight, throttle: Array) -> Battery | None:

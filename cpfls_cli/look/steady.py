@@ -18,6 +18,8 @@ WINDOW_S = 2.0
 MOST_BLOCKS, PER_BLOCK = 10, 4
 """Blocks of a jackknife, of at least so many windows where there are enough of them."""
 FEWEST_WINDOWS = 6
+_RATE, _TILT = np.radians(40.0), np.radians(15.0)
+"""Most root mean square of the body rates about roll and pitch, and mean rate about yaw; most mean tilt."""
 _WHOLE = 0.7
 """Share of the samples expected in a window that it has to have."""
 
@@ -61,6 +63,14 @@ def windows_of(flight: LogFlight, length_s: float = WINDOW_S) -> Windows:
 def on_clock(flight: LogFlight, values: Array) -> Samples:
     """Give a signal on the common clock as samples."""
     return Samples(flight.time, values)
+
+
+def calm(flight: LogFlight, windows: Windows) -> BoolArray:
+    """Tell in which windows the body hardly turns and, where attitude is known, hardly tilts, shape (window,)."""
+    rate = windows.means(on_clock(flight, flight.body_rate))
+    moving = windows.means(on_clock(flight, flight.body_rate[:, :2] ** 2)).sum(axis=1)
+    tilt = windows.means(on_clock(flight, np.hypot(flight.attitude[:, 0], flight.attitude[:, 1])))[:, 0]
+    return np.asarray((moving < _RATE**2) & (np.abs(rate[:, 2]) < _RATE) & ~(tilt > _TILT))
 
 
 class Known(NamedTuple):
@@ -161,5 +171,7 @@ def stated_curve(flight: LogFlight) -> StatedCurve:
     name, expo = found.get("expo", ("", np.nan))
     low, high = found.get("low", ("", 0.0))[1], found.get("high", ("", 1.0))[1]
     curve = ThrustCurve(expo if name else 0.0, low, high if high > low else 1.0, bool(autopilot and autopilot.series))
-    # PX4 applies its curve behind what it logs there.
-    return StatedCurve(curve, name, expo, "actuator_motors" in flight.rotors.source)
+    # PX4 applies its curve behind what it logs there; what is asked of the mixer is thrust.
+    asked = "actuator_motors" in flight.rotors.source or not flight.rotors.values.size
+    rebuilt = flight.autopilot == "px4" and flight.rotors_source == "rebuilt"
+    return StatedCurve(curve, name, expo, asked or rebuilt)

@@ -18,7 +18,7 @@ from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
 
 _WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
-_ABOVE_HZ, _TELLS_HZ = 20.0, 50.0
+_ABOVE_HZ, _SHOWS_HZ = 20.0, 50.0
 """Vibration is what is above the first; a log that ends below the second shows too little of it."""
 _LOWEST_LINE_HZ, _FLOOR, _LINE_DB, _SURE, _MOST_LINES = 20.0, 0.3, 6.0, 5.0, 6
 """A line is so many decibels above the median of its neighbourhood, which is so much of half the sampling rate, on the
@@ -92,7 +92,7 @@ class Change:
     parameter: str = about("its name")
     now: float = about("as the log states it")
     proposed: float = about("value")
-    reason: str = about("notch beside the line, or line outside the range of dynamic notches")
+    reason: str = about("notch off the line, or line outside the range of dynamic notches")
 
 
 @result
@@ -102,9 +102,13 @@ class Vibration:
     spectra: dict[str, Spectrum] = part()
     lines: tuple[Line, ...] = part()
     lines_lack: str = about("why no line can be seen: empty, rate, or time")
-    limit: tuple[float, ...] = about("of the autopilot for the accelerometer: doubtful, bad", "level", unit="m/s^2")
+    limit: tuple[float, ...] = about(
+        "of the autopilot for an unfiltered accelerometer: doubtful, bad", "level", unit="m/s^2"
+    )
     folds: bool = about("whether what is above half the logged rate may be folded below")
-    jitter: tuple[float, ...] = about("command about roll, pitch, yaw that the noise makes, rms", "command_axis")
+    jitter: tuple[float, ...] = about(
+        "command about roll, pitch, yaw that noise above 20 Hz makes, rms", "command_axis"
+    )
     filters: tuple[StatedFilter, ...] = part()
     delay_ms: float = about("of the static filters of the gyroscope together, at 5 Hz", unit="ms", gaps=True)
     changes: tuple[Change, ...] = part()
@@ -133,15 +137,19 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
     law = _law(flight, autopilot)
-    noise = _noise(main, law, filtered and before is None) if main and law else None
+    noise = main.noise() if main and law else None
+    if noise and law and filtered and before is None:
+        noise = noise.before_filters(law)
     filters = tuple(_filters(flight, autopilot, law, lines)) if autopilot and law else ()
     level, hz, db = _map(flight, main) if main else (np.empty(0), np.empty(0), np.empty((0, 0)))
     highest = 0.5 * (before or after).rate_hz
+    # What ArduPilot logs as IMU is behind its low-pass of 20 Hz.
+    smooth = flight.accelerometer is not None and flight.accelerometer.source.startswith("IMU")
     return Vibration(
         spectra=spectra,
         lines=lines,
-        lines_lack="" if main else "rate" if highest < _TELLS_HZ else "time",
-        limit=LIMITS.get(flight.autopilot, ()),
+        lines_lack="" if main else "rate" if highest < _SHOWS_HZ else "time",
+        limit=() if smooth else LIMITS.get(flight.autopilot, ()),
         folds=highest < _FOLDS_HZ,
         jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
@@ -172,7 +180,7 @@ class _Power(NamedTuple):
     @classmethod
     def of(cls, flight: LogFlight, samples: Samples) -> _Power | None:
         rate = samples.rate_hz
-        if rate < 2 * _TELLS_HZ:
+        if rate < 2 * _SHOWS_HZ:
             return None
         windows = windows_of(flight, max(_WINDOW_S, _LEAST_SAMPLES / rate))
         windows = windows.keep(np.asarray(np.isfinite(windows.means(samples)).all(axis=1)))
@@ -206,6 +214,11 @@ class _Power(NamedTuple):
             density=self.density.mean(axis=0),
         )
 
+    def noise(self) -> Noise:
+        """Give the spectrum of vibration."""
+        shown = self.frequency > _ABOVE_HZ - 0.5 * self.frequency[1]
+        return Noise(self.frequency[shown], self.density[:, shown].mean(axis=0))
+
     def _above(self) -> Array:
         """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
         from scipy.fft import irfft, next_fast_len, rfft
@@ -224,11 +237,6 @@ def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
         return None
     values = autopilot.in_log(flight.parameters)
     return autopilot.law(autopilot.of_log(values)) if values else None
-
-
-def _noise(power: _Power, law: Law, filtered: bool) -> Noise:
-    noise = Noise(power.frequency[1:], power.density.mean(axis=0)[1:])
-    return noise.before_filters(law) if filtered else noise
 
 
 def _map(flight: LogFlight, power: _Power) -> tuple[Array, Array, Array]:
@@ -253,14 +261,17 @@ class _Drive(NamedTuple):
 
 
 def _drives(flight: LogFlight, power: _Power) -> Iterator[_Drive]:
-    if flight.rotor_speed is not None:
-        turns = power.windows.means(flight.rotor_speed) / (2 * np.pi)
-        for rotor in range(turns.shape[1]):
-            yield _Drive(rotor + 1, turns[:, rotor], np.ones(1))
-    level = power.windows.means(Samples(flight.time, flight.collective))[:, 0]
-    known = np.isfinite(level).any()
     powers = _POWERS if power.frequency[-1] < _FOLDS_HZ else _POWERS[_POWERS > -0.3]
-    yield _Drive(0, level if known else np.ones(len(level)), powers if known else np.zeros(1))
+    levels = [(0, power.windows.means(Samples(flight.time, flight.collective))[:, 0], powers)]
+    if flight.rotor_speed is not None:
+        turns = power.windows.means(flight.rotor_speed).T / (2 * np.pi)
+        levels += [(rotor + 1, level, np.ones(1)) for rotor, level in enumerate(turns)]
+    for rotor, level, tried in levels:
+        known = level > 0
+        if known.any():
+            yield _Drive(rotor, np.where(known, level, np.median(level[known])), tried)
+        elif not rotor:
+            yield _Drive(0, np.ones(len(level)), np.zeros(1))
 
 
 def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
@@ -272,8 +283,8 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
     power = power._replace(windows=power.windows.keep(thinned), density=power.density[thinned])
     total = 10 * np.log10(np.maximum(power.density.sum(axis=2), 1e-20))
     above = total - median_filter(total, (1, max(int(_FLOOR * 0.5 * rate / spacing) | 1, 9)), mode="nearest")
-    above[:, power.frequency < _LOWEST_LINE_HZ] = 0.0
-    drives = [_usable(each) for each in _drives(flight, power)]
+    above[:, power.frequency < _LOWEST_LINE_HZ - 0.5 * spacing] = 0.0
+    drives = list(_drives(flight, power))
     for _ in range(_MOST_LINES):
         tables = [_Table(above, drive, rate, spacing) for drive in drives]
         best = max(tables, key=lambda table: table.height + (_PREFERRED_DB if table.drive.rotor else 0.0))
@@ -281,11 +292,6 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
             return
         yield best.line(power)
         best.remove(above)
-
-
-def _usable(drive: _Drive) -> _Drive:
-    level = np.where(np.isfinite(drive.level) & (drive.level > 0), drive.level, np.nan)
-    return drive._replace(level=np.where(np.isfinite(level), level, np.nanmedian(level)))
 
 
 class _Table:
@@ -301,7 +307,9 @@ class _Table:
         self.drive, self.rate, self.spacing = drive, rate, spacing
         self.middle = float(np.median(drive.level))
         self.relative = drive.level / self.middle
-        self.starts = np.arange(_LOWEST_LINE_HZ, 0.5 * rate - spacing, 0.5 * spacing)
+        # Off the edges of bins, so that no rounding decides.
+        steps = np.arange(2 * round(_LOWEST_LINE_HZ / spacing), above.shape[1] * 2 - 3)
+        self.starts = spacing * (0.5 * steps + 0.25)
         if drive.rotor:
             steps = np.arange(-_NEAR_ORDER, _NEAR_ORDER, 0.5 * spacing / self.middle)
             self.starts = self.middle * (np.arange(1, _ORDERS + 1)[:, None] + steps).ravel()
@@ -412,12 +420,12 @@ def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Lin
 
 
 def _changes(flight: LogFlight, filters: tuple[StatedFilter, ...], lines: tuple[Line, ...]) -> Iterator[Change]:
-    """Propose what is sure: a notch beside the one fixed line, and dynamic notches that begin above a motor's line."""
+    """Propose what is sure: a notch off the one fixed line, and dynamic notches that begin above a motor's line."""
     notches = [each for each in filters if each.kind == "notch" and each.stage == "measured"]
     fixed = [line.hz for line in lines if line.kind == "fixed" and line.above_db > _STRONG_DB]
     if len(notches) == len(fixed) == 1 and abs(notches[0].hz - fixed[0]) > 0.5 * notches[0].width_hz:
         now, proposed = notches[0].hz, float(round(fixed[0]))
-        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch beside the line")
+        yield Change(parameter=notches[0].parameter, now=now, proposed=proposed, reason="notch off the line")
     moving = [line.lowest_hz for line in lines if line.kind in ("moves", "rotor") and line.above_db > _STRONG_DB]
     count, low = (number(flight, f"dyn_notch_{name}") or 0.0 for name in ("count", "min_hz"))
     by_speed = any(number(flight, name) for name in _BY_SPEED)

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.hover import GRAVITY, hover_of
 from tests.builders.look_flights import correlated, still_flight
 
 RATE = 20.0
+NO_ROTORS = Samples(np.empty(0), np.empty((0, 0)))
 
 
 def forces(up):
@@ -79,6 +81,13 @@ def test_a_height_controller_hides_no_exponent():
     assert hover_of(still_flight(120.0, RATE, collective=only_gusts, specific_force=forces(up))).shape is None
 
 
+def test_a_loop_in_acro_is_no_hover():
+    """Where no attitude is logged, the mean force of a loop may be gravity all the same."""
+    turning = np.tile([0.0, 6.0, 0.0], (1200, 1))
+    flight = still_flight(60.0, RATE, body_rate=turning, attitude=np.full((1200, 3), np.nan))
+    assert hover_of(flight).throttle is None
+
+
 def test_a_steady_collective_has_no_shape():
     assert hover_of(climbing(0, 1.5, by=0.02)).shape is None
 
@@ -100,12 +109,14 @@ def test_the_stated_curve_is_compared_by_its_exponent():
 
 
 def test_stated_hover_is_compared_as_thrust():
-    """Of 0.4 of the range, a square curve makes 0.16 of thrust."""
+    """Of 0.4 of the range, a square curve makes 0.16 of thrust; what is asked of the mixer is thrust itself."""
     stated = {"MOT_THST_EXPO": 1.0, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0, "MOT_THST_HOVER": 0.3}
     hover = hover_of(still_flight(60.0, RATE, autopilot="ardupilot", parameters=stated))
     assert hover.stated.parameter == "MOT_THST_HOVER"
     assert hover.stated.measured.value == pytest.approx(0.16)
     assert hover.stated.differs
+    asked = still_flight(60.0, RATE, autopilot="ardupilot", parameters=stated, rotors=NO_ROTORS)
+    assert hover_of(asked).stated.measured.value == pytest.approx(0.4)
 
 
 def battery(seed=0, resistance=0.05, varied=5.0, seconds=120.0, noise=0.03):
