@@ -27,6 +27,8 @@ HOLDS = 0.95
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
+_SHORT = 0.9
+"""Share of the asked disk margin, below which the best gains are none."""
 _RAISED = "D in fast moves"
 _FINE, _NEAR, _MOST_DB = 1e-6, 0.98, 99.0
 _ANY, _ANY_SHARE = np.array([100.0, 0.02, 0.02, 1.0, 0.0]), 0.5
@@ -227,7 +229,7 @@ class _Work:
                 reasons[axis] = ("weak", plant.reason)
             elif self.refuted[axis]:
                 reasons[axis] = ("law", "")
-            elif proposed.disk[axis] < _NEAR * self.asked.disk:
+            elif proposed.disk[axis] < _SHORT * self.asked.disk:
                 reasons[axis] = ("margins", f"{_degrees(proposed.disk[axis]):.3g}")
             elif (crosses := self._margins(axis, _with(self.values, proposed)).crossover_hz.value) > plant.band_hz[1]:
                 reasons[axis] = ("band", f"{crosses:.3g}")
@@ -362,7 +364,7 @@ class _Work:
         return own and bool(self.attitude[axis])
 
     def _together(self, axis: int, rows: list[GainRow], values: Sequence[float]) -> list[GainRow]:
-        """Move what is not sure with what is, where margins need it."""
+        """Move what is not sure with what is, where what is sure alone would take margin away."""
         if all(row.direction == "keep" for row in rows):
             return rows
         names = {self.names.get(name, name): name for name in self.values}
@@ -371,7 +373,7 @@ class _Work:
             new = {names[row.parameter]: value for row, value in zip(rows, chosen, strict=True)}
             return float(np.quantile(self._held(axis, {**self.values, **new}), 1 - HOLDS))
 
-        if least([row.proposed for row in rows]) >= _NEAR * min(least(values), self.asked.disk):
+        if least([row.proposed for row in rows]) >= _NEAR * min(least([row.today for row in rows]), self.asked.disk):
             return rows
         return [
             row

@@ -1,7 +1,9 @@
 """Command `tune`."""
 
 import json
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from tests.builders.autopilots import STUDY, found_vehicle
+from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
+from tests.builders.looked import PLANTS, looked_flight, looked_plant
 
 ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazyflie": ".yaml"}
 
@@ -37,9 +41,9 @@ def gains(cpfls, folder):
     return told
 
 
-def written(folder, name):
+def written(folder, name, stem=""):
     """Read the parameters of a ground station's file."""
-    text = (folder / f"{name}{ENDINGS[name]}").read_text()
+    text = (folder / f"{stem or name}{ENDINGS[name]}").read_text()
     if name == "crazyflie":
         held = yaml.safe_load(text)
         assert (held["type"], held["version"]) == ("persistent_param_state", "1")
@@ -232,3 +236,32 @@ def test_the_file_of_ardupilot_is_read_by_a_parser_of_others(gains, folder):
     assert read.load(str(folder / "ardupilot.param"))
     assert dict(read) == pytest.approx(written(folder, "ardupilot"))
     assert (folder / "betaflight.txt").read_text().startswith("# For Betaflight 2025.12.\n")
+
+
+def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypatch):
+    own = looked_flight("px4")
+    plants = [looked_plant(*PLANTS["px4"], axis=axis) for axis in ("roll", "pitch", "yaw")]
+    # Reading and the estimate of plants have tests of their own.
+    monkeypatch.setitem(sys.modules, "cpfls_cli.look.reading", SimpleNamespace(read_flight=lambda *_: own))
+    monkeypatch.setitem(sys.modules, "cpfls_cli.look.effectiveness", SimpleNamespace(effectiveness=lambda _: plants))
+    log = folder / "log.csv"
+    save(log, np.zeros((9, 2)), "t,p")
+    answered = cpfls("tune", log, "-o", folder / "looked", "--json")
+    assert answered.exit_code == 0
+    told = json.loads(answered.stdout)
+    changed = written(folder, "px4", "looked")
+    assert changed == pytest.approx({row["parameter"]: row["proposed"] for row in told["changes"]})
+    again = cpfls("tune", log, "-o", folder / "looked")
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+    for more, said in ((["--autopilot", "px4"], "leave --autopilot"), (["--seed", "1"], "reads no config")):
+        refused = cpfls("tune", log, *more)
+        assert refused.exit_code == 2
+        assert said in refused.stderr
+
+
+def test_a_config_needs_its_vehicle(cpfls, folder):
+    refused = cpfls("tune", folder / "study.yaml")
+    assert refused.exit_code == 2
+    assert "needs the vehicle" in refused.stderr
+    assert cpfls("tune", folder / "study.yaml", folder / "vehicle.h5").exit_code == 2

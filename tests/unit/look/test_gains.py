@@ -1,7 +1,6 @@
 """Gains from one log: what is sure of them, over plants whose loops are computed here by their formula."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,15 +9,12 @@ from control import FRD, stability_margins
 import cpfls_cli.look.gains
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.tune import of_flight
-from cpfls_cli.look.flight import AXES, LogFlight, Samples
+from cpfls_cli.look.flight import AXES
 from cpfls_cli.look.gains import tuned_gains
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.margins import crossing_margins
+from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked_plant, weak_plant
 
-SYSTEMS = {"px4": "PX4 1.15.0", "ardupilot": "ArduCopter 4.5", "betaflight": "Betaflight 4.5.1"}
-PLANTS = {"px4": (130.0, 0.02, 0.03), "ardupilot": (150.0, 0.02, 0.03), "betaflight": (900.0, 0.008, 0.02)}
-"""Effectiveness, delay, lag."""
-NARROW = (0.03, 0.002, 0.1)
 HELD_DISK = 2 * np.tan(np.radians(45) / 2)
 
 
@@ -28,55 +24,9 @@ def few_draws(monkeypatch):
     monkeypatch.setattr(cpfls_cli.look.gains, "DRAWS", 10)
 
 
-def plant(gain, delay, lag, spread=NARROW, axis="roll", seed=1):
-    """A plant as a log shows it, with draws of effectiveness, delay and lag."""
-    own, scale, late, slow = np.random.default_rng(seed).standard_normal((3, 200)), *spread
-    draws = np.stack(
-        [
-            gain * np.exp(scale * own[0]),
-            delay * np.exp(late / delay * own[1]),
-            lag * np.exp(slow * own[2]),
-            np.ones(200),
-            np.zeros(200),
-        ],
-        axis=1,
-    )
-    found = np.array([gain, delay, lag, 1.0, 0.0])
-    band = np.array([0.5, 100.0])
-    return SimpleNamespace(axis=axis, identified=True, reason="", parameters=found, draws=draws, band_hz=band)
-
-
-def weak(axis):
-    return SimpleNamespace(axis=axis, identified=False, reason="sticks rest", parameters=None, draws=None, band_hz=None)
-
-
-def flight(autopilot, values=None, system=None, *, noise=0.02, attitude=False):
-    """A log with the parameters of an autopilot, in which nothing but noise of the gyroscope is there."""
-    count = 4000
-    nothing, one, every = np.full((count, 3), np.nan), np.full(count, np.nan), np.ones(count, dtype=bool)
-    time = np.arange(count) / 500
-    rates = noise * np.random.default_rng(0).standard_normal((count, 3))
-    return LogFlight(
-        name="log",
-        autopilot=autopilot,
-        system=SYSTEMS[autopilot] if system is None else system,
-        parameters=AUTOPILOTS[autopilot].defaults() | (values or {}),
-        rate_hz=500.0,
-        time=time,
-        **dict.fromkeys(("body_rate", "command", "rate_setpoint", "stick", "attitude", "specific_force"), nothing),
-        attitude_setpoint=np.zeros((count, 3)) if attitude else nothing,
-        **dict.fromkeys(("collective", "voltage", "current", "height", "climb_rate"), one),
-        flown=every,
-        usable=every,
-        rotors=Samples(np.zeros(0), np.zeros((0, 4))),
-        gyroscope=Samples(time, rates),
-        gaps_s=np.zeros((0, 2)),
-    )
-
-
 def found(autopilot, values=None, own=None, **options):
-    plants = [own or plant(*PLANTS[autopilot]), weak("pitch"), weak("yaw")]
-    return tuned_gains(flight(autopilot, values, **options), plants)
+    plants = [own or looked_plant(*PLANTS[autopilot]), weak_plant("pitch"), weak_plant("yaw")]
+    return tuned_gains(looked_flight(autopilot, values, **options), plants)
 
 
 def loops(autopilot, values, draws):
@@ -95,7 +45,7 @@ def by_term(gains):
 
 @pytest.mark.parametrize("autopilot", PLANTS)
 def test_proposed_gains_hold_the_asked_margin_with_nineteen_of_twenty_plants(autopilot):
-    own = plant(*PLANTS[autopilot], (0.1, 0.003, 0.2))
+    own = looked_plant(*PLANTS[autopilot], (0.1, 0.003, 0.2))
     gains = found(autopilot, own=own)
     values = AUTOPILOTS[autopilot].defaults()
     named = {AUTOPILOTS[autopilot].firmware.names(SYSTEMS[autopilot]).get(name, name): name for name in values}
@@ -112,14 +62,16 @@ def test_proposed_gains_hold_the_asked_margin_with_nineteen_of_twenty_plants(aut
 
 
 def test_gains_go_with_the_inverse_of_effectiveness():
-    usual, stronger = (by_term(found("px4", own=plant(scale * 130.0, 0.02, 0.03))) for scale in (1, 2))
+    usual, stronger = (by_term(found("px4", own=looked_plant(scale * 130.0, 0.02, 0.03))) for scale in (1, 2))
     for term in ("P", "I", "D"):
         assert usual[term].proposed / stronger[term].proposed == pytest.approx(2, rel=0.02)
         assert usual[term].low / stronger[term].low == pytest.approx(2, rel=0.02)
 
 
 def test_the_interval_is_that_of_the_plants():
-    sure, open_ = (by_term(found("px4", own=plant(*PLANTS["px4"], spread))) for spread in (NARROW, (0.15, 0.002, 0.1)))
+    sure, open_ = (
+        by_term(found("px4", own=looked_plant(*PLANTS["px4"], spread))) for spread in (NARROW, (0.15, 0.002, 0.1))
+    )
     # Ten of a normal spread of 15 % reach over some three times as much.
     assert np.log(open_["P"].high / open_["P"].low) > 0.3
     assert 0.05 < np.log(sure["P"].high / sure["P"].low) < 0.4
@@ -153,7 +105,7 @@ def test_the_factor_on_all_gains_stays():
 
 def test_noise_gives_one_end_only():
     quiet = {"p_roll": 8.0, "i_roll": 8.0, "d_roll": 2.0, "d_max_roll": 0.0}
-    row = by_term(found("betaflight", quiet, own=plant(300.0, 0.003, 0.006)))["P"]
+    row = by_term(found("betaflight", quiet, own=looked_plant(300.0, 0.003, 0.006)))["P"]
     assert (row.direction, row.why) == ("raise", "noise")
     assert row.high == np.inf
     assert 8 < row.low <= row.proposed
@@ -166,7 +118,7 @@ def test_a_loop_that_would_not_fly_is_of_another_law():
 
 
 def test_gains_do_not_go_beyond_the_band():
-    own = plant(*PLANTS["px4"])
+    own = looked_plant(*PLANTS["px4"])
     own.band_hz = np.array([0.3, 0.8])
     assert found("px4", own=own).axes[0].reason == "band"
 
@@ -208,14 +160,17 @@ def test_names_are_those_of_the_version():
 
 
 def test_only_what_changes_is_written(tmp_path):
-    own, plants = flight("betaflight"), [plant(*PLANTS["betaflight"]), weak("pitch"), weak("yaw")]
+    own, plants = (
+        looked_flight("betaflight"),
+        [looked_plant(*PLANTS["betaflight"]), weak_plant("pitch"), weak_plant("yaw")],
+    )
     outcome = of_flight(own, plants, tmp_path / "gains", AskedMargins())
     text = (tmp_path / "gains.txt").read_text()
     changes = {row.parameter: row.proposed for row in tuned_gains(own, plants).changes}
     lines = [line.split() for line in text.splitlines() if line.startswith("set ") and "simplified" not in line]
     assert {words[1]: float(words[3]) for words in lines} == changes
     assert outcome.summary["changes"]
-    kept = flight("betaflight", system="Betaflight 3.0.1")
+    kept = looked_flight("betaflight", system="Betaflight 3.0.1")
     assert of_flight(kept, plants, tmp_path / "none", AskedMargins()).written is None
 
 
@@ -232,6 +187,6 @@ def test_crossings_are_those_of_python_control():
 
 
 def test_axes_are_in_their_order():
-    gains = tuned_gains(flight("px4"), [plant(*PLANTS["px4"], axis=axis) for axis in AXES])
+    gains = tuned_gains(looked_flight("px4"), [looked_plant(*PLANTS["px4"], axis=axis) for axis in AXES])
     assert [axis.axis for axis in gains.axes] == list(AXES)
     assert replace(gains, rows=()).changes == ()
