@@ -119,6 +119,32 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     )
 
 
+def crossing_margins(frequency: Array, loop: Numbers) -> tuple[Array, Array, Array]:
+    """Find the margins of stable loops, shape (..., frequency), where their gain is 1 and where they turn it round.
+
+    Returns
+    -------
+    gain_db, phase_deg, crossover_hz : array, shape (...)
+        The least change of gain and of phase that makes a loop unstable, infinite where none does, and the frequency at
+        which its gain is 1 with that phase.
+    """
+    decibels, turns = 20 * np.log10(np.abs(loop)), np.unwrap(np.angle(loop), axis=-1) / (2 * np.pi) - 0.5
+
+    def at_crossing(values: Array, level: Array, other: Array) -> Array:
+        """Interpolate another value where one crosses a level between two frequencies; infinite where it does not."""
+        before, after = values[..., :-1] - level, values[..., 1:] - level
+        share = before / np.where(before == after, 1.0, before - after)
+        crosses = (before > 0) != (after > 0)
+        return np.where(crosses, other[..., :-1] + share * (other[..., 1:] - other[..., :-1]), np.inf)
+
+    whole = np.maximum(np.floor(turns[..., :-1]), np.floor(turns[..., 1:]))
+    gain = np.abs(at_crossing(turns, whole, decibels)).min(axis=-1)
+    turned = at_crossing(decibels, np.zeros_like(whole), turns)
+    phase = np.where(np.isfinite(turned), np.abs(turned - np.round(np.where(np.isfinite(turned), turned, 0))), np.inf)
+    at = np.take_along_axis(frequency[:-1] * np.ones_like(phase), phase.argmin(axis=-1)[..., None], axis=-1)[..., 0]
+    return gain, 360 * phase.min(axis=-1), at
+
+
 def disk_of(loop: Numbers) -> Array:
     """Give the disk margins of stable loops, shape (..., frequency), balanced: 1 over the largest half of |S - T|."""
     return np.asarray(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max(axis=-1))
