@@ -1,12 +1,13 @@
-"""The loop that flew: body rate by its setpoint, over frequency and as a step, and how far the loop is from unstable."""
+"""The loop that flew: body rate by its setpoint, over frequency and as a step, and how far it is from unstable."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.autopilots.law import Law
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.estimation.spectra import (
@@ -20,7 +21,7 @@ from cpfls_cli.estimation.spectra import (
 from cpfls_cli.look.effectiveness import FEWEST_BLOCKS, AxisPlant, PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
-from cpfls_cli.look.setpoints import exogenous
+from cpfls_cli.look.setpoints import Exogenous, exogenous
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.margins import crossing_margins, disk_of, is_stable
 
@@ -109,16 +110,16 @@ def loops(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop, .
 def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) -> AxisLoop:
     asked, rate = flight.rate_setpoint[:, axis], flight.body_rate[:, axis]
     usable = flight.usable & np.isfinite(asked) & np.isfinite(rate)
-    chosen = exogenous(flight, axis, usable)
+    chosen = exogenous(flight, axis, usable) if usable.any() else Exogenous((), "no rate setpoint is logged")
     length = round(_WINDOW_S * flight.rate_hz)
     time = np.arange(round(_SHOWN_S * flight.rate_hz)) / flight.rate_hz
-    found, source, reason = None, "", chosen.reason or "no rate setpoint is logged"
-    for source, values in chosen.candidates if usable.any() else ():
-        found = _response(flight, values, asked, rate, usable & np.isfinite(values), length)
+    found, source, reason = None, "", chosen.reason
+    for name, values in chosen.candidates:
+        found, source = _response(flight, values, asked, rate, usable & np.isfinite(values), length), name
         if found is not None:
             break
         reason = "too short, or the setpoint moves too little"
-    every = fields_of(found, time, flight.rate_hz, length) if found else {}
+    every = _measured(found, time, length) if found else {}
     loop = _Loop.of(plant, law, axis)
     power = float(np.mean(asked[usable] ** 2)) if usable.any() else 0.0
     return AxisLoop(
@@ -147,13 +148,13 @@ class _Response(NamedTuple):
 
 
 def _response(
-    flight: LogFlight, instrument: Array, asked: Array, rate: Array, usable: Array, length: int
+    flight: LogFlight, instrument: Array, asked: Array, rate: Array, usable: BoolArray, length: int
 ) -> _Response | None:
     """Take the spectra of a response; None where it is not clear from the first frequencies on."""
     early = round(_USUAL_LATE_S * flight.rate_hz)
     begins = window_starts(usable & np.concatenate([np.zeros(early, dtype=bool), usable[:-early]]), length)
     period = 1 / flight.rate_hz
-    frequency = np.fft.rfftfreq(length, period)
+    frequency = np.asarray(np.fft.rfftfreq(length, period), dtype=np.float64)
     inside = frequency <= min(_TOP_HZ, _OF_CLOCK * flight.rate_hz)
     if len(begins) < FEWEST_BLOCKS:
         return None
@@ -175,7 +176,7 @@ def _response(
     return _Response(spectra, coherence, ends) if ends >= _FADES / _WINDOW_S * 2 else None
 
 
-def _stepped(gains: Numbers, frequency: Array, ends: float, rate_hz: float, length: int, samples: int) -> Array:
+def _stepped(gains: Numbers, frequency: Array, ends: float, length: int, samples: int) -> Array:
     """Give steps of responses, shape (..., frequency), that fade out from where they are not known any more."""
     fading = np.clip((frequency / ends - 1) / (_FADES - 1), 0.0, 1.0)
     shown = gains * (0.5 + 0.5 * np.cos(np.pi * fading))
@@ -185,20 +186,19 @@ def _stepped(gains: Numbers, frequency: Array, ends: float, rate_hz: float, leng
     # What fades without a phase begins before the step.
     before = length // 8
     impulse = np.roll(np.fft.irfft(whole, length, axis=-1), before, axis=-1)
-    del rate_hz
     return np.asarray(np.cumsum(impulse, axis=-1)[..., before : before + samples])
 
 
-def fields_of(found: _Response, time: Array, rate_hz: float, length: int) -> dict[str, object]:
+def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
     """Give the fields of an `AxisLoop` that a measured response has."""
     gains, frequency, blocks = found.gains(), found.spectra.frequency, len(found.spectra.windows)
-    steps = _stepped(gains, frequency, found.clear_hz, rate_hz, length, len(time))
+    steps = _stepped(gains, frequency, found.clear_hz, length, len(time))
     half = half_width(jackknife_error(steps[1:]), blocks)
     magnitude = np.log(np.maximum(np.abs(gains), _TINY))
     return {
         "windows": int(found.spectra.windows.sum()),
         "clear_hz": found.clear_hz,
-        "bandwidth_hz": _jackknifed(np.array([bandwidth(frequency, np.abs(each), found.clear_hz) for each in gains])),
+        "bandwidth_hz": _jackknifed(np.array([_bandwidth(frequency, np.abs(each), found.clear_hz) for each in gains])),
         "by_step": _numbers(time, steps, _jackknifed),
         "frequency": frequency,
         "gain": np.abs(gains[0]),
@@ -212,7 +212,7 @@ def fields_of(found: _Response, time: Array, rate_hz: float, length: int) -> dic
     }
 
 
-def _nothing() -> dict[str, object]:
+def _nothing() -> dict[str, Any]:
     empty = ("frequency", "gain", "phase", "gain_error", "coherence", "law_gain", "law_phase")
     times = ("time", "step", "step_low", "step_high", "law_step")
     return {"windows": 0, "clear_hz": np.nan, **dict.fromkeys((*empty, *times), np.zeros(0))}
@@ -234,7 +234,7 @@ def _drawn(values: Array) -> Estimate | None:
     return Estimate(value=float(values[0]), low=float(min(low, values[0])), high=float(max(high, values[0])))
 
 
-def bandwidth(frequency: Array, gain: Array, ends: float) -> float:
+def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     """Give the frequency at which a response has half its power; NaN where that is not below an end."""
     below = np.flatnonzero((gain < _HALF_POWER) & (frequency > 0))
     if not len(below) or below[0] == 0 or frequency[below[0]] > ends:
@@ -244,7 +244,7 @@ def bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _numbers(time: Array, steps: Array, of: object) -> StepNumbers | None:
+def _numbers(time: Array, steps: Array, of: Callable[[Array], Estimate | None]) -> StepNumbers | None:
     """Read overshoot and times from steps, shape (1 + other, time)."""
     settled = steps[:, (time >= _SETTLES_S[0]) & (time <= _SETTLES_S[1])].mean(axis=1)
     level = np.where(settled > 0, settled, np.nan)
@@ -257,11 +257,10 @@ def _numbers(time: Array, steps: Array, of: object) -> StepNumbers | None:
         part_ = (share * level - before) / np.where(first > 0, steps[rows, first] - before, 1.0)
         return np.where(above.any(axis=1), (first - 1 + np.where(first > 0, part_, 1.0)) * (time[1] - time[0]), np.nan)
 
-    assert callable(of)
-    found = (of(steps.max(axis=1) - 1.0), of(reached(0.9) - reached(0.1)), of(reached(0.5)))
-    if any(each is None for each in found):
+    over, rise, half = of(steps.max(axis=1) - 1.0), of(reached(0.9) - reached(0.1)), of(reached(0.5))
+    if over is None or rise is None or half is None:
         return None
-    return StepNumbers(overshoot=found[0], rise_s=found[1], half_s=found[2])
+    return StepNumbers(overshoot=over, rise_s=rise, half_s=half)
 
 
 class _Loop(NamedTuple):
@@ -286,14 +285,14 @@ class _Loop(NamedTuple):
         filters = gyroscope_filters(self.law, self.axis, frequency)
         return np.asarray(filters * moved * control.forward / (1 + moved * control.feedback))
 
-    def fields(self, time: Array, rate_hz: float, length: int, measured: dict[str, object]) -> dict[str, object]:
+    def fields(self, time: Array, rate_hz: float, length: int, measured: dict[str, Any]) -> dict[str, Any]:
         """Give the fields of an `AxisLoop` that plant and law have."""
-        frequency = np.fft.rfftfreq(length, 1 / rate_hz)[1:]
+        frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate_hz)[1:], dtype=np.float64)
         frequency = frequency[frequency < 0.45 * self.law.rate_hz]
         response = self.closed(frequency)
         gains = np.concatenate([np.ones((len(response), 1)), response], axis=1)
         whole = np.concatenate([[0.0], frequency])
-        steps = _stepped(gains, whole, float(frequency[-1]) / _FADES, rate_hz, length, len(time))
+        steps = _stepped(gains, whole, float(frequency[-1]) / _FADES, length, len(time))
         shown = measured.get("frequency", np.zeros(0))
         assert isinstance(shown, np.ndarray)
         own = np.interp(shown, whole, gains[0].real) + 1j * np.interp(shown, whole, gains[0].imag)
@@ -315,12 +314,8 @@ class _Loop(NamedTuple):
             return None
         gain, phase, crossover = crossing_margins(frequency, loop[stable])
         disk = np.degrees(2 * np.arctan(disk_of(loop[stable]) / 2))
-        found = [_drawn(each) for each in (gain, phase, disk, phase / 360 / crossover, crossover)]
-        if any(each is None for each in found):
+        values = {"gain_db": gain, "phase_deg": phase, "disk_deg": disk, "delay_s": phase / 360 / crossover}
+        found: dict[str, Any] = {name: _drawn(each) for name, each in {**values, "crossover_hz": crossover}.items()}
+        if None in found.values():
             return None
-        names = ("gain_db", "phase_deg", "disk_deg", "delay_s", "crossover_hz")
-        return LoopMargins(
-            **dict(zip(names, found, strict=True)),
-            stable=float(stable.mean()),
-            extrapolated=bool(crossover[0] > self.band_hz),
-        )
+        return LoopMargins(**found, stable=float(stable.mean()), extrapolated=bool(crossover[0] > self.band_hz))
