@@ -10,7 +10,6 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +31,12 @@ GUST_SIZE, GUST_S = np.array([3.4, 5.1, 2.0]), np.array([0.31, 1.18, 0.5])
 """Standard deviation, rad/s^2, and time constant about each axis; strong gusts have twice the size."""
 WASH, WASH_S = 0.5, 0.05
 """Size over that of gusts, and time constant, of what a vehicle meets in its own wake."""
-LOGGED_HZ = {"betaflight": (1000.0, 1000.0), "px4": (50.0, 250.0), "ardupilot": (400.0, 400.0), "crazyflie": (100.0, 100.0)}
+LOGGED_HZ = {
+    "betaflight": (1000.0, 1000.0),
+    "px4": (50.0, 250.0),
+    "ardupilot": (400.0, 400.0),
+    "crazyflie": (100.0, 100.0),
+}
 """Of commands and of body rates."""
 GYRO_NOISE = 0.02
 CROSSOVER = {"betaflight": 60.0, "px4": 15.0, "ardupilot": 15.0, "crazyflie": 15.0}
@@ -111,7 +115,11 @@ def sticks_of(rng: np.random.Generator, kind: str, time: np.ndarray) -> np.ndarr
         at = 1.0
         while at < time[-1] - 1:
             length = rng.uniform(0.15, 0.5) if kind == "acro" else rng.uniform(0.4, 2.0)
-            size = rng.uniform(0.1, 0.5) * rng.choice([-1, 1]) if rng.random() > 0.06 or kind != "acro" else rng.choice([-1.0, 1.0])
+            size = (
+                rng.uniform(0.1, 0.5) * rng.choice([-1, 1])
+                if rng.random() > 0.06 or kind != "acro"
+                else rng.choice([-1.0, 1.0])
+            )
             moved = (time >= at) & (time < at + length)
             out[moved, axis] += size * (0.4 if axis == 2 else 1.0)
             at += length + rng.exponential(0.7 if kind == "acro" else 1.2)
@@ -124,7 +132,10 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
     law = cases[0].law
     period, steps, lanes = law.period, int(seconds * law.rate_hz), 3 * len(cases)
     controller = Lanes(law, tuple(axis for case in cases for axis in case.law.axes))
-    wide = {name: np.concatenate([getattr(case, name) for case in cases]) for name in ("gain", "delay", "lag", "damping", "lead")}
+    wide = {
+        name: np.concatenate([getattr(case, name) for case in cases])
+        for name in ("gain", "delay", "lag", "damping", "lead")
+    }
     limit = np.repeat([case.limit for case in cases], 3)
     time = np.arange(steps) * period
     stick = np.concatenate([sticks_of(rng, case.sticks, time) for case in cases], axis=1)
@@ -134,7 +145,9 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
     wash = np.zeros(lanes)
     acro = np.repeat([case.sticks == "acro" for case in cases], 3)
     yaw = np.tile([False, False, True], len(cases))
-    top = np.where(acro, np.where(np.repeat([case.vehicle == "racer" for case in cases], 3), 8.0, 3.0), np.where(yaw, 1.5, 0.5))
+    top = np.where(
+        acro, np.where(np.repeat([case.vehicle == "racer" for case in cases], 3), 8.0, 3.0), np.where(yaw, 1.5, 0.5)
+    )
     expo = 0.3 * stick + 0.7 * stick**3
     noise = GYRO_NOISE * np.sqrt(law.rate_hz / 1000)
     late, share = np.divmod(wide["delay"] / period, 1.0)
@@ -143,7 +156,10 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
     sent, lagged = np.zeros((line, lanes)), np.zeros(lanes)
     pull = 1 - np.exp(-period / wide["lag"])
     gust, rate, angle, heading = size * rng.standard_normal(lanes), np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
-    kept = {name: np.zeros((steps, lanes), dtype=np.float32) for name in ("rate", "gyro", "asked", "angle", "wanted", "command", "acting")}
+    kept = {
+        name: np.zeros((steps, lanes), dtype=np.float32)
+        for name in ("rate", "gyro", "asked", "angle", "wanted", "command", "acting")
+    }
     command, saturated = np.zeros(lanes), np.zeros(lanes, dtype=bool)
     hold = np.repeat([case.sticks == "hold" for case in cases], 3)
     velocity = np.zeros(lanes)
@@ -166,13 +182,24 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
         gust = gust * decay + shocks * rng.standard_normal(lanes)
         wash = wash * decay_wash + shocks_wash * rng.standard_normal(lanes)
         torque = wide["gain"] * (lagged + wide["lead"] * change / period) + gust + wash
-        for name, value in (("rate", rate), ("gyro", gyro), ("asked", asked), ("angle", angle), ("wanted", target), ("command", command), ("acting", acting)):
+        for name, value in (
+            ("rate", rate),
+            ("gyro", gyro),
+            ("asked", asked),
+            ("angle", angle),
+            ("wanted", target),
+            ("command", command),
+            ("acting", acting),
+        ):
             kept[name][step] = value
         rate = rate + period * (torque - wide["damping"] * rate)
         angle = angle + period * rate
         velocity = velocity + period * (9.8 * np.sin(angle) - 0.3 * velocity)
     kept["stick"], kept["time"] = stick.astype(np.float32), time
-    return [{name: (each if name == "time" else each[:, 3 * k : 3 * k + 3].astype(float)) for name, each in kept.items()} for k in range(len(cases))]
+    return [
+        {name: (each if name == "time" else each[:, 3 * k : 3 * k + 3].astype(float)) for name, each in kept.items()}
+        for k in range(len(cases))
+    ]
 
 
 def filtered(case: Case, gyro: np.ndarray) -> np.ndarray:
@@ -230,7 +257,11 @@ def flights(seed: int, count: int, seconds: float = 60.0):
     by_law: dict[tuple[str, float], list[Case]] = {}
     for number in range(count):
         autopilot = list(AUTOPILOTS)[number % 4]
-        vehicle = str(rng.choice(list(VEHICLES))) if autopilot in ("px4", "ardupilot") else {"betaflight": "racer", "crazyflie": "nano"}[autopilot]
+        vehicle = (
+            str(rng.choice(list(VEHICLES)))
+            if autopilot in ("px4", "ardupilot")
+            else {"betaflight": "racer", "crazyflie": "nano"}[autopilot]
+        )
         gusts = list(GUSTS)[number // 4 % 3]
         kinds = ("acro", "gentle") if autopilot == "betaflight" else STICKS
         case = draw_case(rng, autopilot, vehicle, gusts, kinds[number // 12 % len(kinds)])

@@ -1,7 +1,7 @@
 """Numbers from equations with instruments: ``sum Z' W (r - X d) = 0``, their covariance over blocks, their strength.
 
-``r`` is the residual at values of the numbers, ``X`` its slopes (``r`` falls by ``X d`` for a step ``d``), ``Z`` what is
-correlated with the slopes and not with the disturbance. Least squares is the case ``Z = X``.
+``r`` is the residual at values of the numbers, ``X`` its slopes (``r`` falls by ``X d`` for a step ``d``), ``Z`` what
+goes with the slopes and not with the disturbance. Least squares is the case ``Z = X``.
 """
 
 from __future__ import annotations
@@ -189,9 +189,7 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         covariance=jackknife_covariance(left_out) + held,
         left_out=left_out,
         strength=conditional_strength(normal, prior),
-        blocks=effective_blocks(
-            np.trace(normal.information / np.maximum(np.diag(total), _RIDGE), axis1=1, axis2=2)
-        ),
+        blocks=effective_blocks(np.trace(normal.information / np.maximum(np.diag(total), _RIDGE), axis1=1, axis2=2)),
         settled=settled,
     )
 

@@ -7,7 +7,7 @@ autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing o
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -63,6 +63,8 @@ _SEEN = 1e-4
 _USUAL_DELAY_S = 0.012
 _TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
+_NORMAL = 1.96
+"""Standard deviations of half a 95 % interval."""
 _YAW = 2
 
 Z, U, Y, A, J = range(5)
@@ -132,7 +134,7 @@ class AxisPlant:
     reason: str = about("why it is not identified; empty where it is")
     instrument: str = about("signal that moves the vehicle and knows nothing of gusts; empty where there is none")
     at_hz: float = about("frequency of the effectiveness", unit="Hz", gaps=True)
-    band_hz: Array = about("lowest and highest frequency of the estimate", "end", unit="Hz", gaps=True)
+    band_hz: np.ndarray = about("lowest and highest frequency of the estimate", "end", unit="Hz", gaps=True)
     windows: int = about("windows of the estimate, overlapping by half")
     strength: float = about("F statistic of the instrument, conditional on all other numbers", gaps=True)
     coherence: float = about("of instrument and command, median over the band", gaps=True)
@@ -143,20 +145,22 @@ class AxisPlant:
     lag: Estimate | None = part(default=None)
     least_squares: Estimate | None = part(default=None)
     bound: Estimate | None = part(default=None)
-    frequency: Array = about("of the curves", "frequency", unit="Hz", brief=False)
-    gain: Array = about("angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    phase: Array = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
-    gain_error: Array = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
-    model_gain: Array = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    model_phase: Array = about("of the model", "frequency", unit="rad", gaps=True, brief=False)
-    direct_gain: Array = about("by least squares", "frequency", unit="rad/s^2", gaps=True, brief=False)
-    direct_phase: Array = about("by least squares", "frequency", unit="rad", gaps=True, brief=False)
-    input_coherence: Array = about("of instrument and command", "frequency", gaps=True, brief=False)
-    output_coherence: Array = about("of instrument and body rate", "frequency", gaps=True, brief=False)
-    parameters: Array = about(
+    frequency: np.ndarray = about("of the curves", "frequency", unit="Hz", brief=False)
+    gain: np.ndarray = about(
+        "angular acceleration per full command", "frequency", unit="rad/s^2", gaps=True, brief=False
+    )
+    phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
+    gain_error: np.ndarray = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
+    model_gain: np.ndarray = about("of the model", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    model_phase: np.ndarray = about("of the model", "frequency", unit="rad", gaps=True, brief=False)
+    direct_gain: np.ndarray = about("by least squares", "frequency", unit="rad/s^2", gaps=True, brief=False)
+    direct_phase: np.ndarray = about("by least squares", "frequency", unit="rad", gaps=True, brief=False)
+    input_coherence: np.ndarray = about("of instrument and command", "frequency", gaps=True, brief=False)
+    output_coherence: np.ndarray = about("of instrument and body rate", "frequency", gaps=True, brief=False)
+    parameters: np.ndarray = about(
         "gain rad/s^2, delay s, lag s, damping 1/s, lead s of the model", "number", gaps=True, brief=False
     )
-    draws: Array = about("the same of plants that the log leaves possible", "draw", "number", brief=False)
+    draws: np.ndarray = about("the same of plants that the log leaves possible", "draw", "number", brief=False)
 
     @property
     def identified(self) -> bool:
@@ -221,12 +225,15 @@ def plant_spectra(
     seconds = float(np.clip(usable.sum() / flight.rate_hz / _WINDOWS, *_window_s(flight)))
     length = round(seconds * flight.rate_hz)
     begins = window_starts(usable, length)
-    frequency = np.fft.rfftfreq(length, 1 / flight.rate_hz)
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / flight.rate_hz), dtype=np.float64)
     inside = (frequency >= _PERIODS / seconds * (1 - 1e-9)) & (frequency <= min(_TOP_HZ, _OF_CLOCK * flight.rate_hz))
     if len(begins) < 2 or inside.sum() < 6:
         return None
     period = 1 / flight.rate_hz
-    parts = [*transforms(instrument, begins, length, period), *transforms(np.roll(command, early), begins, length, period)]
+    parts = [
+        *transforms(instrument, begins, length, period),
+        *transforms(np.roll(command, early), begins, length, period),
+    ]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
     parts += transforms(rate, begins, length, period, 2)
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
@@ -263,7 +270,7 @@ def _outer(cross: Numbers, power: Numbers) -> Numbers:
 
 
 class _Equations:
-    """Equations of one axis by frequency: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
+    """Equations of one axis: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
 
     Instruments are what the other blocks predict from the setpoint: a prediction by the same windows would follow the
     gusts again.
@@ -282,7 +289,9 @@ class _Equations:
             # Least squares takes the command as it is.
             predicted[..., 0], kept = 1.0, np.ones_like(kept)
         self._predicted = predicted * kept[..., None]
-        rest = spectra.total[:, U:, U:] - _outer(spectra.total[:, instrument, U:], spectra.total[:, instrument, instrument])
+        rest = spectra.total[:, U:, U:] - _outer(
+            spectra.total[:, instrument, U:], spectra.total[:, instrument, instrument]
+        )
         shared = SHARED_BINS / SMOOTHED_BINS / self._windows
         self._chance = rest * (shared * (kept**2).mean(axis=0))[:, None, None]
 
@@ -422,7 +431,7 @@ def _bound(equations: _Equations, values: Array) -> Estimate | None:
     return Estimate(value=np.nan, low=low, high=high) if low > 0 or np.isfinite(high) else None
 
 
-def _apart(fit: Fit, verdict: str) -> dict[str, Estimate | None]:
+def _apart(fit: Fit, verdict: str) -> dict[str, Any]:
     """Give delay and lag apart where the log halves what was known of their shares before."""
     half = fit.half(np.eye(len(fit.values))[2])
     if verdict != "identified" or half > _LAG_SPREAD:
@@ -441,16 +450,18 @@ def _apart(fit: Fit, verdict: str) -> dict[str, Estimate | None]:
 
 def _drawn(fit: Fit, at_hz: float) -> np.ndarray:
     """Draw plants that the log leaves possible, shape (draw, 5), as wide as Student's t of few blocks."""
-    variance, axes = np.linalg.eigh(fit.covariance)
+    floor = np.zeros(len(fit.values))
+    floor[:2] = GAIN_FLOOR / _NORMAL, DELAY_FLOOR_S / _DELAY_UNIT_S / _NORMAL
+    variance, axes = np.linalg.eigh(fit.covariance + np.diag(floor**2))
     first = np.eye(len(fit.values))[0]
-    wider = fit.half(first) / 1.96 / float(np.sqrt(fit.covariance[0, 0]))
+    wider = fit.half(first) / _NORMAL / float(np.sqrt(fit.covariance[0, 0]))
     normal = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.values)))
     draws = fit.values + wider * (normal * np.sqrt(np.maximum(variance, 0.0))) @ axes.T
     draws[:, 1] = np.maximum(draws[:, 1], _LEAST_DELAY)
     return np.stack([np.broadcast_to(each, _DRAWS) for each in PlantModel.of(draws, at_hz)], axis=1)
 
 
-def _curves(equations: _Equations, fit: Fit) -> dict[str, np.ndarray]:
+def _curves(equations: _Equations, fit: Fit) -> dict[str, Any]:
     spectra = equations.spectra
     gain, direct = spectra.gain(Z, U, A), spectra.gain(U, U, A)
     model = PlantModel.of(fit.values, equations.at_hz)
@@ -474,8 +485,8 @@ def _curves(equations: _Equations, fit: Fit) -> dict[str, np.ndarray]:
 
 
 def _none(axis: str, reason: str) -> AxisPlant:
-    empty = np.zeros(0)
     curves = ("frequency", "gain", "phase", "gain_error", "model_gain", "model_phase", "direct_gain", "direct_phase")
+    missing: dict[str, Any] = dict.fromkeys((*curves, "input_coherence", "output_coherence"), np.zeros(0))
     return AxisPlant(
         axis=axis,
         verdict="none",
@@ -486,7 +497,7 @@ def _none(axis: str, reason: str) -> AxisPlant:
         windows=0,
         strength=np.nan,
         coherence=np.nan,
-        **dict.fromkeys((*curves, "input_coherence", "output_coherence"), empty),
+        **missing,
         parameters=np.full(5, np.nan),
         draws=np.zeros((0, 5)),
     )

@@ -1,0 +1,321 @@
+"""The loop that flew: body rate by its setpoint, over frequency and as a step, and how far it is from unstable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.autopilots.law import Law
+from cpfls_cli.blocks import half_width, jackknife_error
+from cpfls_cli.estimation.spectra import (
+    BlockSpectra,
+    block_spectra,
+    cut_blocks,
+    smoothed,
+    transforms,
+    window_starts,
+)
+from cpfls_cli.look.effectiveness import FEWEST_BLOCKS, AxisPlant, PlantModel
+from cpfls_cli.look.flight import AXES, LogFlight
+from cpfls_cli.look.law import flown_law, gyroscope_filters
+from cpfls_cli.look.setpoints import Exogenous, exogenous
+from cpfls_cli.result import Estimate, about, part, result
+from cpfls_cli.tuning.margins import crossing_margins, disk_of, is_stable
+
+CLEAR = 0.5
+"""Coherence, of instrument with setpoint and with body rate, below which the response is not measured any more."""
+_WINDOW_S, _SHOWN_S, _SETTLES_S = 2.0, 0.6, (0.3, 0.5)
+_TOP_HZ, _OF_CLOCK, _FADES = 60.0, 0.2, 1.6
+"""Top of the band; the same, share of the clock; frequencies over which a cut step fades, by its end."""
+_USUAL_LATE_S = 0.04
+_POINTS, _LOWEST_HZ, _OF_NYQUIST = 400, 0.1, 0.98
+_CERTAIN = 0.975
+_HALF_POWER = 0.5**0.5
+_TINY = float(np.finfo(float).tiny)
+Z, X, Y = 0, 1, 2
+
+
+@result
+class StepNumbers:
+    """What a step of the rate setpoint does."""
+
+    overshoot: Estimate = part()
+    """Share of the step."""
+    rise_s: Estimate = part()
+    """From a tenth to nine tenths."""
+    half_s: Estimate = part()
+    """Until half of it."""
+
+
+@result
+class LoopMargins:
+    """How far the rate loop is from instability, cut at the command, over all plants that the log leaves possible."""
+
+    gain_db: Estimate = part()
+    phase_deg: Estimate = part()
+    disk_deg: Estimate = part()
+    delay_s: Estimate = part()
+    """Delay that the loop bears more."""
+    crossover_hz: Estimate = part()
+    stable: float = about("share of the plants with which the loop is stable")
+    extrapolated: bool = about("whether the loop crosses above the frequencies that were measured")
+
+
+@result
+class AxisLoop:
+    """The rate loop about one axis as it flew."""
+
+    axis: str = about("roll, pitch or yaw")
+    measured: bool = about("whether the response was measured")
+    reason: str = about("why it was not; empty where it was")
+    instrument: str = about("signal that moves the vehicle and knows nothing of gusts; empty where there is none")
+    windows: int = about("windows of the response, overlapping by half")
+    clear_hz: float = about("frequency up to which the response is measured", unit="Hz", gaps=True)
+    tracking: float = about("root mean square of rate setpoint less body rate, over that of the setpoint", gaps=True)
+    bandwidth_hz: Estimate | None = part(default=None)
+    by_step: StepNumbers | None = part(default=None)
+    """Of the measured response, deconvolved."""
+    by_law: StepNumbers | None = part(default=None)
+    """Of the plant and the law that flew."""
+    margins: LoopMargins | None = part(default=None)
+    frequency: np.ndarray = about("of the response", "frequency", unit="Hz", brief=False)
+    gain: np.ndarray = about("of body rate by setpoint", "frequency", gaps=True, brief=False)
+    phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
+    gain_error: np.ndarray = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
+    coherence: np.ndarray = about("the smaller of both", "frequency", gaps=True, brief=False)
+    law_gain: np.ndarray = about("of plant and law", "frequency", gaps=True, brief=False)
+    law_phase: np.ndarray = about("of plant and law", "frequency", unit="rad", gaps=True, brief=False)
+    time: np.ndarray = about("of the step", "time", unit="s", brief=False)
+    step: np.ndarray = about("body rate by a unit step of its setpoint", "time", gaps=True, brief=False)
+    step_low: np.ndarray = about("lower end of its 95 % interval", "time", gaps=True, brief=False)
+    step_high: np.ndarray = about("upper end of its 95 % interval", "time", gaps=True, brief=False)
+    law_step: np.ndarray = about("of plant and law", "time", gaps=True, brief=False)
+
+    @property
+    def overshoot(self) -> Estimate | None:
+        """Overshoot by plant and law where both are known, else by the deconvolved step."""
+        known = self.by_law or self.by_step
+        return known.overshoot if known else None
+
+
+def loops(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop, ...]:
+    """Measure the rate loops about all axes, and compute them from plant and law."""
+    law = flown_law(flight)
+    return tuple(_axis_loop(flight, axis, plants[axis], law) for axis in range(len(AXES)))
+
+
+def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) -> AxisLoop:
+    asked, rate = flight.rate_setpoint[:, axis], flight.body_rate[:, axis]
+    usable = flight.usable & np.isfinite(asked) & np.isfinite(rate)
+    chosen = exogenous(flight, axis, usable) if usable.any() else Exogenous((), "no rate setpoint is logged")
+    length = round(_WINDOW_S * flight.rate_hz)
+    time = np.arange(round(_SHOWN_S * flight.rate_hz)) / flight.rate_hz
+    found, source, reason = None, "", chosen.reason
+    for name, values in chosen.candidates:
+        found, source = _response(flight, values, asked, rate, usable & np.isfinite(values), length), name
+        if found is not None:
+            break
+        reason = "too short, or the setpoint moves too little"
+    every = _measured(found, time, length) if found else {}
+    loop = _Loop.of(plant, law, axis)
+    power = float(np.mean(asked[usable] ** 2)) if usable.any() else 0.0
+    return AxisLoop(
+        axis=AXES[axis],
+        measured=found is not None,
+        reason="" if found else reason,
+        instrument=source if found else "",
+        tracking=float(np.sqrt(np.mean((asked - rate)[usable] ** 2) / power)) if power > 0 else np.nan,
+        **{**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})},
+    )
+
+
+class _Response(NamedTuple):
+    """Spectra of instrument, setpoint and rate, and up to which frequency they are clear."""
+
+    spectra: BlockSpectra
+    coherence: Array
+    clear_hz: float
+
+    def gains(self) -> Numbers:
+        """Give the response of all blocks, then without each, shape (1 + block, frequency)."""
+        total, blocks = self.spectra.total, self.spectra.cross
+        sums = np.concatenate([total[None], total - blocks])
+        below = sums[:, :, Z, X]
+        return np.asarray(sums[:, :, Z, Y] / np.where(np.abs(below) > 0, below, _TINY))
+
+
+def _response(
+    flight: LogFlight, instrument: Array, asked: Array, rate: Array, usable: BoolArray, length: int
+) -> _Response | None:
+    """Take the spectra of a response; None where it is not clear from the first frequencies on."""
+    early = round(_USUAL_LATE_S * flight.rate_hz)
+    begins = window_starts(usable & np.concatenate([np.zeros(early, dtype=bool), usable[:-early]]), length)
+    period = 1 / flight.rate_hz
+    frequency = np.asarray(np.fft.rfftfreq(length, period), dtype=np.float64)
+    inside = frequency <= min(_TOP_HZ, _OF_CLOCK * flight.rate_hz)
+    if len(begins) < FEWEST_BLOCKS:
+        return None
+    # What entered a window is what left it: setpoints are taken earlier, and turned back.
+    turned = np.exp(2j * np.pi * frequency * early * period)
+    z, x = (
+        transforms(np.nan_to_num(np.roll(each, early)), begins, length, period)[0] * turned
+        for each in (instrument, asked)
+    )
+    y = transforms(np.nan_to_num(rate), begins, length, period)[0]
+    power = np.abs(z[:, inside]).max(axis=1)
+    spectra = block_spectra([z, x, y], cut_blocks(power), frequency, inside)
+    if len(spectra.windows) < FEWEST_BLOCKS:
+        return None
+    coherence = np.minimum(spectra.coherence(Z, X), spectra.coherence(Z, Y))
+    unclear = np.flatnonzero(smoothed(coherence) < CLEAR)
+    unclear = unclear[unclear > 1]
+    ends = float(spectra.frequency[unclear[0]] if len(unclear) else spectra.frequency[-1])
+    return _Response(spectra, coherence, ends) if ends >= _FADES / _WINDOW_S * 2 else None
+
+
+def _stepped(gains: Numbers, frequency: Array, ends: float, length: int, samples: int) -> Array:
+    """Give steps of responses, shape (..., frequency), that fade out from where they are not known any more."""
+    fading = np.clip((frequency / ends - 1) / (_FADES - 1), 0.0, 1.0)
+    shown = gains * (0.5 + 0.5 * np.cos(np.pi * fading))
+    shown[..., 0] = np.abs(shown[..., 1])
+    whole = np.zeros((*gains.shape[:-1], length // 2 + 1), dtype=complex)
+    whole[..., : gains.shape[-1]] = shown
+    # What fades without a phase begins before the step.
+    before = length // 8
+    impulse = np.roll(np.fft.irfft(whole, length, axis=-1), before, axis=-1)
+    return np.asarray(np.cumsum(impulse, axis=-1)[..., before : before + samples])
+
+
+def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
+    """Give the fields of an `AxisLoop` that a measured response has."""
+    gains, frequency, blocks = found.gains(), found.spectra.frequency, len(found.spectra.windows)
+    steps = _stepped(gains, frequency, found.clear_hz, length, len(time))
+    half = half_width(jackknife_error(steps[1:]), blocks)
+    magnitude = np.log(np.maximum(np.abs(gains), _TINY))
+    return {
+        "windows": int(found.spectra.windows.sum()),
+        "clear_hz": found.clear_hz,
+        "bandwidth_hz": _jackknifed(np.array([_bandwidth(frequency, np.abs(each), found.clear_hz) for each in gains])),
+        "by_step": _numbers(time, steps, _jackknifed),
+        "frequency": frequency,
+        "gain": np.abs(gains[0]),
+        "phase": np.unwrap(np.angle(gains[0])),
+        "gain_error": jackknife_error(magnitude[1:]),
+        "coherence": found.coherence,
+        "time": time,
+        "step": steps[0],
+        "step_low": steps[0] - half,
+        "step_high": steps[0] + half,
+    }
+
+
+def _nothing() -> dict[str, Any]:
+    empty = ("frequency", "gain", "phase", "gain_error", "coherence", "law_gain", "law_phase")
+    times = ("time", "step", "step_low", "step_high", "law_step")
+    return {"windows": 0, "clear_hz": np.nan, **dict.fromkeys((*empty, *times), np.zeros(0))}
+
+
+def _jackknifed(values: Array) -> Estimate | None:
+    """Give a number from its value and those without each block; None where it is not always there."""
+    if not np.isfinite(values).all():
+        return None
+    half = float(half_width(jackknife_error(values[1:]), len(values) - 1))
+    return Estimate(value=float(values[0]), low=float(values[0] - half), high=float(values[0] + half))
+
+
+def _drawn(values: Array) -> Estimate | None:
+    """Give a number from its value and draws; infinite ends where draws are."""
+    if not np.isfinite(values[0]):
+        return None
+    low, high = np.quantile(values[1:], [1 - _CERTAIN, _CERTAIN], method="nearest")
+    return Estimate(value=float(values[0]), low=float(min(low, values[0])), high=float(max(high, values[0])))
+
+
+def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
+    """Give the frequency at which a response has half its power; NaN where that is not below an end."""
+    below = np.flatnonzero((gain < _HALF_POWER) & (frequency > 0))
+    if not len(below) or below[0] == 0 or frequency[below[0]] > ends:
+        return np.nan
+    at = below[0]
+    share = (gain[at - 1] - _HALF_POWER) / max(gain[at - 1] - gain[at], _TINY)
+    return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
+
+
+def _numbers(time: Array, steps: Array, of: Callable[[Array], Estimate | None]) -> StepNumbers | None:
+    """Read overshoot and times from steps, shape (1 + other, time)."""
+    settled = steps[:, (time >= _SETTLES_S[0]) & (time <= _SETTLES_S[1])].mean(axis=1)
+    level = np.where(settled > 0, settled, np.nan)
+
+    def reached(share: float) -> Array:
+        above = steps >= share * level[:, None]
+        first = above.argmax(axis=1)
+        rows = np.arange(len(steps))
+        before = steps[rows, np.maximum(first - 1, 0)]
+        part_ = (share * level - before) / np.where(first > 0, steps[rows, first] - before, 1.0)
+        return np.where(above.any(axis=1), (first - 1 + np.where(first > 0, part_, 1.0)) * (time[1] - time[0]), np.nan)
+
+    over, rise, half = of(steps.max(axis=1) - 1.0), of(reached(0.9) - reached(0.1)), of(reached(0.5))
+    if over is None or rise is None or half is None:
+        return None
+    return StepNumbers(overshoot=over, rise_s=rise, half_s=half)
+
+
+class _Loop(NamedTuple):
+    """Plant and law of one axis: the plant that was found, then those that are possible, shape (1 + draw, 1) each."""
+
+    plants: PlantModel
+    law: Law
+    axis: int
+    band_hz: float
+
+    @classmethod
+    def of(cls, plant: AxisPlant, law: Law | None, axis: int) -> _Loop | None:
+        """Take them where both are known."""
+        if law is None or not plant.identified:
+            return None
+        every = np.concatenate([plant.parameters[None], plant.draws])
+        return cls(PlantModel(*(every[:, [place]] for place in range(5))), law, axis, float(plant.band_hz[1]))
+
+    def closed(self, frequency: Array) -> Numbers:
+        """Evaluate the logged body rate by its setpoint, shape (1 + draw, frequency)."""
+        control, moved = self.law.response(self.axis, frequency), self.plants.rate(frequency)
+        filters = gyroscope_filters(self.law, self.axis, frequency)
+        return np.asarray(filters * moved * control.forward / (1 + moved * control.feedback))
+
+    def fields(self, time: Array, rate_hz: float, length: int, measured: dict[str, Any]) -> dict[str, Any]:
+        """Give the fields of an `AxisLoop` that plant and law have."""
+        frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate_hz)[1:], dtype=np.float64)
+        frequency = frequency[frequency < 0.45 * self.law.rate_hz]
+        response = self.closed(frequency)
+        gains = np.concatenate([np.ones((len(response), 1)), response], axis=1)
+        whole = np.concatenate([[0.0], frequency])
+        steps = _stepped(gains, whole, float(frequency[-1]) / _FADES, length, len(time))
+        shown = measured.get("frequency", np.zeros(0))
+        assert isinstance(shown, np.ndarray)
+        own = np.interp(shown, whole, gains[0].real) + 1j * np.interp(shown, whole, gains[0].imag)
+        return {
+            "by_law": _numbers(time, steps, _drawn),
+            "margins": self.margins(),
+            "time": time,
+            "law_step": steps[0],
+            "law_gain": np.abs(own),
+            "law_phase": np.unwrap(np.angle(own)),
+        }
+
+    def margins(self) -> LoopMargins | None:
+        """Compute the margins; None where the loop that flew would not be stable: then one of both is not as found."""
+        frequency = np.geomspace(_LOWEST_HZ, _OF_NYQUIST * 0.5 * self.law.rate_hz, _POINTS)
+        loop = self.plants.rate(frequency) * self.law.response(self.axis, frequency).feedback
+        stable = is_stable(frequency, loop)
+        if not stable[0] or stable.mean() < 0.5:
+            return None
+        gain, phase, crossover = crossing_margins(frequency, loop[stable])
+        disk = np.degrees(2 * np.arctan(disk_of(loop[stable]) / 2))
+        values = {"gain_db": gain, "phase_deg": phase, "disk_deg": disk, "delay_s": phase / 360 / crossover}
+        found: dict[str, Any] = {name: _drawn(each) for name, each in {**values, "crossover_hz": crossover}.items()}
+        if None in found.values():
+            return None
+        return LoopMargins(**found, stable=float(stable.mean()), extrapolated=bool(crossover[0] > self.band_hz))
