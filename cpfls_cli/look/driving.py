@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.allocation import factor_mix
 from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.flightlog.airframe import Airframe
@@ -161,10 +162,12 @@ def _sum_of_terms(log: LookedLog) -> Samples | None:
 def _by_rotors(
     rotors: Rotors, places: Array, spins: Array, autopilot: Autopilot | None, parameters: Parameters
 ) -> Samples | None:
-    columns = mixer_columns(places, spins, autopilot.mixer if autopilot else MixerRule("peak", 1.0, 1.0))
     thrusts = rotors.thrusts(_curve(rotors, autopilot, parameters))
-    if columns is None or thrusts is None:
+    rows = np.column_stack([np.ones(len(spins)), places, spins])
+    if thrusts is None or np.linalg.matrix_rank(rows, tol=1e-6) < rows.shape[1]:
         return None
+    rule = autopilot.mixer if autopilot else MixerRule("peak", 1.0, 1.0)
+    columns = factor_mix(rule, places, spins, inverse=rule.by == "power")
     return thrusts._replace(values=(thrusts.values @ np.linalg.pinv(columns).T)[:, 1:])
 
 
@@ -178,33 +181,3 @@ def _curve(rotors: Rotors, autopilot: Autopilot | None, parameters: Parameters) 
     curve = autopilot.law(autopilot.of_log(known)).curve
     # The range that Betaflight's header states begins where motors idle.
     return replace(curve, low=0.0, high=1.0) if autopilot.name == "betaflight" else curve
-
-
-def mixer_columns(places: Array, spins: Array, rule: MixerRule) -> Array | None:
-    """Build the mixer of an autopilot, shape (rotor, 4): share of full thrust for thrust, roll, pitch and yaw.
-
-    Parameters
-    ----------
-    places : array, shape (rotor, 2)
-        Forward and right.
-    spins : array, shape (rotor,)
-
-    Returns
-    -------
-    array or None
-        None where the rotors do not control all four.
-    """
-    rows = np.array([np.ones(len(spins)), -places[:, 1], places[:, 0], spins])
-    if np.linalg.matrix_rank(rows, tol=1e-6) < 4:
-        return None
-    columns = np.linalg.pinv(rows)
-    columns[np.abs(columns) < 1e-9] = 0.0
-    columns[:, 0] /= columns[:, 0].mean()
-    peaks = np.abs(columns).max(axis=0)
-    tilts = peaks[1:3]
-    if rule.by == "power":
-        used = (columns[:, 1:3] != 0).sum(axis=0)
-        tilts = np.full(2, np.sqrt((columns[:, 1:3] ** 2).sum(axis=0) / (used / 2)).max())
-    columns[:, 1:3] *= rule.tilt / tilts
-    columns[:, 3] *= rule.yaw / peaks[3]
-    return np.asarray(columns)

@@ -16,6 +16,7 @@ from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.gains import TunedGains, tuned_gains
 from cpfls_cli.look.gusts import AxisGusts, Driven, gusts_of
 from cpfls_cli.look.hover import Hover, hover_of
+from cpfls_cli.look.loop import AxisLoop, loops_of
 from cpfls_cli.look.logged import Logged, what_is_logged
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.timeline import Event, timeline
@@ -41,6 +42,7 @@ class Look:
     rotors_source: str = about("logged or rebuilt; empty where commands of the rotors are neither", default="")
     plants: dict[str, AxisPlant] | None = part(default=None)
     vibration: Vibration | None = part(default=None)
+    loops: dict[str, AxisLoop] | None = part(default=None)
     gusts: dict[str, AxisGusts] | None = part(default=None)
     gains: TunedGains | None = part(default=None)
     tracks: dict[str, Track] | None = part(default=None)
@@ -72,6 +74,8 @@ def look_at(
     balance, hover, vibration = balance_of(flight), hover_of(flight), vibration_of(flight)
     progress("effectiveness")
     plants = effectiveness(flight)
+    progress("the loop that flew")
+    loops = loops_of(flight, plants)
     gusts = gusts_of(flight, {plant.axis: _driven(plant) for plant in plants if plant.identified})
     progress("gains")
     gains = tuned_gains(flight, plants)
@@ -91,6 +95,7 @@ def look_at(
         rotors_source=flight.rotors_source,
         plants={plant.axis: plant for plant in plants},
         vibration=vibration,
+        loops={loop.axis: loop for loop in loops},
         gusts={each.axis: each for each in gusts},
         gains=gains,
         tracks=_tracks(flight),

@@ -101,7 +101,7 @@ class AxisLoop:
         return known.overshoot if known else None
 
 
-def loops(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop, ...]:
+def loops_of(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop, ...]:
     """Measure the rate loops about all axes, and compute them from plant and law."""
     law = flown_law(flight)
     return tuple(_axis_loop(flight, axis, plants[axis], law) for axis in range(len(AXES)))

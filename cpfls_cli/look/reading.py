@@ -85,7 +85,7 @@ def read_flight(
         with about(name, InputError):
             recognition = recognise(topics, units, parameters, system)
     # Commands that are rebuilt stand in a topic of their own.
-    rebuilt = getattr(recognition, "rebuilt", None)
+    rebuilt = recognition.rebuilt
     held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
     return _Reader(name, LookedLog(held, units, system), recognition, parameters).flight()
 
