@@ -93,7 +93,9 @@ class Found:
         axes = joined([each.axis for each in moves] or [axis for axis in AXES if axis not in self.identified])
         how = moves[0] if moves else None
         mode = f" in mode {how.mode}" if how else " in a mode without position hold"
-        speed = f", from {how.lowest:g} to {max(each.highest for each in moves):g} Hz" if how else ", slowly then faster"
+        speed = (
+            f", from {how.lowest:g} to {max(each.highest for each in moves):g} Hz" if how else ", slowly then faster"
+        )
         return f"move the stick of {axes} to both sides{mode}{speed}, for 20 s an axis"
 
 
@@ -135,7 +137,9 @@ def _hover(found: Found) -> tuple[str, str, str, str]:
     hover = found.hover
     if hover is None or hover.throttle is None:
         missing = not np.isfinite(found.flight.collective).any()
-        return ("no", "commands are not logged", "rotor commands", "") if missing else ("no", "no hover in it", "", _HOVER)
+        return (
+            ("no", "commands are not logged", "rotor commands", "") if missing else ("no", "no hover in it", "", _HOVER)
+        )
     why = f"{hover.hover_s:.0f} s of hover, seen by {hover.found_by}"
     return "yes" if hover.throttle.half < _SURE_HOVER else "roughly", why, "", ""
 
@@ -145,7 +149,12 @@ def _plants(found: Found) -> tuple[str, str, str, str]:
         return "yes", f"all axes, by {joined(dict.fromkeys(plant.instrument for plant in found.plants))}", "", ""
     answer = "roughly" if found.identified else "no"
     if found.loop_hz < _SLOWEST_HZ:
-        return answer, f"body rates or commands are logged only {found.loop_hz:.0f} times a second", "body rates and commands", ""
+        return (
+            answer,
+            f"body rates or commands are logged only {found.loop_hz:.0f} times a second",
+            "body rates and commands",
+            "",
+        )
     reasons: dict[str, list[str]] = {}
     for plant in found.plants:
         if not plant.identified:
@@ -161,7 +170,12 @@ def _loops(found: Found) -> tuple[str, str, str, str]:
     if not np.isfinite(found.flight.rate_setpoint).any():
         return "no", "rate setpoints are not logged", "rate setpoints", ""
     if found.loop_hz < _SLOWEST_HZ:
-        return "no", f"body rates or setpoints are logged only {found.loop_hz:.0f} times a second", "body rates and rate setpoints", ""
+        return (
+            "no",
+            f"body rates or setpoints are logged only {found.loop_hz:.0f} times a second",
+            "body rates and rate setpoints",
+            "",
+        )
     return "no", "rate setpoints move too little", "", found.sticks
 
 
@@ -222,7 +236,9 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     steps = []
     if slow:
         least = _WHOLE_SPECTRUM_HZ if all(each.question == "vibration" for each in slow) else FAST_HZ
-        text = log_faster(joined(dict.fromkeys(each.log for each in slow)), least, flight.system, parameters=flight.parameters)
+        text = log_faster(
+            joined(dict.fromkeys(each.log for each in slow)), least, flight.system, parameters=flight.parameters
+        )
         steps.append(NextStep(what=text, why=f"answers {joined([each.question for each in slow])}"))
     wanted: dict[str, list[str]] = {}
     for each in open_:

@@ -7,7 +7,45 @@ import numpy as np
 from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.law import Law, chain
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.estimation.spectra import block_spectra, cut_blocks, smoothed, transforms, window_starts
 from cpfls_cli.look.flight import LogFlight
+from cpfls_cli.result import about, result
+
+_WINDOW_S, _SLOW_WINDOW_S, _SLOW_HZ = 1.0, 4.0, 150.0
+"""Windows, those of slow logs, and the rate of the clock below which a log is one."""
+_OF_CLOCK, _FEWEST_BLOCKS = 0.065, 6
+_EXPLAINED = 0.8
+"""Least share of the command that setpoint and body rate explain where the feedback is seen."""
+_MOST_DB, _MOST_DEG = 3.0, 20.0
+"""By which the feedback that flew may differ from the stated one, so that margins of the latter count."""
+_AROUND = 1.5
+"""Frequencies around a crossover that decide its margins, a factor to both sides."""
+
+
+@result
+class FlownFeedback:
+    """The feedback about one axis as it flew, over that of the stated law."""
+
+    axis: str = about("roll, pitch or yaw")
+    frequency: Array = about("at which setpoint and body rate explain the command", "frequency", unit="Hz", brief=False)
+    ratio: Array = about("size of what flew over that of the law", "frequency", brief=False)
+    ratio_error: Array = about("standard error of its logarithm", "frequency", brief=False)
+    turned: Array = about("phase of what flew less that of the law", "frequency", unit="rad", brief=False)
+
+    def near(self, hz: float) -> tuple[float, float] | None:
+        """Give size, as a ratio, and phase, rad, around a crossover; None where the log does not show them."""
+        inside = np.abs(np.log(self.frequency / hz)) < np.log(_AROUND)
+        if not inside.any():
+            return None
+        return float(np.exp(np.median(np.log(self.ratio[inside])))), float(np.median(self.turned[inside]))
+
+    def fits(self, hz: float) -> bool:
+        """Whether margins of the stated law count at a crossover; so they do where the log does not show it."""
+        found = self.near(hz)
+        if found is None:
+            return True
+        return abs(20 * np.log10(found[0])) < _MOST_DB and abs(np.degrees(found[1])) < _MOST_DEG
 
 
 def flown_law(flight: LogFlight) -> Law | None:
@@ -24,3 +62,41 @@ def gyroscope_filters(law: Law | None, axis: int, frequency: Array) -> Numbers:
     if law is None:
         return np.ones(len(frequency), dtype=complex)
     return chain(law.axes[axis].measured, np.exp(-2j * np.pi * frequency * law.period), law.period)
+
+
+def flown_feedback(flight: LogFlight, axis: int, law: Law) -> FlownFeedback | None:
+    """Estimate the feedback that flew: how the command follows the body rate where the setpoint is held equal.
+
+    The autopilot makes the command of setpoint and body rate alone, so least squares of the command on both, frequency
+    by frequency, is unbiased by gusts. None where too little is usable.
+    """
+    signals = (flight.rate_setpoint[:, axis], flight.body_rate[:, axis], flight.command[:, axis])
+    usable = flight.usable & np.isfinite(np.stack(signals)).all(axis=0)
+    length = round((_WINDOW_S if flight.rate_hz > _SLOW_HZ else _SLOW_WINDOW_S) * flight.rate_hz)
+    begins, frequency = window_starts(usable, length), np.fft.rfftfreq(length, 1 / flight.rate_hz)
+    inside = (frequency > 2.5 / length * flight.rate_hz) & (frequency < _OF_CLOCK * flight.rate_hz)
+    if len(begins) < 2 or not inside.any():
+        return None
+    parts = [transforms(np.nan_to_num(each), begins, length, 1 / flight.rate_hz)[0] for each in signals]
+    spectra = block_spectra(parts, cut_blocks((np.abs(parts[2]) ** 2).sum(axis=1)), frequency, inside)
+    if len(spectra.windows) < _FEWEST_BLOCKS:
+        return None
+    total = smoothed(np.concatenate([spectra.total[None], spectra.total - spectra.cross]), axis=1)
+    power = total[..., 2, 2].real
+    solved = np.linalg.solve(
+        total[..., :2, :2] + 1e-12 * np.trace(total[..., :2, :2], axis1=-2, axis2=-1)[..., None, None] * np.eye(2),
+        total[..., :2, 2:],
+    )
+    explained = (total[0, :, :2, 2].conj() * solved[0, :, :, 0]).sum(axis=1).real / np.maximum(
+        power[0], np.finfo(float).tiny
+    )
+    over = -solved[..., 1, 0] / law.response(axis, spectra.frequency).feedback
+    clear = (explained > _EXPLAINED) & (np.abs(over) > 0).all(axis=0)
+    size = np.log(np.abs(over[:, clear]))
+    return FlownFeedback(
+        axis=("roll", "pitch", "yaw")[axis],
+        frequency=spectra.frequency[clear],
+        ratio=np.exp(size[0]),
+        ratio_error=jackknife_error(size[1:]),
+        turned=np.angle(over[0, clear]),
+    )

@@ -24,6 +24,7 @@ from cpfls_cli.look.vibration import Vibration, vibration_of
 from cpfls_cli.result import about, part, result
 from cpfls_cli.trace import Track, track
 
+
 @result
 class Look:
     """What one log tells of its vehicle."""
@@ -80,7 +81,14 @@ def look_at(
     progress("gains")
     gains = tuned_gains(flight, plants)
     found = Found(
-        flight=flight, balance=balance, hover=hover, plants=plants, loops=loops, vibration=vibration, gusts=gusts, gains=gains
+        flight=flight,
+        balance=balance,
+        hover=hover,
+        plants=plants,
+        loops=loops,
+        vibration=vibration,
+        gusts=gusts,
+        gains=gains,
     )
     answers = answers_of(found)
     return Look(
@@ -110,7 +118,9 @@ def _driven(plant: AxisPlant) -> Driven:
 def _tracks(flight: LogFlight) -> dict[str, Track]:
     """Take the signals that the page draws over time, those that the log has."""
     degrees = 180 / np.pi
-    labels = tuple(f"M{rotor + 1}" for rotor in range(flight.rotors.values.shape[-1] if flight.rotors.values.size else 0))
+    labels = tuple(
+        f"M{rotor + 1}" for rotor in range(flight.rotors.values.shape[-1] if flight.rotors.values.size else 0)
+    )
     lean, volts = ("roll", "pitch"), ("voltage",)
     given = {
         "rate": (AXES, flight.time, degrees * flight.body_rate, False),
