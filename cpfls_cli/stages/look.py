@@ -82,6 +82,49 @@ def _curves(chart: Chart, plant: AxisPlant, clear: np.ndarray) -> None:
     )
 
 
+def _step(r: Look) -> str:
+    """Draw the answer of the body rate to a step of its setpoint."""
+    shown = [loop for loop in (r.loops or {}).values() if loop.measured]
+    if not shown:
+        return ""
+    lows, highs = [loop.step_low for loop in shown], [loop.step_high for loop in shown]
+    low, high = span(*(each.step for each in shown), *lows, *highs, [0.0, 1.2])
+    chart = Chart(
+        "step",
+        "Body rate after a step of its setpoint, as a share of the step",
+        Axis("time after the step, s", 0.0, float(shown[0].time[-1])),
+        Axis("share of the step", max(low, -0.5), min(high, 2.0)),
+    )
+    chart.mark(y=1.0)
+    for loop in shown:
+        style = AXES.index(loop.axis)
+        chart.line(loop.axis, loop.time, loop.step, style, low=loop.step_low, high=loop.step_high)
+        if np.isfinite(loop.law_step).any() and len(loop.law_step) == len(loop.time):
+            chart.line(f"{loop.axis}, by effectiveness and law", loop.time, loop.law_step, style, kind="dashed thin")
+    return str(chart)
+
+
+def _response(r: Look) -> str:
+    """Draw the gain from rate setpoint to body rate."""
+    shown = [loop for loop in (r.loops or {}).values() if loop.measured]
+    if not shown:
+        return ""
+    inside = [(loop.frequency > 0) & (loop.frequency <= loop.clear_hz) for loop in shown]
+    frequency = np.concatenate([loop.frequency[part] for loop, part in zip(shown, inside, strict=True)])
+    chart = Chart(
+        "response",
+        "Body rate over rate setpoint, by frequency",
+        Axis("frequency, Hz", float(frequency.min()), float(frequency.max()), log=True),
+        Axis("gain", 0.0, 2.0),
+    )
+    chart.mark(y=1.0)
+    for loop, part in zip(shown, inside, strict=True):
+        spread = np.exp(1.96 * loop.gain_error[part])
+        gain, style = loop.gain[part], AXES.index(loop.axis)
+        chart.line(loop.axis, loop.frequency[part], gain, style, low=gain / spread, high=gain * spread)
+    return str(chart)
+
+
 def _map(r: Look) -> str:
     """Draw the power of the gyroscope over frequency and throttle."""
     v = r.vibration
@@ -189,6 +232,8 @@ FIGURES = {
     "traces": _traces,
     "balance": _balance,
     "effectiveness": _effectiveness,
+    "step": _step,
+    "response": _response,
     "vibration-map": _map,
     "spectra": _spectra,
     "thrust": _thrust,
