@@ -79,13 +79,13 @@ def constants() -> list[tuple[str, ...]]:
         time = flight.time
         true = flight.command @ np.sign([-1.0, 1.0, 1.0, -1.0]) / 4
         held = {"all steps, 400 Hz": (time, true), "logged, 10 Hz": (time[slow], true[slow])}
-        held["rebuilt, 50 Hz"] = time[every], true[every]
+        held["rebuilt, 50 Hz, on a line"] = time, np.interp(time, time[every], true[every])
         size = float(true.std())
-        for share in (0.99, 0.95, 0.9, 0.8):
-            noise = size * np.sqrt(1 - share) * rng.standard_normal(len(every))
-            held[f"rebuilt, explains {share:g}"] = time[every], true[every] + noise
-        for late in (0.01, 0.02, 0.04):
-            held[f"rebuilt, {1e3 * late:g} ms late"] = time[every] + late, true[every]
+        noise = size * rng.standard_normal(len(every))
+        made = {f"rebuilt, explains {share:g}": (0.0, np.sqrt(1 - share)) for share in (1.0, 0.99, 0.95, 0.9, 0.8)}
+        made |= {f"rebuilt, {1e3 * late:g} ms late": (late, 0.0) for late in (0.005, 0.01, 0.02)}
+        for name, (late, share) in made.items():
+            held[name] = time[every] + late, true[every] + share * noise
         for name, (stamps, values) in held.items():
             found.setdefault(name, []).append(effectiveness(flight, stamps, values))
     whole = np.array(found["all steps, 400 Hz"])[:, 0]

@@ -88,7 +88,7 @@ def _of_copter(system: str, parameters: Parameters) -> str:
     names = joined(f"{bit} ({_BITS[bit]})" for bit in bits)
     return (
         f"log motor speeds with bidirectional DShot ({'' if new else 'ArduPilot 4: '}SERVO_BLH_BDMASK), for {system} "
-        f"logs outputs (RCOU) 10 times a second at most; body rates, and RATE from which outputs are rebuilt, come faster"
-        f" with "
+        f"logs outputs (RCOU) 10 times a second at most; body rates, and RATE from which outputs are rebuilt, come"
+        f" faster with "
         f"{'LOG_FILE_RATEMAX = 0 and ' if new else ''}LOG_BITMASK {named} bits {names}"
     )

@@ -43,7 +43,7 @@ SOURCES: Final = (
 )
 """All columns that rebuilding reads."""
 
-_LEAST_EXPLAINED, _MOST_LAG_S, _SCALES, _MOST_OFFSET = 0.9, 0.02, (0.9, 1.1), 0.01
+_LEAST_EXPLAINED, _MOST_LAG_S, _SCALES, _MOST_OFFSET = 0.9, 0.01, (0.9, 1.1), 0.01
 """What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean,
 share of full. docs/import.md has the study."""
 _SMALLEST, _ON_TIME_S, _AT_ONCE_S = 2e-3, 5e-3, 1e-3

@@ -9,7 +9,6 @@ from cpfls_cli.flights.imported import imported
 from tests.builders.command_line import run
 from tests.builders.thinned_logs import Flown, write_px4
 
-
 SWAPPED = {"CA_ROTOR0_PX": -0.16, "CA_ROTOR0_PY": -0.16, "CA_ROTOR1_PX": 0.16, "CA_ROTOR1_PY": 0.16}
 
 
@@ -48,7 +47,7 @@ def test_a_config_of_init_imports_rebuilt_motors(flown, log, config):
     assert ((own - differing) ** 2).sum() < 0.2 * (differing**2).sum()
 
 
-def test_who_names_the_logged_columns_gets_them(flown, log, config):
+def test_who_names_the_logged_columns_gets_them(log, config):
     text = config.read_text()
     own = text.replace("gap_s: 0.1", "gap_s: 0.3")
     for motor in range(4):
