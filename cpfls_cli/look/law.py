@@ -45,7 +45,7 @@ class FlownFeedback:
         found = self.near(hz)
         if found is None:
             return True
-        return abs(20 * np.log10(found[0])) < _MOST_DB and abs(np.degrees(found[1])) < _MOST_DEG
+        return bool(abs(20 * np.log10(found[0])) < _MOST_DB and abs(np.degrees(found[1])) < _MOST_DEG)
 
 
 def flown_law(flight: LogFlight) -> Law | None:
@@ -73,7 +73,8 @@ def flown_feedback(flight: LogFlight, axis: int, law: Law) -> FlownFeedback | No
     signals = (flight.rate_setpoint[:, axis], flight.body_rate[:, axis], flight.command[:, axis])
     usable = flight.usable & np.isfinite(np.stack(signals)).all(axis=0)
     length = round((_WINDOW_S if flight.rate_hz > _SLOW_HZ else _SLOW_WINDOW_S) * flight.rate_hz)
-    begins, frequency = window_starts(usable, length), np.fft.rfftfreq(length, 1 / flight.rate_hz)
+    begins = window_starts(usable, length)
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / flight.rate_hz), dtype=float)
     inside = (frequency > 2.5 / length * flight.rate_hz) & (frequency < _OF_CLOCK * flight.rate_hz)
     if len(begins) < 2 or not inside.any():
         return None

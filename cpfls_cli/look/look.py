@@ -16,8 +16,8 @@ from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.gains import TunedGains, tuned_gains
 from cpfls_cli.look.gusts import AxisGusts, Driven, gusts_of
 from cpfls_cli.look.hover import Hover, hover_of
-from cpfls_cli.look.loop import AxisLoop, loops_of
 from cpfls_cli.look.logged import Logged, what_is_logged
+from cpfls_cli.look.loop import AxisLoop, loops_of
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.timeline import Event, timeline
 from cpfls_cli.look.vibration import Vibration, vibration_of

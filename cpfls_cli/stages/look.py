@@ -145,7 +145,8 @@ def _map(r: Look) -> str:
 
 def _spectra(r: Look) -> str:
     """Draw the spectra of the gyroscope, before and after filters."""
-    shown = [] if r.vibration is None else [each for each in r.vibration.spectra.values() if each.signal.startswith("gyroscope")]
+    every = {} if r.vibration is None else r.vibration.spectra
+    shown = [each for name, each in every.items() if name.startswith("gyroscope")]
     if not shown:
         return ""
     densities = [np.degrees(np.sqrt(each.density.mean(axis=1))) for each in shown]
