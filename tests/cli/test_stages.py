@@ -160,7 +160,7 @@ class Named:
 def several(run, names):
     """Give a thing for each name."""
     run.progress(0, len(names))
-    return {name: Named(name=name) for name in names}
+    return {name: Named(name=None if name == "nothing" else name) for name in names}
 
 
 @pytest.fixture
@@ -254,6 +254,6 @@ def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
 @pytest.mark.usefixtures("at_home")
 def test_a_result_that_breaks_its_description_is_refused_by_the_name_of_its_file(tmp_path):
     with pytest.raises(ComputationError) as error:
-        several.run(Run(output=tmp_path / "out"), names=[None])
-    assert str(error.value) == f"{tmp_path / 'out' / 'None.h5'}: not written: name: is missing"
+        several.run(Run(output=tmp_path / "out"), names=["nothing"])
+    assert str(error.value) == f"{tmp_path / 'out' / 'nothing.h5'}: not written: name: is missing"
     assert not (tmp_path / "out").exists()
