@@ -117,6 +117,9 @@ def _scalar(kind: Any) -> type:
         return type(inner[0])
     if origin is tuple:
         return _scalar(inner[0])
+    if kind is np.ndarray:
+        # Arrays are of numbers unless they say more.
+        return float
     if origin is np.ndarray:
         return _scalar(get_args(inner[1])[0])
     kinds = {bool: (bool, np.bool_), int: (int, np.integer), str: (str, np.str_), float: (float, np.floating)}
