@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,6 +26,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markdown_it.rules_core import StateCore
+from markdown_it.token import Token
 from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
@@ -44,6 +46,7 @@ _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
+_TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _LONG = 36
 """Characters from which the words of a cell are a sentence, which a terminal breaks."""
 _NEAR = 0.1
@@ -202,18 +205,31 @@ def _markdown() -> MarkdownIt:
 
 
 def _take_marks(state: StateCore) -> None:
-    """Make marks behind a cell or a paragraph the class of it, and first cells the headers of their rows."""
+    """Make marks behind a cell or a paragraph the class of it."""
+    table: list[Token] = []
     for before, token in zip(state.tokens, state.tokens[1:], strict=False):
         last = token.children[-1] if token.children else None
         if last is not None and last.type == "text" and (found := _MARKS.search(last.content)):
             last.content = last.content[: found.start()]
             before.attrSet("class", found[1])
-        if token.type == "th_open":
-            token.attrSet("scope", "col")
-        elif before.type == "tr_open" and token.type == "td_open":
-            token.attrSet("scope", "row")
-            token.tag = "th"
-            next(each for each in state.tokens[state.tokens.index(token) :] if each.type == "td_close").tag = "th"
+        table = [] if before.type == "table_open" else [*table, before]
+        if token.type == "table_close":
+            _name_cells(table)
+
+
+def _name_cells(table: Sequence[Token]) -> None:
+    """Say of which column a cell is, as narrow screens show one cell below the other; first cells name their rows."""
+    titles = [_plain_line(words.content) for cell, words in pairwise(table) if cell.type == "th_open"]
+    column = 0
+    for cell in table:
+        column = 0 if cell.type == "tr_open" else column + (cell.type == "td_close")
+        if cell.type == "th_open":
+            cell.attrSet("scope", "col")
+        elif cell.type == "td_open" and column:
+            cell.attrSet("data-title", titles[column])
+        elif cell.type == "td_open":
+            cell.attrSet("scope", "row")
+        cell.tag = "th" if cell.type in {"td_open", "td_close"} and column == (cell.type == "td_close") else cell.tag
 
 
 def blocks(text: str) -> list[Block]:
@@ -356,9 +372,7 @@ def _html(nodes: Iterable[Node], figures: Figures) -> Iterator[str]:
         if node.kind == "words":
             made = cast(str, _markdown().render(node.text))
             # No text can be a tag: what is wide can be scrolled, with a keyboard too.
-            yield made.replace("<table>", '<div class="table" tabindex="0"><table>').replace(
-                "</table>", "</table></div>"
-            )
+            yield _TABLE.sub(lambda found: f'<div class="{_shape(found[0])}" tabindex="0">{found[0]}</div>', made)
         elif node.kind == "heading":
             yield f"<h4{_class(node)}>{_line(node.text)}</h4>"
         elif node.kind == "fold":
@@ -367,6 +381,11 @@ def _html(nodes: Iterable[Node], figures: Figures) -> Iterator[str]:
             yield "</details>"
         elif drawn := figures[node.name]():
             yield f'<figure id="{node.name}">{drawn}<figcaption>{_line(node.text)}</figcaption></figure>'
+
+
+def _shape(table: str) -> str:
+    """Tell a table of sentences, whose cells stand one below the other on a narrow screen."""
+    return "table prose" if any(len(cell) > _LONG for cell in re.findall(r"<td[^>]*>(.*?)</td>", table)) else "table"
 
 
 def _class(node: Node) -> str:

@@ -210,6 +210,8 @@ class Stage:
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
         for name in names:
             refuse_inputs(output / name, run.inputs)
+        for name, each in results.items():
+            store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, names) as folder:
             for name, each in results.items():
                 store.write(folder / f"{name}.h5", each, run.origin(name))

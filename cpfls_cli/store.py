@@ -63,8 +63,7 @@ class Origin:
 
 def write(path: Path, given: Any, origin: Origin) -> None:
     """Write a result, whose class names its ``FORMAT``; one that breaks its own description is refused."""
-    if wrong := findings(given):
-        raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
+    require_sound(path, given)
     with sealed_output(path) as output, h5py.File(output, "w") as file:
         file.attrs["format"] = type(given).FORMAT
         file.attrs["schema_version"] = SCHEMA_VERSION
@@ -78,6 +77,12 @@ def write(path: Path, given: Any, origin: Origin) -> None:
             file.create_group(f"{INPUTS}/{role}").attrs.update(vars(source))
         _write(file, given)
         output.require_written()
+
+
+def require_sound(path: Path, given: Any) -> None:
+    """Refuse a result that breaks its own description; the path is that of the file it was to go into."""
+    if wrong := findings(given):
+        raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
 
 def _write(group: h5py.Group, given: Any) -> None:

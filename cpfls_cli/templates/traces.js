@@ -74,7 +74,8 @@
       const a = u.valToPos(from, "x", true), b = u.valToPos(to, "x", true);
       ctx.fillStyle = ctx.strokeStyle = colour(ofSeverity[severity]);
       ctx.globalAlpha = 0.12;
-      if (b > a) ctx.fillRect(a, bbox.top, b - a, bbox.height);
+      // What lasts and needs no look would shade the whole flight.
+      if (b > a && severity !== "note") ctx.fillRect(a, bbox.top, b - a, bbox.height);
       ctx.globalAlpha = 0.8;
       ctx.setLineDash([4, 4]);
       ctx.beginPath();

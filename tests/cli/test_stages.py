@@ -11,6 +11,7 @@ import typer
 
 import cpfls_cli.stages
 from cpfls_cli.cli.stages import AllCommands, stage_commands
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage, unique_names
 from tests.builders.studies import TINY, VEHICLE
@@ -159,7 +160,7 @@ class Named:
 def several(run, names):
     """Give a thing for each name."""
     run.progress(0, len(names))
-    return {name: Named(name=name) for name in names}
+    return {name: Named(name=None if name == "nothing" else name) for name in names}
 
 
 @pytest.fixture
@@ -248,3 +249,11 @@ def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
         assert result.exit_code == 2
         assert message in result.stderr
         assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("at_home")
+def test_a_result_that_breaks_its_description_is_refused_by_the_name_of_its_file(tmp_path):
+    with pytest.raises(ComputationError) as error:
+        several.run(Run(output=tmp_path / "out"), names=["nothing"])
+    assert str(error.value) == f"{tmp_path / 'out' / 'nothing.h5'}: not written: name: is missing"
+    assert not (tmp_path / "out").exists()

@@ -71,7 +71,7 @@ def test_no_data_is_taken_for_markdown_or_html(tmp_path):
     assert "<em>" not in shown
     assert "\u202e" not in shown
     assert "\x1b" not in shown
-    assert shown.count("&lt;script&gt;alert(1)&lt;/script&gt;") == 7
+    assert shown.count("&lt;script&gt;alert(1)&lt;/script&gt;") == 8
 
 
 @pytest.mark.parametrize(
@@ -182,8 +182,11 @@ def test_a_page_is_whole_and_needs_nothing_else():
     assert ("header", {"class": "good"}) in parsed.tags
     assert ("article", {"class": "card warning"}) in parsed.tags
     assert ("th", {"style": "text-align:left", "scope": "row"}) in parsed.tags
-    assert ("td", {"style": "text-align:right", "class": "good"}) in parsed.tags
-    assert ("div", {"class": "table", "tabindex": "0"}) in parsed.tags
+    assert ("td", {"style": "text-align:right", "class": "good", "data-title": "Works"}) in parsed.tags
+    assert ("th", {"style": "text-align:right", "scope": "col"}) in parsed.tags
+    assert tags.count("th") == 4
+    assert tags.count("td") == 2
+    assert ("div", {"class": "table prose", "tabindex": "0"}) in parsed.tags
     assert "<figcaption>Shares of <em>thrust</em></figcaption>" in shown
     assert "<details><summary>More of it</summary><p>Inside.</p>" in shown
     assert "<h3>Opened</h3><p>Shown.</p>" in shown
