@@ -31,7 +31,9 @@ def test_instruments_give_the_slopes_that_least_squares_misses():
 def test_covariance_is_that_of_the_jackknife():
     z, x, y = closed_loop(np.random.default_rng(2), rows=400)
     found, block = fit(z, x, y, blocks=8), contiguous(400, 8)
-    left_out = np.array([np.linalg.solve(z[block != b].T @ x[block != b], z[block != b].T @ y[block != b]) for b in range(8)])
+    left_out = np.array(
+        [np.linalg.solve(z[block != b].T @ x[block != b], z[block != b].T @ y[block != b]) for b in range(8)]
+    )
     apart = left_out - left_out.mean(axis=0)
     np.testing.assert_allclose(found.covariance, 7 / 8 * apart.T @ apart, rtol=1e-6)
 

@@ -47,7 +47,9 @@ def test_a_gain_by_an_instrument_is_that_of_the_vehicle():
     rng = np.random.default_rng(1)
     z, disturbance = rng.standard_normal((2, 300, 9)) + 1j * rng.standard_normal((2, 300, 9))
     u = z - 0.9 * disturbance
-    spectra = block_spectra([z, u, 2.0 * u + disturbance], np.repeat(np.arange(10), 30), np.arange(9.0), np.arange(9) > 0)
+    spectra = block_spectra(
+        [z, u, 2.0 * u + disturbance], np.repeat(np.arange(10), 30), np.arange(9.0), np.arange(9) > 0
+    )
     assert np.abs(spectra.gain(0, 1, 2) - 2.0).max() < 0.3 < np.abs(spectra.gain(1, 1, 2) - 2.0).min()
     assert spectra.coherence(0, 1) == pytest.approx(np.full(8, 1 / 1.81), abs=0.15)
     assert spectra.windows.sum() == 300
