@@ -55,7 +55,7 @@ _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 _TIGHT = 0.05
 _LEAD_S, _LEAD_SPREAD = 0.01, 1.0
 """Before: lead of yaw by the rotors' own angular momentum."""
-_FLOOR = 1e-6
+_FLOOR, _OPEN = 1e-6, 300.0
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
 _SEEN = 1e-4
@@ -404,7 +404,9 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
 
 
 def _exponential(value: float, half: float) -> Estimate:
-    return Estimate(value=float(np.exp(value)), low=float(np.exp(value - half)), high=float(np.exp(value + half)))
+    # What is not known at all stays a number.
+    low, high = np.exp(np.clip([value - half, value + half], -_OPEN, _OPEN))
+    return Estimate(value=float(np.exp(value)), low=float(low), high=float(high))
 
 
 def _delay_at(fit: Fit, at_hz: float) -> Estimate:
