@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, Numbers
-from cpfls_cli.estimation.estimate import Fit, Normal, Prior, estimate, positive_ratio, solve
+from cpfls_cli.estimation.estimate import Bounds, Fit, Normal, Prior, estimate, positive_ratio, solve
 from cpfls_cli.estimation.spectra import (
     SHARED_BINS,
     SMOOTHED_BINS,
@@ -30,8 +30,8 @@ from cpfls_cli.look.law import flown_law, gyroscope_filters
 from cpfls_cli.look.setpoints import exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
-STRONG = 10.0
-"""F statistic of an instrument below which its estimate falls back to that of the loop."""
+STRONG = 25.0
+"""F statistic of an instrument below which its estimate may fall back to that of the loop: benchmarks/look_study.py."""
 NARROW, NARROW_DELAY_S = 0.4, 0.02
 """Half widths, of the logarithm of effectiveness and of the delay, above which it is not called identified."""
 GAIN_FLOOR, DELAY_FLOOR_S = 0.02, 5e-4
@@ -55,12 +55,12 @@ _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 _TIGHT = 0.05
 _LEAD_S, _LEAD_SPREAD = 0.01, 1.0
 """Before: lead of yaw by the rotors' own angular momentum."""
-_FLOOR = 1e-6
+_FLOOR, _OPEN = 1e-6, 300.0
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
 _SEEN = 1e-4
 """Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
-_USUAL_DELAY_S = 0.012
+_USUAL_DELAY_S, _LATEST_S = 0.012, 0.1
 _TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _NORMAL = 1.96
@@ -190,16 +190,19 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
-        spectra = plant_spectra(flight, axis, values, known, _USUAL_DELAY_S)
+        late = _USUAL_DELAY_S
+        for last in (False, True):
+            spectra = plant_spectra(flight, axis, values, known, late)
+            if spectra is None:
+                break
+            filters = gyroscope_filters(law, axis, spectra.frequency)
+            if not last:
+                equations = _Equations(spectra, filters, _reference(spectra))
+                push = filters * PlantModel.of(_begun(equations, axis == _YAW), equations.at_hz).push(spectra.frequency)
+                late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
         if spectra is None:
             continue
-        filters = gyroscope_filters(law, axis, spectra.frequency)
         found = _of_spectra(AXES[axis], source, spectra, filters)
-        if found.strength >= STRONG:
-            late = _lateness(spectra, filters * found.model.push(spectra.frequency))
-            again = plant_spectra(flight, axis, values, known, max(late, 0.0))
-            if again is not None:
-                found = _of_spectra(AXES[axis], source, again, gyroscope_filters(law, axis, again.frequency))
         if best is None or (best.strength < STRONG and found.strength > best.strength):
             best = found
     return best or _none(AXES[axis], chosen.reason or "too short")
@@ -309,10 +312,13 @@ class _Equations:
         slopes = (terms[1 + numbers :] - terms[1 : 1 + numbers]) / (2 * step)
         weight = self._weight(terms[0])
         predicted = np.einsum("pfs,bfs->bpf", slopes, self._predicted).conj() * weight
+        actual = np.einsum("qfs,bfs->bfq", slopes, self._seen)
+        residual = (terms[0] * self._seen).sum(axis=2)[..., None]
+        by_chance = np.einsum("fst,qft->qfs", self._chance, slopes) * weight[:, None]
         return Normal(
-            np.einsum("bpf,qfs,bfs->bpq", predicted, slopes, self._seen, optimize=True).real,
-            np.einsum("bpf,bf->bp", predicted, (terms[0] * self._seen).sum(axis=2)).real,
-            np.einsum("f,pfs,fst,qft->pq", weight, slopes.conj(), self._chance, slopes, optimize=True).real,
+            (predicted @ actual).real,
+            (predicted @ residual)[..., 0].real,
+            np.tensordot(slopes.conj(), by_chance, ((1, 2), (1, 2))).real,
         )
 
     def _weight(self, terms: Numbers) -> Array:
@@ -331,7 +337,20 @@ def _prior(yaw: bool) -> Prior:
 
 
 def _fitted(equations: _Equations, yaw: bool) -> Fit:
-    """Fit the model, begun at the best of a few delays."""
+    """Fit the model."""
+    prior = _prior(yaw)
+    return estimate(equations, _begun(equations, yaw), prior, _bounds(prior))
+
+
+def _bounds(prior: Prior) -> Bounds:
+    low, high = np.full(len(prior.mean), -np.inf), np.full(len(prior.mean), np.inf)
+    low[1], high[1] = _LEAST_DELAY, _MOST_DELAY_S / _DELAY_UNIT_S
+    low[2:], high[2:] = prior.mean[2:] - 4 * prior.spread[2:], prior.mean[2:] + 4 * prior.spread[2:]
+    return low, high
+
+
+def _begun(equations: _Equations, yaw: bool) -> Array:
+    """Estimate gain and delay with a shape that is all but held, begun at the best of a few delays."""
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
     seen = equations.spectra.total[:, equations.instrument, U:]
@@ -345,12 +364,8 @@ def _fitted(equations: _Equations, yaw: bool) -> Fit:
         left = float((weight * np.abs(target - gain * follows) ** 2).sum())
         if gain > 0 and left < best[0]:
             best = (left, np.concatenate([[np.log(gain)], values[1:]]))
-    low, high = np.full(len(prior.mean), -np.inf), np.full(len(prior.mean), np.inf)
-    low[1], high[1] = _LEAST_DELAY, _MOST_DELAY_S / _DELAY_UNIT_S
-    low[2:], high[2:] = prior.mean[2:] - 4 * prior.spread[2:], prior.mean[2:] + 4 * prior.spread[2:]
-    # First with the shape all but held, so that gain and delay are about right when it is let go.
     tight = Prior(prior.mean, np.where(np.isfinite(prior.spread), _TIGHT, np.inf))
-    return estimate(equations, solve(equations, best[1], tight, (low, high)).values, prior, (low, high))
+    return solve(equations, best[1], tight, _bounds(prior)).values
 
 
 def _reference(spectra: BlockSpectra) -> float:
@@ -389,7 +404,9 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
 
 
 def _exponential(value: float, half: float) -> Estimate:
-    return Estimate(value=float(np.exp(value)), low=float(np.exp(value - half)), high=float(np.exp(value + half)))
+    # What is not known at all stays a number.
+    low, high = np.exp(np.clip([value - half, value + half], -_OPEN, _OPEN))
+    return Estimate(value=float(np.exp(value)), low=float(low), high=float(high))
 
 
 def _delay_at(fit: Fit, at_hz: float) -> Estimate:

@@ -120,7 +120,7 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
             break
         reason = "too short, or the setpoint moves too little"
     every = _measured(found, time, length) if found else {}
-    loop = _Loop.of(plant, law, axis)
+    loop = PlantAndLaw.of(plant, law, axis)
     power = float(np.mean(asked[usable] ** 2)) if usable.any() else 0.0
     return AxisLoop(
         axis=AXES[axis],
@@ -263,7 +263,7 @@ def _numbers(time: Array, steps: Array, of: Callable[[Array], Estimate | None]) 
     return StepNumbers(overshoot=over, rise_s=rise, half_s=half)
 
 
-class _Loop(NamedTuple):
+class PlantAndLaw(NamedTuple):
     """Plant and law of one axis: the plant that was found, then those that are possible, shape (1 + draw, 1) each."""
 
     plants: PlantModel
@@ -272,7 +272,7 @@ class _Loop(NamedTuple):
     band_hz: float
 
     @classmethod
-    def of(cls, plant: AxisPlant, law: Law | None, axis: int) -> _Loop | None:
+    def of(cls, plant: AxisPlant, law: Law | None, axis: int) -> PlantAndLaw | None:
         """Take them where both are known."""
         if law is None or not plant.identified:
             return None
