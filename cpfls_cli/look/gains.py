@@ -70,7 +70,7 @@ class Plant(Protocol):
 
 
 @result
-class LoopMargins:
+class AxisMargins:
     """What the loop about one axis bears, cut at the command, with all plants that the log leaves possible."""
 
     gain_db: Estimate = part()
@@ -110,8 +110,8 @@ class AxisGains:
     )
     fact: str = about("more about the reason")
     attitude: bool = about("whether the loop of the attitude is closed around that of the rate")
-    before: LoopMargins | None = part(default=None)
-    after: LoopMargins | None = part(default=None)
+    before: AxisMargins | None = part(default=None)
+    after: AxisMargins | None = part(default=None)
 
 
 @result
@@ -203,7 +203,7 @@ class _Work:
         self.axes = [axis for axis, plant in enumerate(self.plants) if plant.identified]
         self.noise = _noise(self.flight, self.autopilot, self.law)
         self.best = [_plant(_draws(plant)[0], self.law) for plant in self.plants]
-        self.possible = [[_plant(draw, self.law) for draw in _draws(plant)[1:]] for plant in self.plants]
+        self.possible = [[_plant(draw, self.law) for draw in _draws(plant)] for plant in self.plants]
         self._frequency = frequencies(self.law)
         self._moved = [
             np.stack([moved_by(self.law, each, self._frequency) for each in plants]) for plants in self.possible
@@ -211,9 +211,9 @@ class _Work:
         self.refuted = [not self._keep_stable(axis) for axis in range(len(AXES))]
 
     def _keep_stable(self, axis: int) -> bool:
-        """Drop the plants with which the loop that flew would be unstable; keep all where nearly none is left."""
+        """Drop the plants with which the loop that flew would be unstable; tell where the one that was found is."""
         stable = self._held(axis, self.values) > 0
-        if stable.mean() <= 1 - HOLDS:
+        if not stable[0] or stable.mean() < _MOSTLY:
             return False
         self.possible[axis] = [each for each, flies in zip(self.possible[axis], stable, strict=True) if flies]
         self._moved[axis] = self._moved[axis][stable]
@@ -278,12 +278,12 @@ class _Work:
         cut = self._cut(axis, values)
         return np.asarray(np.where(is_stable(self._frequency, cut), disk_of(cut), 0.0).min(axis=0))
 
-    def _margins(self, axis: int, values: Mapping[str, float]) -> LoopMargins:
+    def _margins(self, axis: int, values: Mapping[str, float]) -> AxisMargins:
         cut, held, law = self._cut(axis, values), self._held(axis, values), self.open.law(values)
         gain, phase, crossover = crossing_margins(self._frequency, cut[0])
         rate = cut[0] if len(cut) == 1 else cut[1]
         follows = np.abs(self._moved[axis] * law.response(axis, self._frequency).forward / (1 + rate)) >= 0.5**0.5
-        return LoopMargins(
+        return AxisMargins(
             gain_db=_estimate(np.where(held > 0, np.minimum(gain, _MOST_DB), 0.0)),
             phase_deg=_estimate(np.where(held > 0, phase, 0.0)),
             disk_deg=_estimate(_degrees(held)),
@@ -392,8 +392,9 @@ def _degrees(disk: Array | float) -> Array:
 
 
 def _estimate(drawn: Array) -> Estimate:
-    low, middle, high = np.quantile(drawn, [0.025, 0.5, 0.975])
-    return Estimate(value=float(middle), low=float(low), high=float(high))
+    """Give the value of the plant that was found, which is the first, with the interval over all."""
+    low, high = np.quantile(drawn, [0.025, 0.975], method="nearest")
+    return Estimate(value=float(drawn[0]), low=float(min(low, drawn[0])), high=float(max(high, drawn[0])))
 
 
 def _draws(plant: Plant) -> Array:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cpfls_cli.look.gains import HOLDS, AxisGains, GainRow, LoopMargins, TunedGains
+from cpfls_cli.look.gains import HOLDS, AxisGains, AxisMargins, GainRow, TunedGains
 from cpfls_cli.look.manoeuvres import Manoeuvre
 from cpfls_cli.report.content import Block, Box, Cell, Table, Text
 from cpfls_cli.report.numbers import number, percent, sentence
@@ -68,7 +68,7 @@ def _axis(axis: AxisGains) -> str:
     return f"{axis.axis}: {phase}, {gain}, {band}"
 
 
-def _margins(own: LoopMargins) -> str:
+def _margins(own: AxisMargins) -> str:
     return joined(
         [
             f"phase margin {_interval(own.phase_deg, '°')}",

@@ -116,7 +116,9 @@ def test_a_header_of_betaflight_tells_what_is_off():
     assert found["angle_p_gain"] == 55
     assert (found["d_max_roll"], found["d_max_pitch"]) == (40, 46)
     assert AUTOPILOTS["betaflight"].in_log({"rollPID": "45,80,40"}) == {
-        "p_roll": 45, "i_roll": 80, "d_roll": 40,
+        "p_roll": 45,
+        "i_roll": 80,
+        "d_roll": 40,
         "d_max_roll": 40,
     }
     assert AUTOPILOTS["px4"].in_log(named) == {}
