@@ -36,6 +36,8 @@ _CERTAIN = 0.975
 _HALF_POWER = 0.5**0.5
 _TINY = float(np.finfo(float).tiny)
 Z, X, Y = 0, 1, 2
+_OVER_FREQUENCY = ("gain", "phase", "gain_error", "coherence", "law_gain", "law_phase")
+_OVER_TIME = ("step", "step_low", "step_high", "law_step")
 
 
 @result
@@ -128,8 +130,20 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         reason="" if found else reason,
         instrument=source if found else "",
         tracking=float(np.sqrt(np.mean((asked - rate)[usable] ** 2) / power)) if power > 0 else np.nan,
-        **{**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})},
+        **_whole({**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})}),
     )
+
+
+def _whole(given: dict[str, Any]) -> dict[str, Any]:
+    """Fill curves that are not known with NaN, so that all over one axis have one length."""
+    curves = {"frequency": _OVER_FREQUENCY, "time": _OVER_TIME}
+    unknown = {
+        name: np.full(len(given[axis]), np.nan)
+        for axis, names in curves.items()
+        for name in names
+        if not len(given[name])
+    }
+    return {**given, **unknown}
 
 
 class _Response(NamedTuple):
@@ -213,9 +227,8 @@ def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
 
 
 def _nothing() -> dict[str, Any]:
-    empty = ("frequency", "gain", "phase", "gain_error", "coherence", "law_gain", "law_phase")
-    times = ("time", "step", "step_low", "step_high", "law_step")
-    return {"windows": 0, "clear_hz": np.nan, **dict.fromkeys((*empty, *times), np.zeros(0))}
+    curves = ("frequency", "time", *_OVER_FREQUENCY, *_OVER_TIME)
+    return {"windows": 0, "clear_hz": np.nan, **dict.fromkeys(curves, np.zeros(0))}
 
 
 def _jackknifed(values: Array) -> Estimate | None:
