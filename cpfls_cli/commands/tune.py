@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +27,10 @@ from cpfls_cli.export.parameter_files import file_of, parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
 from cpfls_cli.logs.formats import log_contents, read_log
+from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.gains import Plant, TunedGains, tuned_gains
+from cpfls_cli.look.reading import read_flight
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.look_gains import answer as answer_of_log
 from cpfls_cli.pages.source import source_of
@@ -117,11 +118,10 @@ def run_log(
 ) -> Outcome:
     """Find gains from one log alone, and write those that change where a file is named."""
     contents = log_contents(log)
-    reading, effectiveness = (import_module(f"cpfls_cli.look.{name}") for name in ("reading", "effectiveness"))
-    flight = reading.read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
+    flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
     if dry_run:
         return Outcome({"dry_run": True}, (Text(f"{log}: is a log of a multirotor; nothing is computed"),))
-    return of_flight(flight, effectiveness.effectiveness(flight), output, asked, force=force)
+    return of_flight(flight, effectiveness(flight), output, asked, force=force)
 
 
 def of_flight(

@@ -37,6 +37,7 @@ _LACKING = {
 _OF_AXIS = {
     "weak": "effectiveness is not identified",
     "law": "the stated law does not explain the response",
+    "feedback": "the feedback that flew is not that of the stated gains",
     "margins": "no gains keep the margins",
     "band": "the loop would be faster than what is identified",
 }

@@ -13,6 +13,7 @@ from cpfls_cli.autopilots.law import AXES, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight
+from cpfls_cli.look.law import flown_feedback
 from cpfls_cli.look.manoeuvres import Manoeuvre, manoeuvres
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
@@ -26,6 +27,10 @@ HOLDS = 0.95
 """Share of the plants with which proposed gains hold the asked margins."""
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
+_ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
+"""Margins from which on a loop is usually accepted: what has them and flies is not slowed down."""
+_AT_ONCE = 1.25
+"""Factor by which a gain changes at most from one log to the next."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
 _SHORT = 0.9
 """Share of the asked disk margin, below which the best gains are none."""
@@ -95,7 +100,9 @@ class GainRow:
     low: float = about("least of the best values over the plants; not finite where it goes with another", gaps=True)
     high: float = about("largest of the best values; not finite where noise or a range sets the value", gaps=True)
     direction: str = about("raise, lower or keep")
-    why: str = about("margins, noise, range, or with: it goes with another parameter of its axis; empty where kept")
+    why: str = about(
+        "margins, noise, range, step: the way there in one log, or with: it goes with another parameter of its axis; empty where kept"
+    )
 
 
 @result
@@ -105,7 +112,7 @@ class AxisGains:
     axis: str = about("roll, pitch or yaw")
     changed: bool = about("whether a change is sure")
     reason: str = about(
-        "why nothing is proposed: weak, law (with the plant it would not fly), margins (no gains keep them), band (the "
+        "why nothing is proposed: weak, law (with the plant it would not fly), feedback (what flew is not as stated), margins (no gains keep them), band (the "
         "loop would cross above what is identified); empty where gains are proposed or kept"
     )
     fact: str = about("more about the reason")
@@ -229,6 +236,8 @@ class _Work:
                 reasons[axis] = ("weak", plant.reason)
             elif self.refuted[axis]:
                 reasons[axis] = ("law", "")
+            elif fact := self._other_feedback(axis):
+                reasons[axis] = ("feedback", fact)
             elif proposed.disk[axis] < _SHORT * self.asked.disk:
                 reasons[axis] = ("margins", f"{_degrees(proposed.disk[axis]):.3g}")
             elif (crosses := self._margins(axis, _with(self.values, proposed)).crossover_hz.value) > plant.band_hz[1]:
@@ -236,6 +245,15 @@ class _Work:
             else:
                 rows += self._rows(axis, proposed, single)
         return [self._axis(axis, rows, *reasons.get(axis, ("", ""))) for axis in range(len(AXES))], rows
+
+    def _other_feedback(self, axis: int) -> str:
+        """Say how the feedback that flew differs from the stated one where the loop crosses; empty where it does not."""
+        flown = flown_feedback(self.flight, axis, self.law)
+        crosses = self._margins(axis, self.values).crossover_hz.value
+        if flown is None or flown.fits(crosses):
+            return ""
+        ratio, turned = flown.near(crosses) or (1.0, 0.0)
+        return f"{ratio:.2g} times, turned by {np.degrees(turned):.0f} deg, at {crosses:.2g} Hz"
 
     def _searched(self) -> tuple[Tuned, list[Tuned]]:
         """Tune for the plants together that have to hold, and for each of some plants alone."""
@@ -341,8 +359,40 @@ class _Work:
                 )
             )
             values.append(value)
-        rows = self._together(axis, rows, values)
+        rows = self._at_once(axis, self._together(axis, self._acceptable(axis, rows), values))
         return [*rows, *self._raised(axis, rows)]
+
+    def _acceptable(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
+        """Keep gains that are higher than asked margins allow where the loop has those that every guide accepts."""
+        if float(np.median(self._held(axis, self.values))) < _ACCEPTABLE.disk:
+            return rows
+        return [
+            replace(row, proposed=row.today, direction="keep", why="") if row.direction == "lower" else row
+            for row in rows
+        ]
+
+    def _at_once(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
+        """Go no further than one log bears: law and vehicle are known around what flew."""
+        capped = []
+        for row in rows:
+            parameter = next(
+                each for each in self.autopilot.parameters if self.names.get(each.name, each.name) == row.parameter
+            )
+            most = row.today * _AT_ONCE if row.proposed > row.today else row.today / _AT_ONCE
+            beyond = row.today > 0 and (row.proposed - most) * (row.proposed - row.today) > 0
+            value = floored(parameter, most + (parameter.step if most < row.today else 0.0)).value
+            capped.append(
+                replace(row, proposed=value, direction=_direction(value - row.today), why="step") if beyond else row
+            )
+        names = {self.names.get(name, name): name for name in self.values}
+        new = {names[row.parameter]: row.proposed for row in capped}
+        # On the way no margin may be lost that what flew has.
+        before, after = (
+            float(np.quantile(self._held(axis, values), 1 - HOLDS)) for values in (self.values, {**self.values, **new})
+        )
+        if after >= _NEAR * min(before, self.asked.disk):
+            return capped
+        return [replace(row, proposed=row.today, direction="keep", why="") for row in rows]
 
     def _raised(self, axis: int, rows: Sequence[GainRow]) -> Iterator[GainRow]:
         """Move the derivative of fast moves in proportion to that of calm flight."""

@@ -51,7 +51,7 @@ class FlownFeedback:
 def flown_law(flight: LogFlight) -> Law | None:
     """Make the law of the parameters in a log; None where it states no gains, or those of a version of other scales."""
     autopilot = AUTOPILOTS.get(flight.autopilot)
-    if autopilot is None or autopilot.firmware.too_old(flight.system):
+    if autopilot is None or autopilot.firmware.gains_differ(flight.system):
         return None
     logged = autopilot.in_log(flight.parameters)
     return autopilot.law(autopilot.of_log(logged)) if logged else None

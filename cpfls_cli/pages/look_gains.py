@@ -23,12 +23,14 @@ _REASONS: Final = {
     "weak": "{fact}",
     "law": "with the gains in the log and the vehicle that it shows the loop would be unstable, but it "
     "flew: the law that flew is another",
+    "feedback": "the feedback that flew is not that of the gains in the log: {fact}",
     "margins": "no gains hold the asked margins with the filters that flew; the best hold {fact}°",
     "band": "the proposed loop would cross at {fact} Hz, above the frequencies at which the log shows the vehicle",
 }
 _WHY: Final = {
     "": "no change is sure",
     "margins": "asked margins",
+    "step": "a step on the way: load it, fly, and look again",
     "noise": "noise: not more at once",
     "range": "end of its documented range",
     "with": "goes with the others of its axis",
