@@ -22,7 +22,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.effectiveness import PlantModel, effectiveness
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.look.loop import AxisLoop, PlantAndLaw, loops
+from cpfls_cli.look.loop import AxisLoop, PlantAndLaw, loops_of
 
 VEHICLES = {
     # gain b of roll and pitch, of yaw, rad/s^2; lag s; damping 1/s; lead of yaw s; hover share of thrust
@@ -281,7 +281,7 @@ def rows_of(case: Case, log: LogFlight) -> list[dict[str, object]]:
     """Hold what `look` says of a flight against its truth, by axis."""
     rows = []
     plants = effectiveness(log)
-    for axis, (plant, loop) in enumerate(zip(plants, loops(log, plants), strict=True)):
+    for axis, (plant, loop) in enumerate(zip(plants, loops_of(log, plants), strict=True)):
         row: dict[str, object] = {"autopilot": case.autopilot, "gusts": case.gusts, "sticks": case.sticks}
         row |= {"vehicle": case.vehicle, "axis": "yaw" if axis == 2 else "roll, pitch", "verdict": plant.verdict}
         true = PlantModel(*(float(getattr(case, name)[axis]) for name in ("gain", "delay", "lag", "damping", "lead")))

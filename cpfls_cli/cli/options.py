@@ -254,6 +254,7 @@ def moments(text: str | Sequence[float]) -> tuple[float, float, float]:
 
 
 WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("I have one log", ("cpfls look log.bbl -o look", "cpfls tune log.bbl -o gains")),
     (
         "I have logs and want a model",
         (

@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.autopilots.law import Controller
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.effectiveness import PlantModel, axis_effectiveness
-from cpfls_cli.look.loop import loops
+from cpfls_cli.look.loop import loops_of
 from tests.builders.looked_flights import PARAMETERS, RATE_HZ, TRUTH, flown, without_sticks
 
 
@@ -18,7 +18,7 @@ def flight():
 @pytest.fixture(scope="module")
 def loop(flight):
     plants = tuple(axis_effectiveness(flight, axis) for axis in range(3))
-    return loops(flight, plants)[0]
+    return loops_of(flight, plants)[0]
 
 
 def stepped():
@@ -77,7 +77,7 @@ def test_the_response_is_that_of_plant_and_law_where_it_is_clear(loop):
 
 def test_resting_sticks_measure_no_response(flight):
     resting = without_sticks(flight)
-    found = loops(resting, tuple(axis_effectiveness(resting, axis) for axis in range(3)))[0]
+    found = loops_of(resting, tuple(axis_effectiveness(resting, axis) for axis in range(3)))[0]
     assert not found.measured
     assert "rests" in found.reason
     assert found.by_step is None
