@@ -167,7 +167,9 @@ def test_patterns_are_named_and_no_rotor_is_called_weak():
     assert "as if its centre of mass were" in said
     assert "ahead of the middle" in said
     weak = words_of(balance=balance_of(hovering(np.ones(4), seconds=60, weak={2: 0.8})))
+    assert "M3 \\+" in weak.splitlines()[0]
     assert "It may be rotor 3 (propeller, motor or speed controller), or a centre of mass" in weak
+    assert "together with a steady yaw torque" in weak
     assert "weak" not in weak
 
 
