@@ -254,9 +254,9 @@ def look(
         except (InputError, ComputationError) as error:
             if len(named) == 1:
                 raise
-            found[name] = Look(name=path.name, refused=str(error))
+            found[name] = Look(name=path.name, refused=str(error).removeprefix(f"{path}: "))
     if all(each.refused for each in found.values()):
-        raise ComputationError("; ".join(each.refused for each in found.values()))
+        raise ComputationError("; ".join(f"{each.name}: {each.refused}" for each in found.values()))
     if run.output is None:
         run.next.append(("cpfls", "look", *logs, "-o", "look"))
     return found
