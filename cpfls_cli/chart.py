@@ -128,24 +128,36 @@ class Chart:
         low: Array | None = None,
         high: Array | None = None,
         kind: str = "",
+        key: bool = True,
     ) -> None:
-        """Draw a curve, with a band; gaps where it is not finite. The kind is ``dashed``, ``thin`` or both."""
+        """Draw a curve, with a band; gaps where it is not finite. The kind is ``dashed``, ``thin`` or both.
+
+        Without `key` its label is in the table of numbers only.
+        """
         if low is not None and high is not None:
             known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
             ends = [*zip(x[known], low[known], strict=True), *zip(x[known][::-1], high[known][::-1], strict=True)]
             self._parts.append(f'<polygon class="band f{style}" points="{self._points(ends)}"/>' if ends else "")
         self._parts.append(f'<path class="curve s{style} {kind}" d="{self._path(x, y)}"/>')
-        self._note(label, style, kind, x, y, low, high)
+        self._note(label, style, kind, x, y, low, high, key=key)
 
     def points(
-        self, label: str, x: Array, y: Array, style: Style = 0, *, low: Array | None = None, high: Array | None = None
+        self,
+        label: str,
+        x: Array,
+        y: Array,
+        style: Style = 0,
+        *,
+        low: Array | None = None,
+        high: Array | None = None,
+        key: bool = True,
     ) -> None:
         """Draw points with whiskers."""
         whole = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
         self._whiskers(x, low, high)
         at = zip(self._px(x[whole]), self._py(y[whole]), strict=True)
         self._parts += [f'<circle class="f{style}" cx="{a:.1f}" cy="{b:.1f}" r="3"/>' for a, b in at]
-        self._note(label, style, "", x, y, low, high)
+        self._note(label, style, "", x, y, low, high, key=key)
 
     def bars(
         self,
@@ -205,8 +217,10 @@ class Chart:
             if math.isfinite(at + a + b):
                 self._parts.append(f'<path class="whisker" d="M{at:.1f} {a:.1f}V{b:.1f}"/>')
 
-    def _note(self, label: str, style: Style, kind: str, x: Array, y: Array, *ends: Array | None) -> None:
-        if label:
+    def _note(
+        self, label: str, style: Style, kind: str, x: Array, y: Array, *ends: Array | None, key: bool = True
+    ) -> None:
+        if label and key:
             self._legend.append((label, style, kind))
         named = zip((label or self.y.label, f"{label}, low", f"{label}, high"), (y, *ends), strict=False)
         self._columns += [(name, x, values) for name, values in named if values is not None and len(values)]

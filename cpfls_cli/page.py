@@ -15,6 +15,7 @@ Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -146,7 +147,7 @@ def _environment(folder: Path) -> Environment:
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column)
+    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote)
     return made
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -20,11 +22,19 @@ from cpfls_cli.result import about, result
 from cpfls_cli.words import joined
 
 _HOVER = "hover for 20 s in still air"
-_TURN = "turn by 180 degrees while you hover for 40 s: what turns with the body is not the wind"
+_TURN = "hover for 40 s and turn by 180 degrees halfway: what turns with the body is not the wind"
+_SWAP = (
+    "swap the propellers of M{} and M{}, which turn the same way, and hover for 40 s: what moves with the propeller is "
+    "the propeller"
+)
+_TRIED = 2
+"""Flights that are proposed at most."""
 _PUNCH = "climb twice at nearly full throttle, for 2 s each"
 _WHOLE_SPECTRUM_HZ = 900.0
 """Rate of a gyroscope whose log shows what rotors of usual sizes vibrate with."""
 _SOME_SPECTRUM_HZ = 150.0
+_LEAST_HZ = 200.0
+"""Rate that is asked for where no parameter of the autopilot is known that sets it."""
 _SLOWEST_HZ = 20.0
 """Rate of body rates and commands below which no loop of a multirotor can be seen."""
 _SURE_SHARE, _SURE_HOVER, _SURE_EXPONENT = 0.05, 0.03, 0.3
@@ -35,7 +45,7 @@ _LACKING = {
     "parameters": "it states no gains",
 }
 _OF_AXIS = {
-    "weak": "effectiveness is not identified",
+    "weak": "what a command does is not identified",
     "law": "the stated law does not explain the response",
     "feedback": "the feedback that flew is not that of the stated gains",
     "margins": "no gains keep the margins",
@@ -50,8 +60,9 @@ class Answer:
     question: str = about("what is asked")
     answer: str = about("yes, roughly, or no")
     why: str = about("what the answer rests on, or what is missing")
-    log: str = about(
-        "what to set in the autopilot, so that another log answers it; empty where nothing helps", default=""
+    log: str = about("signals to log, or to log faster; empty where nothing helps", default="")
+    settings: tuple[str, ...] = about(
+        "parameters of the autopilot that log them, with their values", "setting", default=()
     )
     fly: str = about("what to fly, so that another log answers it; empty where nothing helps", default="")
 
@@ -60,8 +71,10 @@ class Answer:
 class NextStep:
     """What helps most: something to log, to fly or to type."""
 
-    what: str = about("a setting, a flight or a command")
-    why: str = about("what it would answer; empty where it says so itself", default="")
+    what: str = about("a flight, or what to log")
+    settings: tuple[str, ...] = about("parameters of the autopilot with their values", "setting", default=())
+    command: str = about("to type; empty where nothing is", default="")
+    why: str = about("what it would answer")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,36 +101,57 @@ class Found:
         return 0.5 * self.flight.rate_hz
 
     @property
+    def settings(self) -> tuple[str, ...]:
+        """Parameters that make this autopilot log faster, with their values; none where it has them already."""
+        said = log_faster("", FAST_HZ, self.flight.system, parameters=self.flight.parameters)
+        pairs = re.findall(r"\b([A-Za-z]\w*_\w+) = ([\d/]+)", said)
+        has = self.flight.parameters
+        return tuple(f"{name} = {value}" for name, value in pairs if not _is(has.get(name), value))
+
+    @property
     def sticks(self) -> str:
         """What to fly for axes that are not identified."""
         moves = [each for each in self.gains.fly if each.axis not in self.identified]
-        axes = joined([each.axis for each in moves] or [axis for axis in AXES if axis not in self.identified])
-        how = moves[0] if moves else None
-        mode = f" in mode {how.mode}" if how else " in a mode without position hold"
-        speed = (
-            f", from {how.lowest:g} to {max(each.highest for each in moves):g} Hz" if how else ", slowly then faster"
-        )
-        return f"move the stick of {axes} to both sides{mode}{speed}, for 20 s an axis"
+        axes = [each.axis for each in moves] or [axis for axis in AXES if axis not in self.identified]
+        low, high = (min(each.lowest for each in moves), max(each.highest for each in moves)) if moves else (0.0, 0.0)
+        first = f"in mode {moves[0].mode}, " if moves else ""
+        each = "for 20 s" if len(axes) == 1 else "one after the other, 20 s each"
+        speed = f"from slow ({low:g} Hz) to fast ({high:g} Hz)" if moves else "from slow to fast"
+        return f"{first}move the {joined(axes)} stick to both sides, {each}, {speed}"
+
+
+def _is(has: float | str | None, value: str) -> bool:
+    """Tell whether a parameter has a value already."""
+    try:
+        return has is not None and float(has) == float(value)
+    except ValueError:
+        return str(has) == value
 
 
 def answers_of(found: Found) -> tuple[Answer, ...]:
     """List all questions with their answers."""
     asked: dict[str, Callable[[Found], tuple[str, str, str, str]]] = {
-        "balance of rotors": _balance,
+        "rotor balance": _balance,
         "hover throttle": _hover,
-        "delay and effectiveness": _plants,
-        "response of the loop": _loops,
+        "effectiveness and delay": _plants,
+        "loop response": _loops,
         "gains": _gains,
         "vibration": _spectra,
         "thrust curve": _curve,
         "gusts": _gusts,
-        "inertia": _constants("vehicle"),
-        "drag": _constants("vehicle"),
-        "what a model misses": _constants("gap"),
+        "inertia, drag, what a model misses": _constants,
     }
     rows = {question: answer(found) for question, answer in asked.items()}
+    settings = found.settings
     return tuple(
-        Answer(question=question, answer=answer, why=why, log=log, fly=fly)
+        Answer(
+            question=question,
+            answer=answer,
+            why=why,
+            log=log,
+            settings=settings if log and not log.startswith("also ") else (),
+            fly=fly,
+        )
         for question, (answer, why, log, fly) in rows.items()
     )
 
@@ -125,13 +159,27 @@ def answers_of(found: Found) -> tuple[Answer, ...]:
 def _balance(found: Found) -> tuple[str, str, str, str]:
     balance = found.balance
     if balance is None:
-        return "no", "commands of the rotors are not logged", "rotor commands", ""
+        return "no", "commands of the rotors are not logged", "also rotor commands", ""
     shares = [row.share for row in balance.rotors if row.share is not None]
     if not shares:
         return "no", "no steady flight in it", "", _HOVER
     half = max(share.half for share in shares)
     why = f"within {100 * half:.1f} points, {balance.steady_s:.0f} s of steady flight"
-    return "yes" if half < _SURE_SHARE else "roughly", why, "", _TURN if balance.uneven and balance.wind is None else ""
+    return "yes" if half < _SURE_SHARE else "roughly", why, "", _parting(found, balance)
+
+
+def _parting(found: Found, balance: Balance) -> str:
+    """Say what parts the causes that are left, if more than one is; neither hover nor climb does."""
+    causes = [cause for cause in balance.causes if cause.alone] or balance.causes
+    kinds = {cause.kind for cause in causes}
+    rotors = [cause.rotor - 1 for cause in causes if cause.kind == "rotor"]
+    if "wind" in kinds and balance.wind is None:
+        return _TURN
+    spins = found.flight.spins
+    alike = (
+        [] if spins is None or not rotors else [k for k in np.flatnonzero(spins == spins[rotors[0]]) if k != rotors[0]]
+    )
+    return _SWAP.format(rotors[0] + 1, alike[0] + 1) if alike and len(kinds) > 1 else ""
 
 
 def _hover(found: Found) -> tuple[str, str, str, str]:
@@ -139,7 +187,9 @@ def _hover(found: Found) -> tuple[str, str, str, str]:
     if hover is None or hover.throttle is None:
         missing = not np.isfinite(found.flight.collective).any()
         return (
-            ("no", "commands are not logged", "rotor commands", "") if missing else ("no", "no hover in it", "", _HOVER)
+            ("no", "commands are not logged", "also rotor commands", "")
+            if missing
+            else ("no", "no hover in it", "", _HOVER)
         )
     why = f"{hover.hover_s:.0f} s of hover, seen by {hover.found_by}"
     return "yes" if hover.throttle.half < _SURE_HOVER else "roughly", why, "", ""
@@ -153,14 +203,14 @@ def _plants(found: Found) -> tuple[str, str, str, str]:
         return (
             answer,
             f"body rates or commands are logged only {found.loop_hz:.0f} times a second",
-            "body rates and commands",
+            "body rates, commands",
             "",
         )
     reasons: dict[str, list[str]] = {}
     for plant in found.plants:
         if not plant.identified:
             reasons.setdefault(plant.reason, []).append(plant.axis)
-    missing = "; ".join(f"{joined(axes)}: {reason}" for reason, axes in reasons.items())
+    missing = "; ".join(f"about {joined(axes)}, {reason}" for reason, axes in reasons.items())
     return answer, missing, "", found.sticks
 
 
@@ -169,12 +219,12 @@ def _loops(found: Found) -> tuple[str, str, str, str]:
     if known:
         return "yes" if len(known) == len(AXES) else "roughly", joined(known), "", ""
     if not np.isfinite(found.flight.rate_setpoint).any():
-        return "no", "rate setpoints are not logged", "rate setpoints", ""
+        return "no", "rate setpoints are not logged", "also rate setpoints", ""
     if found.loop_hz < _SLOWEST_HZ:
         return (
             "no",
             f"body rates or setpoints are logged only {found.loop_hz:.0f} times a second",
-            "body rates and rate setpoints",
+            "body rates, rate setpoints",
             "",
         )
     return "no", "rate setpoints move too little", "", found.sticks
@@ -191,7 +241,7 @@ def _gains(found: Found) -> tuple[str, str, str, str]:
     for axis in gains.axes:
         if axis.reason:
             reasons.setdefault(_OF_AXIS[axis.reason], []).append(axis.axis)
-    why = "; ".join(f"{joined(axes)}: {reason}" for reason, axes in reasons.items())
+    why = "; ".join(f"{reason} about {joined(axes)}" for reason, axes in reasons.items())
     return "roughly" if known else "no", why, "", ""
 
 
@@ -211,7 +261,7 @@ def _curve(found: Found) -> tuple[str, str, str, str]:
     shape = None if found.hover is None else found.hover.shape
     if shape is None:
         if found.flight.accelerometer is None:
-            return "no", "the accelerometer is not logged", "the accelerometer", ""
+            return "no", "the accelerometer is not logged", "also the accelerometer", ""
         return "no", "throttle varies too little", "", _PUNCH
     why = f"throttle from {shape.lowest:.2f} to {shape.highest:.2f}"
     return "yes" if shape.exponent.half < _SURE_EXPONENT else "roughly", why, "", ""
@@ -221,29 +271,46 @@ def _gusts(found: Found) -> tuple[str, str, str, str]:
     known = [each.axis for each in found.gusts]
     if known:
         return "roughly", joined(known), "", ""
-    return "no", "effectiveness is not identified" if not found.identified else "too little flight", "", ""
+    return "no", "what a command does is not identified" if not found.identified else "too little flight", "", ""
 
 
-def _constants(command: str) -> Callable[[Found], tuple[str, str, str, str]]:
+def _constants(_: Found) -> tuple[str, str, str, str]:
     """Give the answer where constants are needed, which no log holds."""
-    why = "a log holds commands, not newtons: mass and arm are needed"
-    return lambda _: ("no", why, "", f"cpfls init LOG --mass KG --arm M, then cpfls {command}")
+    return "no", "a log holds commands, not newtons: mass and arm are needed", "", ""
 
 
 def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
-    """Choose the setting and the flights that answer most of what is open."""
-    flight, open_ = found.flight, [each for each in answers if each.answer != "yes"]
-    slow = [each for each in open_ if each.log]
-    steps = []
-    if slow:
-        least = _WHOLE_SPECTRUM_HZ if all(each.question == "vibration" for each in slow) else FAST_HZ
-        text = log_faster(
-            joined(dict.fromkeys(each.log for each in slow)), least, flight.system, parameters=flight.parameters
-        )
-        steps.append(NextStep(what=text, why=f"answers {joined([each.question for each in slow])}"))
+    """Choose the setting and the flights that answer most of what is open, and the command that goes on to a model."""
+    open_ = [each for each in answers if each.answer != "yes"]
     wanted: dict[str, list[str]] = {}
     for each in open_:
-        if each.fly and not each.fly.startswith("cpfls "):
+        if each.fly:
             wanted.setdefault(each.fly, []).append(each.question)
-    ranked = sorted(wanted.items(), key=lambda own: -len(own[1]))
-    return (*steps, *(NextStep(what=text, why=f"answers {joined(questions)}") for text, questions in ranked[:2]))
+    # What is asked first comes first among equals; why rotors are uneven, first of all.
+    cause = _parting(found, found.balance) if found.balance and found.balance.uneven else ""
+    ranked = sorted(wanted.items(), key=lambda own: (own[0] != cause, -len(own[1])))
+    flights = [NextStep(what=text, why=", ".join(questions)) for text, questions in ranked]
+    slow = [each for each in open_ if each.log and not each.log.startswith("also ")]
+    how = "faster" if found.settings else f"at {_LEAST_HZ:g} Hz or more"
+    logged = [
+        NextStep(
+            what=f"log {joined(signal for each in slow for signal in each.log.split(', '))} {how}",
+            settings=found.settings,
+            why=", ".join(each.question for each in slow),
+        )
+    ] * bool(slow and (found.settings or not found.flight.parameters))
+    missing: dict[str, list[str]] = {}
+    for each in open_:
+        if each.log.startswith("also "):
+            missing.setdefault(each.log, []).append(each.question)
+    logged += [NextStep(what=f"log {text}", why=", ".join(questions)) for text, questions in missing.items()]
+    # What is roughly known can wait.
+    urgent = any(each.answer == "no" and each.log for each in open_)
+    first = flights[:1] if cause else []
+    steps = [*first, *logged, *flights[len(first) :]] if urgent else [*flights[:_TRIED], *logged]
+    model = NextStep(
+        what="for a model, with mass and arm",
+        command=f"cpfls init {shlex.quote(found.flight.name)} --mass KG --arm M -o study.yaml",
+        why=answers[-1].question,
+    )
+    return (*steps[:_TRIED], model)

@@ -27,7 +27,7 @@ HOLDS = 0.95
 """Share of the plants with which proposed gains hold the asked margins."""
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
-_ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
+ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
 """Margins from which on a loop is usually accepted: what has them and flies is not slowed down."""
 _AT_ONCE = 1.25
 """Factor by which a gain changes at most from one log to the next."""
@@ -364,7 +364,7 @@ class _Work:
 
     def _acceptable(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
         """Keep gains that are higher than asked margins allow where the loop has those that every guide accepts."""
-        if float(np.median(self._held(axis, self.values))) < _ACCEPTABLE.disk:
+        if float(np.median(self._held(axis, self.values))) < ACCEPTABLE.disk:
             return rows
         return [
             replace(row, proposed=row.today, direction="keep", why="") if row.direction == "lower" else row

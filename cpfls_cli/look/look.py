@@ -7,13 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cpfls_cli.errors import InputError
+from cpfls_cli.errors import about as about_
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.look.answers import Answer, Found, NextStep, answers_of, next_steps
 from cpfls_cli.look.balance import Balance, balance_of
 from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.effectiveness import AxisPlant, effectiveness
 from cpfls_cli.look.flight import AXES, LogFlight
-from cpfls_cli.look.gains import TunedGains, tuned_gains
+from cpfls_cli.look.gains import ACCEPTABLE, AxisGains, TunedGains, tuned_gains
 from cpfls_cli.look.gusts import AxisGusts, Driven, gusts_of
 from cpfls_cli.look.hover import Hover, hover_of
 from cpfls_cli.look.logged import Logged, what_is_logged
@@ -23,6 +25,7 @@ from cpfls_cli.look.timeline import Event, timeline
 from cpfls_cli.look.vibration import Vibration, vibration_of
 from cpfls_cli.result import about, part, result
 from cpfls_cli.trace import Track, track
+from cpfls_cli.words import joined
 
 
 @result
@@ -48,6 +51,67 @@ class Look:
     gains: TunedGains | None = part(default=None)
     tracks: dict[str, Track] | None = part(default=None)
 
+    @property
+    def danger(self) -> list[Event]:
+        """List what ended a flight, or could have."""
+        return [event for event in self.events if event.severity == "danger"]
+
+    @property
+    def uneven(self) -> tuple[int, ...]:
+        """Number the rotors that work more or less than sound ones."""
+        return () if self.balance is None else self.balance.uneven
+
+    @property
+    def shaken(self) -> float:
+        """Vibration of the accelerometer where its autopilot has a limit for it, m/s^2; else NaN."""
+        given = None if self.vibration is None else self.vibration.spectra.get("accelerometer")
+        known = given is not None and self.vibration is not None and len(self.vibration.limit) > 0
+        return float(np.nanmax(given.rms)) if known and given and np.isfinite(given.rms).any() else np.nan
+
+    @property
+    def limit(self) -> float:
+        """Limit that vibration exceeds, else the lower one, m/s^2; NaN where there is none."""
+        limits = () if self.vibration is None else self.vibration.limit
+        return max((each for each in limits if self.shaken > each), default=limits[0] if limits else np.nan)
+
+    @property
+    def judged(self) -> list[AxisGains]:
+        """List the axes whose margins are those of the loop that flew."""
+        axes = () if self.gains is None else self.gains.axes
+        return [axis for axis in axes if axis.before and axis.reason not in {"law", "feedback"}]
+
+    @property
+    def small(self) -> list[str]:
+        """Name the axes whose margins surely are smaller than every guide accepts."""
+        found = [(axis.axis, axis.before) for axis in self.judged if axis.before]
+        return [
+            name for name, m in found if m.phase_deg.high < ACCEPTABLE.phase_deg or m.gain_db.high < ACCEPTABLE.gain_db
+        ]
+
+    @property
+    def doubtful(self) -> list[str]:
+        """Name the axes whose margins most likely are smaller than every guide accepts."""
+        found = [(axis.axis, axis.before) for axis in self.judged if axis.before]
+        return [
+            name
+            for name, m in found
+            if m.phase_deg.value < ACCEPTABLE.phase_deg or m.gain_db.value < ACCEPTABLE.gain_db
+        ]
+
+    @property
+    def good(self) -> list[str]:
+        """Name what the log shows to be as it should."""
+        found = [(axis.axis, axis.before) for axis in self.judged if axis.before]
+        fine = [
+            name for name, m in found if m.phase_deg.low >= ACCEPTABLE.phase_deg and m.gain_db.low >= ACCEPTABLE.gain_db
+        ]
+        balanced = self.balance is not None and not self.uneven and any(row.share for row in self.balance.rotors)
+        return [
+            *(["balance"] if balanced else []),
+            *(["vibration"] if self.shaken <= self.limit else []),
+            *([f"margins of {joined(fine)}"] if fine else []),
+        ]
+
 
 def look_at(
     name: str,
@@ -69,7 +133,8 @@ def look_at(
         If the log holds no flight of a multirotor, or no body rates.
     """
     progress("recognises its signals")
-    recognition = recognise(topics, units, parameters, system)
+    with about_(name, InputError):
+        recognition = recognise(topics, units, parameters, system)
     flight = read_flight(name, topics, units, parameters, system, recognition)
     progress("balance, hover, vibration")
     balance, hover, vibration = balance_of(flight), hover_of(flight), vibration_of(flight)
@@ -124,7 +189,7 @@ def _tracks(flight: LogFlight) -> dict[str, Track]:
     lean, volts = ("roll", "pitch"), ("voltage",)
     given = {
         "rate": (AXES, flight.time, degrees * flight.body_rate, False),
-        "rate_asked": (AXES, flight.time, degrees * flight.rate_setpoint, True),
+        "rate_asked": (tuple(f"{axis} setpoint" for axis in AXES), flight.time, degrees * flight.rate_setpoint, True),
         "attitude": (lean, flight.time, degrees * flight.attitude[:, :2], False),
         "rotors": (labels, flight.rotors.time, flight.rotors.values, False),
         "height": (("height",), flight.time, flight.height, False),

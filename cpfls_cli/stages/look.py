@@ -5,6 +5,7 @@ Without -o the answer is printed; with it, FOLDER gets a page and a result for e
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ import numpy as np
 import typer
 
 from cpfls_cli.chart import Axis, Chart, span
-from cpfls_cli.errors import InputError, about
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES
@@ -23,6 +24,11 @@ from cpfls_cli.traces import traces
 _SEEN = 0.15
 """Coherence below which a point of a frequency response is left out."""
 _DECIBELS = 30.0
+_VIBRATES_HZ = 20.0
+_LEAST_STEP_S, _HALVES = 0.2, 10.0
+"""Time that a step is shown: at least, and in times until half of it."""
+_MOST_FACTOR = 10.0
+"""Intervals wider than this factor are not drawn."""
 
 
 def _balance(r: Look) -> str:
@@ -49,11 +55,11 @@ def _balance(r: Look) -> str:
 
 def _effectiveness(r: Look) -> str:
     """Draw angular acceleration per full command over frequency, by instruments and by least squares."""
-    shown = [plant for plant in (r.plants or {}).values() if len(plant.frequency)]
+    shown = [plant for plant in (r.plants or {}).values() if plant.identified]
     if not shown:
         return ""
     seen = [np.minimum(plant.input_coherence, plant.output_coherence) > _SEEN for plant in shown]
-    tops = [plant.model_gain if plant.identified else plant.direct_gain for plant in shown]
+    tops = [plant.model_gain for plant in shown]
     frequency = np.concatenate([plant.frequency for plant in shown])
     chart = Chart(
         "effectiveness",
@@ -68,18 +74,13 @@ def _effectiveness(r: Look) -> str:
 
 def _curves(chart: Chart, plant: AxisPlant, clear: np.ndarray) -> None:
     style = AXES.index(plant.axis)
-    if plant.identified:
-        spread = np.exp(1.96 * plant.gain_error)
-        gain = np.where(clear, plant.gain, np.nan)
-        chart.points("", plant.frequency, gain, style, low=gain / spread, high=gain * spread)
-        chart.line(f"{plant.axis}, by {plant.instrument}", plant.frequency, plant.model_gain, style)
-    chart.line(
-        f"{plant.axis}, least squares",
-        plant.frequency,
-        plant.direct_gain,
-        "g" if plant.identified else style,
-        kind="dashed thin",
+    spread = np.exp(np.minimum(1.96 * plant.gain_error, np.log(_MOST_FACTOR)))
+    gain = np.where(clear & (spread < _MOST_FACTOR), plant.gain, np.nan)
+    chart.points(
+        f"{plant.axis}, points", plant.frequency, gain, style, low=gain / spread, high=gain * spread, key=False
     )
+    chart.line(plant.axis, plant.frequency, plant.model_gain, style)
+    chart.line(f"{plant.axis}, least squares", plant.frequency, plant.direct_gain, style, kind="dashed thin", key=False)
 
 
 def _step(r: Look) -> str:
@@ -88,19 +89,23 @@ def _step(r: Look) -> str:
     if not shown:
         return ""
     lows, highs = [loop.step_low for loop in shown], [loop.step_high for loop in shown]
-    low, high = span(*(each.step for each in shown), *lows, *highs, [0.0, 1.2])
+    late = max([loop.by_step.half_s.value for loop in shown if loop.by_step is not None], default=np.inf)
+    end = min(float(shown[0].time[-1]), max(_LEAST_STEP_S, _HALVES * late))
+    inside = shown[0].time <= end
+    low, high = span(*(each.step[inside] for each in shown), *(each[inside] for each in (*lows, *highs)), [0.0, 1.2])
     chart = Chart(
         "step",
         "Body rate after a step of its setpoint, as a share of the step",
-        Axis("time after the step, s", 0.0, float(shown[0].time[-1])),
+        Axis("time after the step, s", 0.0, end),
         Axis("share of the step", max(low, -0.5), min(high, 2.0)),
     )
     chart.mark(y=1.0)
     for loop in shown:
         style = AXES.index(loop.axis)
-        chart.line(loop.axis, loop.time, loop.step, style, low=loop.step_low, high=loop.step_high)
-        if np.isfinite(loop.law_step).any() and len(loop.law_step) == len(loop.time):
-            chart.line(f"{loop.axis}, by effectiveness and law", loop.time, loop.law_step, style, kind="dashed thin")
+        time, step, least, most = (each[inside] for each in (loop.time, loop.step, loop.step_low, loop.step_high))
+        chart.line(loop.axis, time, step, style, low=least, high=most)
+        if getattr(loop, "law_explains", False) and len(loop.law_step) == len(loop.time):
+            chart.line(f"{loop.axis}, by law", time, loop.law_step[inside], style, kind="dashed thin", key=False)
     return str(chart)
 
 
@@ -130,16 +135,20 @@ def _map(r: Look) -> str:
     v = r.vibration
     if v is None or not v.map_db.size or not np.isfinite(v.map_db).any():
         return ""
-    known = np.isfinite(v.map_db)
-    high = float(np.nanpercentile(v.map_db[known], 99.5))
+    # Below, the vehicle moves as a whole, which would hide what vibrates.
+    inside = v.map_hz >= _VIBRATES_HZ
+    if not np.isfinite(v.map_db[:, inside]).any():
+        return ""
+    hz, shown = v.map_hz[inside], v.map_db[:, inside]
+    high = float(np.nanpercentile(shown, 99.5))
     half = 0.5 * (v.map_collective[1] - v.map_collective[0])
     chart = Chart(
         "vibration-map",
         "Power of the gyroscope over frequency and throttle: the darker, the stronger",
-        Axis("frequency, Hz", float(v.map_hz[0]), float(v.map_hz[-1])),
+        Axis("frequency, Hz", float(hz[0]), float(hz[-1])),
         Axis("throttle, share of full", float(v.map_collective[0] - half), float(v.map_collective[-1] + half)),
     )
-    chart.map(v.map_db, high - _DECIBELS, high)
+    chart.map(shown, high - _DECIBELS, high)
     return str(chart)
 
 
@@ -197,22 +206,6 @@ def _thrust(r: Look) -> str:
     return str(chart)
 
 
-def _battery(r: Look) -> str:
-    """Draw the voltage over time."""
-    battery = None if r.hover is None else r.hover.battery
-    if battery is None or not len(battery.time):
-        return ""
-    chart = Chart(
-        "battery",
-        "Voltage of the battery over time",
-        Axis("time, s", *span(battery.time, room=0.0)),
-        Axis("V", *span(battery.voltage)),
-        table=False,
-    )
-    chart.line("", battery.time, battery.voltage, 0)
-    return str(chart)
-
-
 _PANELS = {
     "rate, deg/s": ("rate", "rate_asked"),
     "attitude, deg": ("attitude",),
@@ -238,7 +231,6 @@ FIGURES = {
     "vibration-map": _map,
     "spectra": _spectra,
     "thrust": _thrust,
-    "battery": _battery,
 }
 
 
@@ -250,6 +242,8 @@ def look(
     """Look into logs, each by itself."""
     named = unique_names(logs)
     for name, path in named.items():
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; give its logs: cpfls look {shlex.quote(str(path))}/*")
         run.take({"log": path}, name)
     if run.dry_run:
         return None
@@ -257,10 +251,12 @@ def look(
     for done, (name, path) in enumerate(named.items()):
         try:
             found[name] = _one(run, path, done, len(named))
-        except InputError as error:
+        except (InputError, ComputationError) as error:
             if len(named) == 1:
                 raise
-            found[name] = Look(name=path.name, refused=str(error))
+            found[name] = Look(name=path.name, refused=str(error).removeprefix(f"{path}: "))
+    if all(each.refused for each in found.values()):
+        raise ComputationError("; ".join(f"{each.name}: {each.refused}" for each in found.values()))
     if run.output is None:
         run.next.append(("cpfls", "look", *logs, "-o", "look"))
     return found
@@ -269,7 +265,7 @@ def look(
 def _one(run: Run, path: Path, done: int, total: int) -> Look:
     run.progress(done, total, f"reads {path.name}")
     contents = log_contents(path)
-    with about(path, InputError):
+    try:
         return look_at(
             path.name,
             contents.topics,
@@ -281,3 +277,6 @@ def _one(run: Run, path: Path, done: int, total: int) -> Look:
             warnings=contents.warnings,
             progress=lambda what: run.progress(done, total, f"{path.name}: {what}"),
         )
+    except InputError as error:
+        # It is a log, but holds nothing to look at.
+        raise ComputationError(f"{path}{str(error).removeprefix(path.name)}") from None

@@ -15,6 +15,7 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage, unique_names
 from tests.builders.studies import TINY, VEHICLE
+from tests.builders.unknown_logs import flat_log, flight, write_csv
 
 STAGE = '''\
 """Weigh a craft.
@@ -218,7 +219,7 @@ def test_names_of_files_are_unique(tmp_path):
 def looked(cpfls, tmp_path, monkeypatch):
     """What `look` wrote of a log."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "log.csv").write_text("t,wx,wy,wz\n" + "".join(f"{0.01 * k},0,{k % 7},0\n" for k in range(300)))
+    write_csv(tmp_path / "log.csv", flat_log(flight(seconds=12.0)))
     (tmp_path / "study.yaml").write_text(TINY + VEHICLE)
     assert cpfls("look", "log.csv", "-o", "out").exit_code == 0
     return tmp_path / "out" / "log.h5"

@@ -1,0 +1,206 @@
+"""`cpfls look` on logs of each autopilot, from the command line to what a person reads."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from cpfls_cli import page
+from cpfls_cli.look.answers import Answer
+from cpfls_cli.look.balance import balance_of
+from cpfls_cli.look.gains import AxisGains, AxisMargins, TunedGains
+from cpfls_cli.look.logged import Logged
+from cpfls_cli.look.look import Look
+from cpfls_cli.result import Estimate
+from tests.builders import looked_logs
+from tests.builders.blackbox_logs import signed
+from tests.builders.dataflash_logs import dataflash
+from tests.builders.look_flights import CROSS, hovering
+from tests.builders.unknown_logs import flat_log, flight, ulog_of_flight, write_csv
+
+OWN = flight(seconds=15.0)
+MOST_LINES = 15
+
+
+def ardupilot_bytes():
+    """The flight as ArduPilot's card has it."""
+    contents = looked_logs.ardupilot(OWN)
+    kinds = {
+        topic: ("Q" + "f" * (len(own) - 1), ",".join(["TimeUS", *list(own)[1:]]))
+        for topic, own in contents.topics.items()
+    }
+    rows = [
+        (topic, (round(1e6 * stamp), *values))
+        for topic, own in contents.topics.items()
+        for stamp, *values in np.column_stack(list(own.values())).tolist()
+    ]
+    rows.sort(key=lambda row: row[1][0])
+    return dataflash(kinds, rows, contents.parameters, ["ArduCopter V4.5.7 (abc)", "Frame: QUAD/X"])
+
+
+def blackbox_bytes():
+    """The flight as a blackbox has it: every frame whole, every field a signed number."""
+    contents = looked_logs.betaflight(OWN)
+    fields = dict(contents.topics[""])
+    scales = {"time": 1e6, "vbatLatest": 100.0, **{f"accSmooth[{k}]": 2048.0 for k in range(3)}}
+    columns = {"loopIteration": np.arange(len(OWN.time)), **fields}
+    rows = np.stack([np.round(scales.get(name, 1.0) * values) for name, values in columns.items()], axis=1)
+    lines = {
+        "Product": "Blackbox flight data recorder by Nicholas Sherlock",
+        "Data version": "2",
+        "I interval": "1",
+        "P interval": "1/1",
+        "Field I name": ",".join(columns),
+        **{f"Field {kind} {what}": ",".join("0" * len(columns)) for kind in "IP" for what in ("predictor", "encoding")},
+        "Field I signed": ",".join("1" * len(columns)),
+        "Firmware type": "Cleanflight",
+        "Firmware revision": "Betaflight 4.5.1 (77d01ba3b) STM32F7X2",
+        "gyro_scale": "0x3f800000",
+        "acc_1G": "2048",
+        "minthrottle": "1070",
+        "vbatref": "1600",
+        **contents.parameters,
+    }
+    head = "".join(f"H {key}:{value}\n" for key, value in lines.items()).encode()
+    return head + b"".join(b"I" + b"".join(map(signed, row)) for row in rows.astype(int).tolist())
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """A folder with a log of each autopilot, and one that has no gyroscope."""
+    folder = tmp_path_factory.mktemp("logs")
+    (folder / "px4 log.ulg").write_bytes(ulog_of_flight(OWN))
+    (folder / "ap.bin").write_bytes(ardupilot_bytes())
+    (folder / "bf.bbl").write_bytes(blackbox_bytes())
+    write_csv(folder / "blind.csv", flat_log(OWN, rate=None, attitude=None))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "system", "rotors"),
+    [("px4 log.ulg", "PX4", 4), ("ap.bin", "ArduCopter", 4), ("bf.bbl", "Betaflight 4.5.1", 4)],
+)
+def test_one_log_is_answered_in_fifteen_lines(cpfls, logs, name, system, rotors):
+    result = cpfls("look", logs / name)
+    assert result.exit_code == 0, result.output
+    first, facts, answers, *rest = result.stdout.splitlines()
+    assert first.startswith("Flies")
+    assert facts.startswith(f"{name}: {system}")
+    assert f"{rotors} rotors" in facts
+    assert answers.startswith("Answers: ")
+    assert [line for line in rest if line in ("Healthy?", "Change", "Fly next")] == ["Healthy?", "Change", "Fly next"]
+    assert len(result.stdout.split("next:\n")[0].splitlines()) <= MOST_LINES
+    assert "--mass KG --arm M -o study.yaml" in result.stdout
+
+
+def test_a_log_that_shows_no_flight_of_a_multirotor_is_refused_with_code_1(refuse, logs):
+    (said,) = refuse("look", logs / "blind.csv", code=1)
+    assert said.startswith(f"{logs / 'blind.csv'}: a log without a gyroscope")
+    assert said.count("blind.csv") == 1
+
+
+def test_what_is_no_log_is_refused_with_code_2(refuse, logs):
+    assert refuse("look", logs) == [f"{logs}: is a folder; give its logs: cpfls look {logs}/*"]
+    assert refuse("look", logs / "none.bbl") == [f"{logs / 'none.bbl'}: no such file"]
+
+
+def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = cpfls("look", logs / "px4 log.ulg", logs / "bf.bbl", logs / "blind.csv", "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("3 flights\n")
+    index = (tmp_path / "out" / "index.html").read_text()
+    assert '<a href="px4%20log.html">px4 log.ulg</a>' in index
+    own = re.search("<h1>(.*?)</h1>", (tmp_path / "out" / "bf.html").read_text())[1]
+    assert own in index
+    assert "without a gyroscope" in index
+    assert sorted(path.name for path in (tmp_path / "out").glob("*.html")) == [
+        "bf.html",
+        "blind.html",
+        "index.html",
+        "px4 log.html",
+    ]
+
+
+def test_where_all_are_refused_nothing_is_written(refuse, logs, tmp_path):
+    assert len(refuse("look", logs / "blind.csv", logs / "blind.csv", "-o", tmp_path / "out", code=1)) == 1
+
+
+def test_page_and_json_have_the_answer(cpfls, logs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    told = json.loads(cpfls("look", logs / "px4 log.ulg", "-o", "out", "--json").stdout)
+    assert [own["question"] for own in told["answers"]][-1] == "inertia, drag, what a model misses"
+    assert told["next_steps"][-1]["command"].startswith("cpfls init 'px4 log.ulg' ")
+    shown = (tmp_path / "out" / "px4 log.html").read_text()
+    for title in ("Healthy?", "Change", "Fly next", "What this log can answer", "Answers"):
+        assert f">{title}</h" in shown
+    again = cpfls("info", tmp_path / "out" / "px4 log.h5", "-v").stdout
+    assert f"<h1>{again.splitlines()[0]}</h1>" in shown
+    assert len(again.splitlines()) > 2 * MOST_LINES
+
+
+def words_of(**given):
+    return page.words("look", Look(name="log.bin", logged=LOGGED, answers=NO_GAINS, **given))
+
+
+NO_GAINS = (Answer(question="gains", answer="no", why="nothing is known"),)
+LOGGED = Logged(
+    name="log.bin",
+    system="ArduCopter 4.5.7",
+    vehicle="multirotor",
+    rotors=4,
+    duration_s=60.0,
+    flown_s=50.0,
+    spans_s=np.array([[5.0, 55.0]]),
+    gyroscope="behind",
+    signals=(),
+)
+
+
+def test_patterns_are_named_and_no_rotor_is_called_weak():
+    quad = np.array([1.0, 1.0, -1.0, -1.0])
+    yaw = balance_of(hovering(1 + 0.1 * quad, seconds=60))
+    assert words_of(balance=yaw).startswith("# Flies, but holds a steady yaw torque: M")
+    ahead = balance_of(hovering(1 + 0.1 * np.sign(CROSS[:, 0]), seconds=60, heading=lambda t: np.pi * (t > 30)))
+    said = words_of(balance=ahead)
+    assert "as if its centre of mass were" in said
+    assert "ahead of the middle" in said
+    weak = words_of(balance=balance_of(hovering(np.ones(4), seconds=60, weak={2: 0.8})))
+    assert "M3 \\+" in weak.splitlines()[0]
+    assert "It may be rotor 3 (propeller, motor or speed controller), or a centre of mass" in weak
+    assert "together with a steady yaw torque" in weak
+    assert "weak" not in weak
+
+
+def test_margins_are_judged_by_their_intervals():
+    def looked(low, value, high):
+        def of(low, value, high):
+            return Estimate(value=value, low=low, high=high)
+
+        margins = AxisMargins(
+            gain_db=of(8.0, 9.0, 10.0),
+            phase_deg=of(low, value, high),
+            disk_deg=of(low, value, high),
+            crossover_hz=of(4.0, 5.0, 6.0),
+            bandwidth_hz=of(8.0, 9.0, 10.0),
+            holds=0.5,
+            stable=1.0,
+        )
+        gains = TunedGains(
+            autopilot="px4",
+            title="PX4",
+            version="1.15",
+            reason="",
+            asked_gain=6.0,
+            asked_phase=45.0,
+            asked_disk=35.0,
+            required=45.0,
+            axes=(AxisGains(axis="roll", changed=False, reason="", fact="", attitude=False, before=margins),),
+        )
+        return words_of(gains=gains).splitlines()[0]
+
+    assert looked(10.0, 15.0, 20.0) == "# Flies, but margins of roll are small {warning}"
+    assert looked(20.0, 28.0, 40.0) == "# Flies; margins of roll may be small {unsure}"
+    assert looked(35.0, 40.0, 45.0) == "# Flies; good, as far as this log shows: margins of roll {good}"
+    assert looked(25.0, 40.0, 45.0).startswith("# Flies; whether rotors")
