@@ -19,8 +19,8 @@ MENTIONS = {
     ("simulation/settings.py", "motor_lag"),
     ("simulation/settings.py", "battery_sag"),
 }
-# A line of the header of a blackbox log, which is called like an effect.
-OF_OTHERS = {("logs/blackbox.py", "gyro_scale")}
+# A line of the header of a blackbox log, and what makes rotors uneven, which are called like effects.
+OF_OTHERS = {("logs/blackbox.py", "gyro_scale"), ("look/balance.py", "wind")}
 # The vehicle's own numbers are part of every fit; what they mean stands in their own file, which the fits import.
 IMPORTED = {"parameter_error"}
 
