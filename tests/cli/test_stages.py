@@ -172,7 +172,8 @@ def at_home(monkeypatch, tmp_path):
     folder.mkdir()
     (folder / "look.md.j2").write_text("# A {{ r.name }}\n")
     (folder / "look_index.md.j2").write_text(
-        "# {{ r | length | plural('thing') }}\n{% for name in r %}\n- [{{ name }}]({{ name | address }})\n{% endfor %}\n"
+        "# {{ r | length | plural('thing') }}\n"
+        "{% for name in r %}\n- [{{ name }}]({{ name | address }})\n{% endfor %}\n"
     )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
 
