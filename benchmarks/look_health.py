@@ -10,7 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from cpfls_cli.look.balance import balance_of
-from cpfls_cli.look.gusts import Driven, gusts_of
+from cpfls_cli.look.gusts import gusts_of
 from cpfls_cli.look.hover import hover_of
 from tests.builders.look_flights import CROSS, correlated, hovering, still_flight
 from tests.unit.look import test_gusts as gusty
@@ -62,7 +62,7 @@ def hovers():
 
 def gusts():
     for memory in (0.15, 0.3, 1.0):
-        plants = {"roll": Driven(gusty.B, gusty.DELAY, 0.0)}
+        plants = {"roll": gusty.PLANT}
         found = [gusts_of(gusty.gusty(seed, memory=memory), plants)[0] for seed in range(DRAWS // 2)]
         row(f"gusts of {memory} s, in the band", [each.in_band for each in found], gusty.in_band(3.0, memory))
         row(f"gusts of {memory} s, size", [each.size for each in found], 3.0)

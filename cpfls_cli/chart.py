@@ -179,7 +179,7 @@ class Chart:
         )
         for a, b, end in zip(left, right, ends, strict=True):
             box = f'x="{a:.1f}" width="{b - a:.1f}" y="{min(end, zero):.1f}" height="{abs(end - zero):.1f}"'
-            self._parts.append(f'<rect class="f{style}" {box}/>' if math.isfinite(end) else "")
+            self._parts.append(f'<rect class="f{style}" {box}/>' if math.isfinite(a + end) else "")
         self._whiskers(x, low, high)
         self._note(label, style, "", x, y, low, high)
 

@@ -14,6 +14,7 @@ Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,6 +23,7 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
+from urllib.parse import quote
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -120,6 +122,7 @@ def _cell(value: Any) -> str:
 
 
 _FILTERS: Mapping[str, Callable[..., Any]] = {
+    "address": lambda file: Markup(quote(os.fsencode(file))),
     "capitalize_first": lambda text: text[:1].upper() + text[1:],
     "change": change,
     "code": code,
@@ -236,12 +239,11 @@ def _name_cells(table: Sequence[Token]) -> None:
 def blocks(text: str) -> list[Block]:
     """Give what a terminal shows of a page; figures are left out, and headings of nothing."""
     made = list(_blocks(tree(text)))
-    shown = [(block, after) for block, after in zip(made, [*made[1:], None], strict=True)]
     empty = (Heading, Folded, type(None))
     return [
         block
-        for block, after in shown
-        if block is made[0] or not (isinstance(block, Heading) and isinstance(after, empty))
+        for block, after in pairwise([*made, None])
+        if block and (block is made[0] or not (isinstance(block, Heading) and isinstance(after, empty)))
     ]
 
 

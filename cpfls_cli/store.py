@@ -134,7 +134,7 @@ def _write_values(group: h5py.Group, name: str, value: Any, own: Described, abou
     array = _as(own, value)
     if array.dtype.kind == "U":
         # Text of fixed length: that of variable length lies in a heap whose bytes are not reproducible.
-        array = np.char.encode(array, "utf-8")
+        array = np.char.encode(array, "utf-8", "backslashreplace")
     packed = {"compression": "gzip", "shuffle": True} if array.nbytes >= _PACKED_BYTES else {}
     dataset = group.create_dataset(name, data=array.astype(np.uint8) if array.dtype == bool else array, **packed)
     unit = "text" if array.dtype.kind == "S" else about.unit
@@ -214,6 +214,8 @@ def _absent(own: Described, group: h5py.Group, missing: list[str]) -> dict[str, 
 
 def _read_table(kind: Any, group: h5py.Group, missing: list[str]) -> tuple[Any, ...]:
     rows = int(group.attrs["rows"])
+    if not 0 <= rows <= group.file.id.get_filesize():
+        raise ValueError(f"{group.name} cannot hold {rows} rows")
     columns: dict[str, Sequence[Any]] = {}
     for own in described_fields(kind):
         if own.name not in group:

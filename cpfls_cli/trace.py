@@ -28,7 +28,8 @@ def track(
     labels: tuple[str, ...], time: Array, values: Array, *, dashed: bool = False, most: int = MOST_SAMPLES
 ) -> Track:
     """Take signals, shape (sample,) or (sample, channel), of increasing time; those without a value are left out."""
-    held = np.asarray(values, np.float32).reshape(len(time), len(labels))
+    with np.errstate(over="ignore"):
+        held = np.asarray(values, np.float32).reshape(len(time), len(labels))
     known = np.atleast_1d(np.isfinite(held).any(axis=0))
     held = held[:, known]
     steps = np.diff(time)

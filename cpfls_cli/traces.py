@@ -19,8 +19,8 @@ from cpfls_cli.trace import Track, thinned
 
 MOST_VALUES = 1_500_000
 """Of all signals of a page, so that it stays below some megabytes."""
-_TICK_S = 1e-4
-"""Time is kept to so much."""
+_TICK_S, _MOST_TICKS = 1e-4, 2**32 - 1
+"""Time is kept to so much, in so many steps at most."""
 _LEVELS = 65535
 """Values are kept to so many steps of their range; 0 stands for none."""
 _OF_NOISE = 16.0
@@ -73,12 +73,13 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = 
     if not every:
         return ""
     ends = min(float(each.time[0]) for each in every), max(float(each.time[-1]) for each in every)
+    tick = max(_TICK_S, (ends[1] - ends[0]) / _MOST_TICKS)
     share = min(1.0, MOST_VALUES / sum(each.values.size for each in every))
     data = {
         "span": ends,
-        "tick": _TICK_S,
+        "tick": tick,
         "panels": [
-            {"title": title, "tracks": [_packed(each, share, ends[0]) for each in tracks]}
+            {"title": title, "tracks": [_packed(each, share, ends[0], tick) for each in tracks]}
             for title, tracks in shown.items()
         ],
     }
@@ -101,7 +102,7 @@ def _in_script(data: Any) -> str:
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _packed(own: Track, share: float, begin: float) -> dict[str, Any]:
+def _packed(own: Track, share: float, begin: float, tick: float) -> dict[str, Any]:
     """Pack a track: differences of whole numbers, compressed, which a page decodes."""
     time, values = (
         thinned(own.time, own.values, max(2, int(share * len(own.time)))) if share < 1 else (own.time, own.values)
@@ -109,7 +110,7 @@ def _packed(own: Track, share: float, begin: float) -> dict[str, Any]:
     scales = [_scale(column[np.isfinite(column)]) for column in values.T.astype(float)]
     low, step = np.array(scales).T
     levels = np.nan_to_num(1 + np.round((values - low) / step), nan=0.0, posinf=0.0, neginf=0.0).astype(np.uint16)
-    ticks = np.round((time - begin) / _TICK_S).astype(np.uint32)
+    ticks = np.round((time - begin) / tick).astype(np.uint32)
     return {
         "labels": [visible(each) for each in own.labels],
         "dashed": own.dashed,

@@ -203,7 +203,8 @@ def _frame(
 ) -> int:
     """Read the fields of a frame into a row; where the next frame begins."""
     count = fields.counts[kind]
-    field = 0
+    # Of one type from the start: with another, numba compiles what is called with it twice.
+    field: Any = np.int64(0)
     while field < count:
         if fields.predictor[kind, field] == _INCREMENT:
             row[field] = before[0, field] + 1
@@ -253,7 +254,6 @@ def _kind(marker: int) -> int:
     return len(_MARKERS) if marker == _EVENT else -1
 
 
-@compiled
 def decode(
     data: Bytes, place: int, fields: Fields, constants: IntArray, rows: IntArray, slow: IntArray
 ) -> tuple[int, int, int]:
@@ -279,9 +279,24 @@ def decode(
     changes : int
         Slow frames.
     """
-    row = np.zeros(fields.encoding.shape[1], dtype=np.int64)
-    before = np.zeros((2, len(row)), dtype=np.int64)
-    values = np.zeros(8, dtype=np.int64)
+    # Arrays are made here and copied by element: numba would compile the words of errors of shapes for two seconds.
+    width = fields.encoding.shape[1]
+    row, before, values = (np.zeros(shape, dtype=np.int64) for shape in (width, (2, width), 8))
+    return _decoded(data, place, fields, constants, rows, slow, row, before, values)
+
+
+@compiled
+def _decoded(
+    data: Bytes,
+    place: int,
+    fields: Fields,
+    constants: IntArray,
+    rows: IntArray,
+    slow: IntArray,
+    row: IntArray,
+    before: IntArray,
+    values: IntArray,
+) -> tuple[int, int, int]:
     number, broken, changes, last, in_step, resumed = 0, 0, 0, np.int64(0), False, True
     while place < len(data):
         kind = _kind(data[place])
@@ -304,7 +319,8 @@ def decode(
         if kind == SLOW:
             if changes < len(slow):
                 slow[changes, 0] = number
-                slow[changes, 1:] = row[: slow.shape[1] - 1]
+                for field in range(slow.shape[1] - 1):
+                    slow[changes, 1 + field] = row[field]
             changes += 1
         if kind != MAIN and (kind != _BETWEEN or not in_step):
             continue
@@ -316,9 +332,11 @@ def decode(
             in_step = False
             continue
         in_step, resumed = True, False
-        before[1] = row if kind == MAIN else before[0]
-        before[0] = row
+        for field in range(len(row)):
+            before[1, field] = row[field] if kind == MAIN else before[0, field]
+            before[0, field] = row[field]
         if number < len(rows):
-            rows[number] = row[: rows.shape[1]]
+            for field in range(rows.shape[1]):
+                rows[number, field] = row[field]
         number += 1
     return number, broken, changes

@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.look.flight import AXES, LogFlight, Samples
-from cpfls_cli.look.steady import Known, jackknifed, windows_of
+from cpfls_cli.estimation.spectra import transforms, window_starts
+from cpfls_cli.look.effectiveness import PlantModel
+from cpfls_cli.look.flight import AXES, LogFlight
+from cpfls_cli.look.steady import FEWEST_WINDOWS, Known, jackknifed
 from cpfls_cli.result import Estimate, about, part, result
 
 _PIECE_S = 8.0
 _BAND_HZ, _OF_RATE = (0.2, 6.0), 0.2
 """Band of the fit: above what a piece resolves, and below where plant and sensors count; share of the sampling rate
 it stays below."""
+_HANN, _NEIGHBOURS = 0.375, {-1: 1 / 6, 0: 2 / 3, 1: 1 / 6}
+"""Mean square of Hann's taper, and shares of a frequency and its neighbours in the power that it shows."""
 _MEMORY_S, _SEEN_S = (0.02, 5.0), (0.04, 0.8)
 """Time constants that are tried, and what an interval of them has to lie within, for corners in the band."""
-
-
-class Driven(NamedTuple):
-    """What a command does about an axis, b exp(-s delay) / ((s + damping) (1 + s lag)) of it as body rate.
-
-    Attributes
-    ----------
-    effectiveness : float, rad/s^2 for a full command
-    delay_s, lag_s : float, s
-    damping : float, 1/s
-    """
-
-    effectiveness: float
-    delay_s: float
-    lag_s: float
-    damping: float = 0.0
 
 
 @result
@@ -50,40 +37,32 @@ class AxisGusts:
     model: Array = about("gusts and noise as fitted", "frequency", unit="(rad/s^2)^2/Hz", brief=False)
 
 
-def gusts_of(flight: LogFlight, plants: Mapping[str, Driven]) -> tuple[AxisGusts, ...]:
+def gusts_of(flight: LogFlight, plants: Mapping[str, PlantModel]) -> tuple[AxisGusts, ...]:
     """Estimate the gusts about each axis whose plant is known.
 
     Parameters
     ----------
-    plants : mapping of str to Driven
+    plants : mapping of str to PlantModel
         By axis, from an estimate that gusts do not bias (instruments).
     """
     found = (_about(flight, axis, plants[name]) for axis, name in enumerate(AXES) if name in plants)
     return tuple(each for each in found if each)
 
 
-def _about(flight: LogFlight, axis: int, plant: Driven) -> AxisGusts | None:
-    windows = windows_of(flight, _PIECE_S)
-    signals = np.stack([flight.body_rate[:, axis], flight.command[:, axis]], axis=1)
-    windows = windows.keep(np.asarray(np.isfinite(windows.means(Samples(flight.time, signals))).all(axis=1)))
-    if not len(windows.begin):
+def _about(flight: LogFlight, axis: int, plant: PlantModel) -> AxisGusts | None:
+    signals, period = (flight.body_rate[:, axis], flight.command[:, axis]), 1 / flight.rate_hz
+    length = round(_PIECE_S * flight.rate_hz)
+    begins = window_starts(flight.usable & np.isfinite(signals).all(axis=0), length)
+    # They overlap by half.
+    if len(begins) < 2 * FEWEST_WINDOWS - 1:
         return None
-    count = round(_PIECE_S * flight.rate_hz)
-    first = np.searchsorted(flight.time, windows.begin - 0.5 / flight.rate_hz)
-    places = np.minimum(first[:, None] + np.arange(count), len(flight.time) - 1)
-    rate, command = (signals[places, k] for k in range(2))
-    acceleration = np.gradient(rate, axis=1) * flight.rate_hz
-    taper = np.hanning(count)
-    frequency = np.asarray(np.fft.rfftfreq(count, 1 / flight.rate_hz), dtype=float)
+    frequency = np.asarray(np.fft.rfftfreq(length, period), dtype=float)
     band = (frequency >= _BAND_HZ[0]) & (frequency <= min(_BAND_HZ[1], _OF_RATE * flight.rate_hz))
-    moved, turned, driven = (
-        np.fft.rfft(taper * (each - each.mean(axis=1, keepdims=True)), axis=1)[:, band]
-        for each in (acceleration, rate, command)
-    )
-    slow = 2j * np.pi * frequency[band]
-    acts = plant.effectiveness * np.exp(-slow * plant.delay_s) / (1 + slow * plant.lag_s)
-    scale = 2 / (flight.rate_hz * float((taper**2).sum()))
-    power = scale * np.abs(moved + plant.damping * turned - acts * driven) ** 2
+    rate, command = map(np.nan_to_num, signals)
+    turned, moved = (each[:, band] for each in transforms(rate, begins, length, period, 1))
+    driven = transforms(command, begins, length, period)[0][:, band]
+    scale = 2 / (_HANN * length * flight.rate_hz)
+    power = scale * np.abs(moved + plant.damping * turned - plant.torque(frequency[band]) * driven) ** 2
     known = jackknifed(lambda kept: _fitted(frequency[band], power[kept].mean(axis=0)), len(power))
     if known is None:
         return None
@@ -91,8 +70,11 @@ def _about(flight: LogFlight, axis: int, plant: Driven) -> AxisGusts | None:
 
 
 def _spectrum(frequency: Array, size: float, memory: float, noise: float) -> Array:
-    turning = 2 * np.pi * frequency
-    return np.asarray(4 * size**2 * memory / (1 + (turning * memory) ** 2) + noise * turning**2)
+    """Evaluate the spectrum of gusts and noise as windows under Hann's taper show it."""
+    near = frequency + (frequency[1] - frequency[0]) * np.array(list(_NEIGHBOURS))[:, None]
+    turning = 2 * np.pi * near
+    every = 4 * size**2 * memory / (1 + (turning * memory) ** 2) + noise * turning**2
+    return np.asarray(np.array(list(_NEIGHBOURS.values())) @ every)
 
 
 def _fitted(frequency: Array, power: Array) -> Array:
@@ -118,8 +100,9 @@ def _fitted(frequency: Array, power: Array) -> Array:
     ends = [(begin[0] - 6, begin[0] + 3), (memory[0], memory[1]), (begin[2] - 12, begin[2] + 6)]
     logs = minimize(unlikely, begin, bounds=ends, method="L-BFGS-B").x
     size, memory = np.exp(logs[:2])
-    gusts = _spectrum(frequency, float(size), float(memory), 0.0).sum() * spacing
-    return np.array([*logs, 0.5 * np.log(gusts)])
+    # A sum over frequencies would begin below the band, where long gusts are largest.
+    ends = np.arctan(2 * np.pi * memory * np.array(_BAND_HZ))
+    return np.array([*logs, np.log(size) + 0.5 * np.log(2 / np.pi * (ends[1] - ends[0]))])
 
 
 def _described(axis: str, known: Known, frequency: Array, power: Array, moved: Array) -> AxisGusts:

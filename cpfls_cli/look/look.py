@@ -16,7 +16,7 @@ from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.effectiveness import AxisPlant, effectiveness
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.gains import ACCEPTABLE, AxisGains, TunedGains, tuned_gains
-from cpfls_cli.look.gusts import AxisGusts, Driven, gusts_of
+from cpfls_cli.look.gusts import AxisGusts, gusts_of
 from cpfls_cli.look.hover import Hover, hover_of
 from cpfls_cli.look.logged import Logged, what_is_logged
 from cpfls_cli.look.loop import AxisLoop, loops_of
@@ -142,7 +142,7 @@ def look_at(
     plants = effectiveness(flight)
     progress("the loop that flew")
     loops = loops_of(flight, plants)
-    gusts = gusts_of(flight, {plant.axis: _driven(plant) for plant in plants if plant.identified})
+    gusts = gusts_of(flight, {plant.axis: plant.model for plant in plants if plant.identified})
     progress("gains")
     gains = tuned_gains(flight, plants)
     found = Found(
@@ -173,11 +173,6 @@ def look_at(
         gains=gains,
         tracks=_tracks(flight),
     )
-
-
-def _driven(plant: AxisPlant) -> Driven:
-    model = plant.model
-    return Driven(float(model.gain), float(model.delay), float(model.lag), float(model.damping))
 
 
 def _tracks(flight: LogFlight) -> dict[str, Track]:

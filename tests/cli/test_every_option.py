@@ -53,7 +53,7 @@ ELSEWHERE = {("identify", "--scheduler"), ("sweep", "--scheduler"), ("trend", "-
 """Those that need a scheduler at work, which the tests of `tests/builders/dask_cluster.py` type."""
 LEARN = "--validate flight2.h5 --choose-on flight3.h5 --workers 1 --set identification.choice=held-out"
 LINES = (
-    "look log.csv -o look",
+    "look rotors.csv -o look",
     "trajectory study.yaml -o 1.h5 --waypoints points.csv --plot --format px4 --home 47.4,8.5,1",
     "trajectory study.yaml -o 2.h5 --to-tell com_offset,motor_lag --box 6,6,4 --height 3 --duration 10",
     "trajectory study.yaml -o 3.h5 --hover 4 --repeat 2 --excite roll --signal multisine --band 0.5,4 --size 5",

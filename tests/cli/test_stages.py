@@ -14,6 +14,7 @@ from cpfls_cli.cli.stages import AllCommands, stage_commands
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage, unique_names
+from cpfls_cli.store import read
 from tests.builders.studies import TINY, VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 
@@ -170,7 +171,10 @@ def at_home(monkeypatch, tmp_path):
     folder = tmp_path / "templates"
     folder.mkdir()
     (folder / "look.md.j2").write_text("# A {{ r.name }}\n")
-    (folder / "look_index.md.j2").write_text("# {{ r | length | plural('thing') }}\n")
+    (folder / "look_index.md.j2").write_text(
+        "# {{ r | length | plural('thing') }}\n"
+        "{% for name in r %}\n- [{{ name }}]({{ name | address }})\n{% endfor %}\n"
+    )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
 
 
@@ -189,10 +193,19 @@ def test_several_results_have_a_page_each_and_an_index(tmp_path):
     ]
     assert "<h1>2 things</h1>" in (tmp_path / "out" / "index.html").read_text()
     assert "<h1>A b</h1>" in (tmp_path / "out" / "b.html").read_text()
-    assert [block.text for block in outcome.blocks] == ["2 things", "A a", "A b", "all", "of b"]
+    assert [block.text for block in outcome.blocks] == ["2 things", "- a", "- b", "A a", "A b", "all", "of b"]
     assert outcome.summary["b"]["name"] == "b"
     assert run.origin("a").cautions == ("all",)
     assert run.origin("b").cautions == ("all", "of b")
+
+
+@pytest.mark.usefixtures("at_home")
+def test_names_of_files_that_are_no_text_are_written_and_linked(tmp_path):
+    names = ["a\udcff", "[b](c) <i>"]
+    several.run(Run(output=tmp_path / "out"), names=names)
+    assert "a%FF" in (page := (tmp_path / "out" / "index.html").read_text())
+    assert "%5Bb%5D%28c%29%20%3Ci%3E" in page
+    assert read(tmp_path / "out" / "a\udcff.h5", Named)[0].name == "a\\udcff"
 
 
 @pytest.mark.usefixtures("at_home")

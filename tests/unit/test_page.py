@@ -89,6 +89,10 @@ def test_code_is_shown_as_it_is(tmp_path, text):
     assert [each.text for each in said.rows[0]] == [f"`{text}`", "2"]
 
 
+def test_nothing_is_shown_of_nothing():
+    assert page.blocks("# \n") == page.blocks("") == []
+
+
 def test_what_a_macro_gives_stays_markdown(tmp_path):
     text = worded(
         tmp_path, "{% macro m(x) %}**{{ x }}**{% endmacro %}{{ m(r) }} and {{ [m(r), 'y'] | joined }}\n", "*x*"

@@ -189,6 +189,8 @@ def test_what_breaks_its_description_is_not_read(written):
     "spoil",
     [
         lambda file: file["rotors"].attrs.update(rows=3),
+        lambda file: file["rotors/peaks"].attrs.update(rows=10**12),
+        lambda file: file["rotors/peaks"].attrs.update(rows=-1),
         lambda file: file["rotors/peaks/row"].write_direct(np.array([0, 7], np.int64)),
         lambda file: file.__delitem__("name") or file.create_dataset("name", data=1.0),
         lambda file: file.__delitem__("name") or file.create_group("name"),

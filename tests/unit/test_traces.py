@@ -80,6 +80,13 @@ def test_the_page_reads_what_was_given():
     assert [panel["title"] for panel in data_of(shown)["panels"]] == ["rate, deg/s", "battery, V"]
 
 
+def test_time_of_any_length_and_values_of_any_size_are_kept():
+    time = np.array([0.0, 1e7, 2e7])
+    (_, read, values), *_ = decoded(traces({"a, u": [track(("a",), time, np.array([1.0, 1e300, 2.0]))]}))
+    assert read == pytest.approx(time, abs=0.01)
+    assert values[0] == pytest.approx([1.0, np.nan, 2.0], nan_ok=True)
+
+
 def test_a_long_log_makes_no_large_page():
     rng = np.random.default_rng(3)
     time = np.arange(130_000) * 0.001
