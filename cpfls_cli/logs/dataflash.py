@@ -38,8 +38,8 @@ _EVENTS = frozenset(("EV", "ERR", "MODE", "MSG"))
 # message, and one in text with what the console says.
 _HEAD_BYTES = 65536
 _NO_STAMPS = (
-    "holds no messages of sensors with time stamps (TimeUS or TimeMS): ArduCopter before 3.2 logs none unless"
-    " LOG_BITMASK has bit 7 (IMU)"
+    "its attitude and outputs have no time stamps, as ArduCopter to 3.1 logs them, so nothing can be computed from them;"
+    " later versions stamp all messages"
 )
 # Of 1980-01-06, less the 18 leap seconds since.
 _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
@@ -98,7 +98,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
         raise InputError(f"{path}: {SDLOG2}")
-    if topics.keys() <= {"GPS", *_EVENTS}:
+    if not topics:
+        raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
+    if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
         raise InputError(f"{path}: {_NO_STAMPS}")
     origin = min(fields[STAMP][0] for fields in topics.values())
     for fields in topics.values():
