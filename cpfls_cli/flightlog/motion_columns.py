@@ -299,8 +299,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     carried = _carried(seen, reading)
     near = _BY_NAME if named.known and stated else NEAR_GRAVITY
     fitting, at_hover = (
-        [row for row in SENSED if 1 / near < abs(vertical) / (weight * row[0]) < near]
-        for weight in (carried, 1.0)
+        [row for row in SENSED if 1 / near < abs(vertical) / (weight * row[0]) < near] for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
     world = _of_places(seen)

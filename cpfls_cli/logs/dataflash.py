@@ -38,8 +38,8 @@ _EVENTS = frozenset(("EV", "ERR", "MODE", "MSG"))
 # message, and one in text with what the console says.
 _HEAD_BYTES = 65536
 _NO_STAMPS = (
-    "its attitude and outputs have no time stamps, as ArduCopter to 3.1 logs them, so nothing can be computed from them;"
-    " later versions stamp all messages"
+    "its attitude and outputs have no time stamps, as ArduCopter to 3.1 logs them, so nothing can be computed from"
+    " them; later versions stamp all messages"
 )
 # Of 1980-01-06, less the 18 leap seconds since.
 _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
@@ -120,9 +120,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
     begins = {"": float(origin)}
     texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
-    said = [
-        (round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)
-    ]
+    said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
     lost_bytes = broken if lost else ()
     return LogContents(topics, units, parameters, _system(tables), lost_bytes, flown_at, begins, tuple(said))
 

@@ -24,8 +24,8 @@ GRAVITY = 9.80665
 _HOVERS, _CLIMBS = 0.05, 0.3
 """Most difference of the vertical specific force from gravity, share, and climb rate, m/s."""
 _THIN_AIR, _FOR_VOLTAGE = 0.8, "MOT_BAT_VOLT_MAX"
-"""Density of the air at 2000 m over that at sea level, and the parameter of ArduPilot that is above 0 where it adds what
-a battery has lost: commands are no throttle then."""
+"""Density of the air at 2000 m over that at sea level, and the parameter of ArduPilot that is above 0 where it adds
+what a battery has lost: commands are no throttle then."""
 _ON_GROUND = 0.5
 """Share of the median thrust below which a vehicle that shows gravity is on the ground."""
 _CURVE_S, _SPREAD, _LEAST_FORCE, _SHARPEST = 0.5, 1.25, 0.2, 0.5

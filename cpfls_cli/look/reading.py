@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.motors import ThrustCurve
@@ -89,6 +89,7 @@ def read_flight(
     if recognition is None:
         with about(name, InputError):
             recognition = recognise(topics, units, parameters, system)
+            return read_flight(name, topics, units, parameters, system, recognition)
     # Commands that are rebuilt stand in a topic of their own.
     rebuilt = recognition.rebuilt
     held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
@@ -351,8 +352,9 @@ def _reads_at_rest(flown: BoolArray, rate: Array, force: Array, rate_hz: float) 
     """Give the size of what an accelerometer reads while it stands, in gravity; NaN where it never does for long."""
     near = binary_dilation(flown, iterations=max(1, round(_REST_S * rate_hz)))
     still = np.linalg.norm(rate - np.nanmedian(rate, axis=0), axis=1) < _STILL_RAD_S
-    sizes = np.linalg.norm(force, axis=1)[~near & still]
-    sizes = sizes[np.isfinite(sizes)]
+    # Noise and vibration make a force longer, and not its mean.
+    mean = uniform_filter1d(np.nan_to_num(force), max(1, round(rate_hz)), axis=0)
+    sizes = np.linalg.norm(mean, axis=1)[~near & still & np.isfinite(force).all(axis=1)]
     return float(np.median(sizes)) / STANDARD_GRAVITY if len(sizes) > _REST_S * rate_hz else np.nan
 
 
