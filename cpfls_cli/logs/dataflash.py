@@ -98,10 +98,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
         raise InputError(f"{path}: {SDLOG2}")
-    if not topics:
-        raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
         raise InputError(f"{path}: {_NO_STAMPS}")
+    if not topics:
+        raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     origin = min(fields[STAMP][0] for fields in topics.values())
     for fields in topics.values():
         # Whole microseconds again: a difference of two large numbers of seconds is none.

@@ -197,7 +197,8 @@ def test_a_log_may_begin_late(read, text, before):
     assert len(late.warnings) == (not text)
 
 
-def test_attitudes_without_stamps(read):
+@pytest.mark.parametrize("more", [[], [("GPS", (3, 1, 1817, 2))]])
+def test_attitudes_without_stamps(read, more):
     kinds = {"ATT": ("cc", "RollIn,Roll"), "EV": OLD["EV"], "GPS": OLD["GPS"], "PARM": OLD["PARM"], "MSG": OLD["MSG"]}
     with pytest.raises(InputError, match="have no time stamps, as ArduCopter to 3"):
-        read(dataflash(kinds, [("ATT", (1, 2)), ("GPS", (3, 1, 1817, 2)), ("EV", (10,))]))
+        read(dataflash(kinds, [("ATT", (1, 2)), ("EV", (10,)), *more]))
