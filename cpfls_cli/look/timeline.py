@@ -34,7 +34,7 @@ that make it one; and how long a rotor is there, s."""
 
 _LIES, _LIES_S, _HARD, _HARD_S = -0.7, 1.0, 3.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity, and how
-long before and after the end of a flight it may come, s."""
+long before the end of a flight it may come, s."""
 
 _READS: Final = 0.12
 """By which an accelerometer at rest may differ from gravity, share of it: the largest offset by its data sheets."""
@@ -206,7 +206,7 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
 def _landing(flight: LogFlight, end: float, at: float) -> Event:
     sensor = flight.accelerometer
     if sensor is not None:
-        rows = (sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _HARD_S)
+        rows = (sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S)
         most = float(np.linalg.norm(sensor.values[rows], axis=1).max(initial=0.0)) / STANDARD_GRAVITY
         if most > _HARD:
             return Event(time_s=at, kind="landing", text=f"lands hard, with {most:.2g} g", severity="warning")
