@@ -26,6 +26,10 @@ does: more than 60 degrees off."""
 _SENSES = (0.7, 2.0)
 """Of gravity: the median force of a log, by which an accelerometer and its unit are believed."""
 
+_OVER_S, _OVER = 3.0, 0.2
+"""For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the
+share of the time with rotors on that is so where an attitude is wrong throughout."""
+
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
 """Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 below which it does not turn, as a share of what is usual and by itself."""
@@ -190,6 +194,22 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     # A mean over a time says as much of all of it.
     carried = binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool))
+
+
+def turns_over(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether by its attitude a vehicle is again and again on its back, and feels its weight along its rotors.
+
+    No flight does; a vehicle that stands while its gyroscope drifts or its attitude is wrong does.
+    """
+    if signs.felt is None or signs.upright is None or not active.any():
+        return False
+    thrust = np.median(signs.felt[active], axis=0)
+    along = averaged(signs.felt @ thrust / max(float(np.linalg.norm(thrust)), _WEIGHT[0]), signs.period, SLOW_S)
+    # A controller turns its rotors down where it takes itself for upside down.
+    on = active if signs.level is None else signs.level > ALIVE
+    impossible = on & (_turned_up(signs.upright, active) < 0) & (along > _WEIGHT[0]) & (along < _WEIGHT[1])
+    long = sum(after - first for first, after in runs(impossible) if (after - first) * signs.period >= _OVER_S)
+    return long > _OVER * int(on.sum())
 
 
 def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:

@@ -17,6 +17,7 @@ from cpfls_cli.flightlog.crash import (
     ended_early,
     resting,
     smoothed,
+    turns_over,
     upright_of,
 )
 from cpfls_cli.flightlog.names import BY_HAND
@@ -190,6 +191,9 @@ def find_flown(signs: Signs) -> FlownPart:
     active, told = _active(signs)
     if active is None:
         return FlownPart(None, (told,), flies=False)
+    if turns_over(signs, active):
+        why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
+        return FlownPart(None, (f"no flight in it: {why}: it stands, and the attitude is wrong",), flies=False)
     rests = resting(signs, active)
     active = smoothed(active & ~rests.carried, signs.period, _SHORT_S)
     if not active.any():

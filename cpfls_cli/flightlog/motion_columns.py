@@ -40,8 +40,9 @@ _OVER_GROUND: Sequence[Row] = (
 )
 """Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2."""
 
-NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
-"""Ratios to gravity: of what is gravity in some unit, since a vehicle pushes, and of what is no more than that."""
+NEAR_GRAVITY, _BY_NAME, _WEIGHT = 1.3, 2.0, 1.15
+"""Ratios to gravity: of what is gravity in some unit, since a vehicle pushes; the same of columns that are known to
+hold it, also where the sensor reads wrong; and of what is no more than that."""
 
 _FAST_HZ, _DERIVED = 10.0, 0.8
 """Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
@@ -296,9 +297,9 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     values, stated = seen.grid(named), named.unit
     vertical = float(np.median(values[:, 2]))
     carried = _carried(seen, reading)
+    near = _BY_NAME if named.known and stated else NEAR_GRAVITY
     fitting, at_hover = (
-        [row for row in SENSED if 1 / NEAR_GRAVITY < abs(vertical) / (weight * row[0]) < NEAR_GRAVITY]
-        for weight in (carried, 1.0)
+        [row for row in SENSED if 1 / near < abs(vertical) / (weight * row[0]) < near] for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
     world = _of_places(seen)

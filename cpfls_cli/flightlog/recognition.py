@@ -103,6 +103,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
         _refuse_unfit(log, named)
+        if system and not log.flat:
+            raise InputError(f"holds only {some([*topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight")
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)

@@ -90,8 +90,9 @@ _KNOWN: Final = """
     ArduPilot   velocity       XKF1.V*                                m/s    NED  1        +
     ArduPilot   velocity       NKF1.V*                                m/s    NED  1        +
     ArduPilot   rotor_command  RCOU.C*                                -      -    1        +
-    # To Copter 3.3.
+    # To Copter 3.3, and to 3.2.
     ArduPilot   rotor_command  RCOU.Ch*                               -      -    1        +
+    ArduPilot   rotor_command  RCOU.Chan*                             -      -    1        +
     ArduPilot   rotor_speed    ESC[*].RPM                             rpm    -    1        +
     ArduPilot   rotor_speed    ESC*.RPM                               rpm    -    1        +
     ArduPilot   voltage        BAT.Volt                               V      -    1        +

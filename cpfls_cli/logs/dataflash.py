@@ -31,7 +31,16 @@ _NUMBERS = {
 _WHOLE = "bBhHiIqQ"
 _OF_TEXT: dict[str, Callable[[str], float | bytes]] = {"i": int, "f": float, "S": lambda text: text.encode("latin-1")}
 _OTHERS = {"n": "S4", "N": "S16", "Z": "S64", "a": "V64"}
-_STAMPS = {"TimeUS": 10**6, "TimeMS": 10**3}
+_STAMPS = {"TimeUS": 10**6, "TimeMS": 10**3, "T": 10**3}
+# Kinds that are stamped as what comes before them, where they have no stamps of their own: to Copter 3.2.
+_EVENTS = frozenset(("EV", "ERR", "MODE", "MSG"))
+# Bytes at the beginning of a file among which the first description of a kind is sought: a log may begin within a
+# message, and one in text with what the console says.
+_HEAD_BYTES = 65536
+_NO_STAMPS = (
+    "its attitude and outputs have no time stamps, as ArduCopter to 3.1 logs them, so nothing can be computed from"
+    " them; later versions stamp all messages"
+)
 # Of 1980-01-06, less the 18 leap seconds since.
 _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
 _INSTANCE = "#"
@@ -58,29 +67,39 @@ class _Kind:
     @property
     def stamp(self) -> str:
         """Name of the field of the stamps; empty where there is none."""
-        return next((name for name in _STAMPS if self.letters.get(name) in ("I", "Q")), "")
+        # Beside a week, TimeMS is that of GPS, and the log's own clock is T.
+        names = ("T",) if {"Week", "TimeMS", "T"} <= self.letters.keys() else ("TimeUS", "TimeMS")
+        return next((name for name in names if self.letters.get(name) in ("I", "Q")), "")
+
+    def stamps(self, samples: np.ndarray) -> Array:
+        """Give the stamps of messages, s."""
+        return seconds(samples[self.stamp], 0, _STAMPS[self.stamp])
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read all messages, ``MESSAGE.field`` or ``MESSAGE[instance].field``; a part of them takes no less time."""
     del wanted
     content = bytes_of(path)
-    if content.startswith(DATAFLASH_MAGIC):
-        kinds, lost = _find_messages(content)
+    text = re.search(rb"^" + DATAFLASH_TEXT_MAGIC, content[:_HEAD_BYTES], re.MULTILINE)
+    if DATAFLASH_MAGIC in content[:_HEAD_BYTES]:
+        kinds, lost = _find_messages(content, content.index(DATAFLASH_MAGIC))
         tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
-    elif content.startswith(DATAFLASH_TEXT_MAGIC):
-        kinds, tables, lost = _read_lines(content)
+    elif text is not None:
+        kinds, tables, lost = _read_lines(content[text.start() :])
     else:
         raise InputError(f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?)")
     stated = _stated_units(tables, kinds)
+    stamps = _all_stamps(kinds, tables)
     topics = {
         topic: fields
         for kind in kinds.values()
-        if kind.name in tables and kind.stamp
-        for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
+        if kind.name in tables and kind.name in stamps
+        for topic, fields in _topics(kind, tables[kind.name], stamps[kind.name], stated.get(kind.name, {}))
     }
     if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
         raise InputError(f"{path}: {SDLOG2}")
+    if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
+        raise InputError(f"{path}: {_NO_STAMPS}")
     if not topics:
         raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     origin = min(fields[STAMP][0] for fields in topics.values())
@@ -100,19 +119,30 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         parameters.setdefault(_text(name), float(value))
     broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
     begins = {"": float(origin)}
-    said = [
-        (round(float(at) / _STAMPS[stamp] - float(origin), 6), "", plain(_text(own)))
-        for stamp in _STAMPS
-        for at, own in _rows(tables, "MSG", **{stamp: "iu", "Message": "S"})
-    ]
+    texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
+    said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
     lost_bytes = broken if lost else ()
     return LogContents(topics, units, parameters, _system(tables), lost_bytes, flown_at, begins, tuple(said))
 
 
-def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:
+def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:
+    """Give the stamps of messages by kind, s; events without any have those of what was written before them."""
+    held = [kind for kind in kinds.values() if kind.name in tables]
+    stamps = {kind.name: kind.stamps(tables[kind.name]) for kind in held if kind.stamp}
+    late = [kind for kind in held if not kind.stamp and kind.name in _EVENTS]
+    if late and stamps:
+        places = np.concatenate([np.asarray(kind.begins) for kind in held if kind.stamp])
+        order, given = np.argsort(places), np.concatenate([*stamps.values()])
+        for kind in late:
+            before = np.maximum(np.searchsorted(places[order], kind.begins) - 1, 0)
+            stamps[kind.name] = given[order][before]
+    return stamps
+
+
+def _find_messages(content: bytes, place: int) -> tuple[dict[int, _Kind], int]:
     """Note where each message begins, by kind, and count the bytes between messages that are none."""
     kinds = {_OF_FORMATS: _Kind("FMT", {}, _FORMAT)}
-    place, lost = 0, 0
+    lost = place
     while 0 <= place < len(content) - 2:
         kind = kinds.get(content[place + 2]) if content.startswith(_HEAD, place) else None
         end = place + (kind.record.itemsize if kind else 0)
@@ -151,7 +181,7 @@ def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray]
     rows: dict[str, list[tuple[float | bytes, ...]]] = {}
     named: dict[str, _Kind] = {}
     lost = 0
-    for line in content.decode("latin-1").splitlines():
+    for place, line in enumerate(content.decode("latin-1").splitlines()):
         name, *fields = (each.strip() for each in line.split(","))
         kind = named.get(name)
         if name == "FMT" and len(fields) > 4 and fields[0].isdecimal():
@@ -162,6 +192,7 @@ def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray]
             lost += len(line)
         else:
             rows.setdefault(name, []).append(values)
+            kind.begins.append(place)
     tables = {name: np.array(own, dtype=named[name].record) for name, own in rows.items()}
     return kinds, tables, lost
 
@@ -192,15 +223,18 @@ def _values(kind: _Kind, fields: list[str]) -> tuple[float | bytes, ...] | None:
         return None
 
 
-def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Iterator[tuple[str, dict[str, Array]]]:
+def _topics(
+    kind: _Kind, samples: np.ndarray, stamps: Array, units: Mapping[str, str]
+) -> Iterator[tuple[str, dict[str, Array]]]:
     """Give the numbers of one kind of message, each instance of it a topic."""
     instance = next((each for each, unit in units.items() if unit == _INSTANCE), None)
     for number in np.unique(samples[instance]).tolist() if instance else [0]:
-        own = samples[samples[instance] == number] if instance else samples
+        rows = samples[instance] == number if instance else slice(None)
+        own = samples[rows]
         yield (
             f"{kind.name}[{number}]" if number else kind.name,
             {
-                STAMP: seconds(own[kind.stamp], 0, _STAMPS[kind.stamp]),
+                STAMP: np.array(stamps[rows]),
                 **{
                     each: kind.factor(each) * numbers(own[each])
                     for each, letter in kind.letters.items()

@@ -262,6 +262,8 @@ def _curve(found: Found) -> tuple[str, str, str, str]:
     if shape is None:
         if found.flight.accelerometer is None:
             return "no", "the accelerometer is not logged", "also the accelerometer", ""
+        if not np.isfinite(found.flight.specific_force).any():
+            return "no", f"the accelerometer reads {found.flight.reads_at_rest:.2f} g at rest", "", ""
         return "no", "throttle varies too little", "", _PUNCH
     why = f"throttle from {shape.lowest:.2f} to {shape.highest:.2f}"
     return "yes" if shape.exponent.half < _SURE_EXPONENT else "roughly", why, "", ""

@@ -21,6 +21,7 @@ _TABLE: Final = """
     rate      PX4         vehicle_angular_velocity.xyz[{0,1,2}]   1        +++
     rate      PX4         vehicle_attitude.{roll,pitch,yaw}speed  1        +++
     rate      ArduPilot   RATE.{R,P,Y}                            deg      +++
+    rate      ArduPilot   RATE.{Rll,Pit,Yaw}                      deg      +++
     raw       PX4         sensor_gyro.{x,y,z}                     1        +++
     raw       PX4         sensor_combined.gyro_rad[{0,1,2}]       1        +++
     raw       ArduPilot   GYR.Gyr{X,Y,Z}                          1        +++
@@ -28,6 +29,7 @@ _TABLE: Final = """
     output    PX4         vehicle_torque_setpoint.xyz[{0,1,2}]    1        +++
     output    PX4         actuator_controls_0.control[{0,1,2}]    1        +++
     output    ArduPilot   RATE.{R,P,Y}Out                         1        +++
+    output    ArduPilot   RATE.{Rll,Pit,Yaw}Out                   1        +++
     # A pitch is positive with the nose up here, unlike in the gyroscope's axes.
     output    Crazyflie   controller.cmd_{roll,pitch,yaw}         1/65536  +++
     thrust    PX4         vehicle_thrust_setpoint.xyz[{2}]        1        -
@@ -38,6 +40,7 @@ _TABLE: Final = """
     thrust    Crazyflie   controller.{cmd_thrust}                 1/65536  +
     setpoint  PX4         vehicle_rates_setpoint.{roll,pitch,yaw} 1        +++
     setpoint  ArduPilot   RATE.{R,P,Y}Des                         deg      +++
+    setpoint  ArduPilot   RATE.{Rll,Pit,Yaw}Des                   deg      +++
     setpoint  Betaflight  setpoint[{0,1,2}]                       deg      +--
     setpoint  Betaflight  axisRate[{0,1,2}]                       deg      +--
     current   PX4         battery_status.{current_a}              1        +

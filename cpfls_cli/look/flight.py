@@ -97,6 +97,9 @@ class LogFlight:
         In front of the autopilot's filters.
     accelerometer : Samples or None
         Fastest logged specific force, shape (sample, 3), m/s^2.
+    reads_at_rest : float
+        What the accelerometer reads where it stands, in gravity; NaN where that is not known. Where it is wrong,
+        `specific_force` is not known.
     gaps_s : array, shape (gap, 2), s
         Begin and end of each.
     gains : mapping from str to array, shape (3,)
@@ -132,5 +135,6 @@ class LogFlight:
     gyroscope: Samples
     gyroscope_unfiltered: Samples | None = None
     accelerometer: Samples | None = None
+    reads_at_rest: float = np.nan
     gaps_s: Array
     gains: Mapping[str, Array] = field(default_factory=dict)

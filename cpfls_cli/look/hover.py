@@ -23,6 +23,9 @@ from cpfls_cli.result import Estimate, about, part, result
 GRAVITY = 9.80665
 _HOVERS, _CLIMBS = 0.05, 0.3
 """Most difference of the vertical specific force from gravity, share, and climb rate, m/s."""
+_THIN_AIR, _FOR_VOLTAGE = 0.8, "MOT_BAT_VOLT_MAX"
+"""Density of the air at 2000 m over that at sea level, and the parameter of ArduPilot that is above 0 where it adds
+what a battery has lost: commands are no throttle then."""
 _ON_GROUND = 0.5
 """Share of the median thrust below which a vehicle that shows gravity is on the ground."""
 _CURVE_S, _SPREAD, _LEAST_FORCE, _SHARPEST = 0.5, 1.25, 0.2, 0.5
@@ -191,7 +194,12 @@ def _compared(flight: LogFlight, thrust: Estimate) -> Stated | None:
     autopilot = AUTOPILOTS.get(flight.autopilot)
     hover = autopilot.by_role("motors.hover") if autopilot else None
     value = number(flight, hover.name) if hover else None
-    return Stated(parameter=hover.name, value=value, measured=thrust) if hover and value else None
+    if not hover or not value or (number(flight, _FOR_VOLTAGE) or 0) > 0:
+        return None
+    # ArduPilot adds to its throttle what thin air takes from thrust.
+    thin = _THIN_AIR if flight.autopilot == "ardupilot" else 1.0
+    measured = Estimate(value=thrust.value, low=thin * (1 - _HOVERS) * thrust.low, high=(1 + _HOVERS) * thrust.high)
+    return Stated(parameter=hover.name, value=value, measured=measured)
 
 
 def _battery(flight: LogFlight, throttle: Array) -> Battery | None:

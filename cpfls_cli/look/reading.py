@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Final, Literal
 
 import numpy as np
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.motors import ThrustCurve
@@ -33,7 +34,7 @@ from cpfls_cli.flightlog.vehicle_kind import forward_flight
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.units import SPEED_UNITS, known_unit
+from cpfls_cli.units import SPEED_UNITS, STANDARD_GRAVITY, known_unit
 
 _DEGREES: Final = 180 / np.pi
 _MOST_HZ: Final = 1000.0
@@ -51,6 +52,10 @@ _FOLLOWS: Final = 0.6
 
 _DEBUG_GYRO: Final = 6
 """Of Betaflight's debug_mode: what the gyroscope reads before filters, in deg/s."""
+
+_REST_S, _STILL_RAD_S, _MISREADS = 2.0, 0.05, 0.05
+"""How far from a flight, and for how long at least, it stands, s; the rate below which it does; and the share by which
+an accelerometer that reads wrong there shows no hover."""
 
 _LEAST_V, _LARGEST_V = 2.0, 100.0
 """Of any battery of a multirotor."""
@@ -84,6 +89,7 @@ def read_flight(
     if recognition is None:
         with about(name, InputError):
             recognition = recognise(topics, units, parameters, system)
+            return read_flight(name, topics, units, parameters, system, recognition)
     # Commands that are rebuilt stand in a topic of their own.
     rebuilt = recognition.rebuilt
     held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
@@ -116,14 +122,17 @@ class _Reader:
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
         if thrust is not None and float(thrust.values.max()) < ALIVE:
-            raise InputError(f"{self.name}: no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
-        clock = _clock(self.name, rate, driving.command)
+            raise InputError(f"no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
+        clock = _clock(rate, driving.command)
         voltage, current = self._battery()
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
         on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
-        flown = self._flown(clock)
+        flown, on_force = self._flown(clock), on_clock(force, clock, 3)
+        reads = _reads_at_rest(flown, on, on_force, 1 / float(clock[1] - clock[0]))
+        if abs(reads - 1) > _MISREADS:
+            on_force = np.full_like(on_force, np.nan)
         return LogFlight(
             name=self.name,
             autopilot=self.autopilot.name if self.autopilot else "",
@@ -143,7 +152,7 @@ class _Reader:
             current=on_clock(current, clock, 1)[:, 0],
             height=on_clock(height, clock, 1)[:, 0],
             climb_rate=on_clock(climb, clock, 1)[:, 0],
-            specific_force=on_clock(force, clock, 3),
+            specific_force=on_force,
             flown=flown,
             usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
             rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
@@ -154,6 +163,7 @@ class _Reader:
             gyroscope=gyroscope,
             gyroscope_unfiltered=self._unfiltered(gyroscope, rate),
             accelerometer=force,
+            reads_at_rest=reads,
             gaps_s=gaps,
             gains=_gains(self.autopilot, self.parameters),
         )
@@ -165,7 +175,7 @@ class _Reader:
 
     def _nothing_asked(self) -> str:
         faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
-        return f"{self.name}: holds motion, but neither rotors nor anything that was asked of them: {faster}"
+        return f"holds motion, but neither rotors nor anything that was asked of them: {faster}"
 
     def signal(self, name: SignalName) -> Samples | None:
         """Give what is recognised, in SI, that of the body in axes forward, right, down; None where it is not."""
@@ -188,7 +198,7 @@ class _Reader:
         if found is None:
             faster = log_faster("body rates", FAST_HZ, self.system, parameters=self.parameters)
             held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
-            raise InputError(f"{self.name}: a log without a gyroscope (it holds {held}): {faster}")
+            raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 
     def _rate(self, gyroscope: Samples) -> Samples:
@@ -313,12 +323,12 @@ class _Reader:
 # Clocks.
 
 
-def _clock(name: str, rate: Samples, command: Samples | None) -> Array:
+def _clock(rate: Samples, command: Samples | None) -> Array:
     both = [rate] if command is None else [rate, command]
     hz = min(_MOST_HZ, 2 * min(own.rate_hz for own in both))
     begin, end = max(own.time[0] for own in both), min(own.time[-1] for own in both)
     if end - begin < 2 / hz:
-        raise InputError(f"{name}: body rates and commands are not logged at the same time")
+        raise InputError("body rates and commands are not logged at the same time")
     return np.arange(begin, end, 1 / hz)
 
 
@@ -336,6 +346,16 @@ def _gaps(*signals: Samples | None) -> Array:
         else:
             joined.append([begin, end])
     return np.array(joined, dtype=float).reshape(-1, 2)
+
+
+def _reads_at_rest(flown: BoolArray, rate: Array, force: Array, rate_hz: float) -> float:
+    """Give the size of what an accelerometer reads while it stands, in gravity; NaN where it never does for long."""
+    near = binary_dilation(flown, iterations=max(1, round(_REST_S * rate_hz)))
+    still = np.linalg.norm(rate - np.nanmedian(rate, axis=0), axis=1) < _STILL_RAD_S
+    # Noise and vibration make a force longer, and not its mean.
+    mean = uniform_filter1d(np.nan_to_num(force), max(1, round(rate_hz)), axis=0)
+    sizes = np.linalg.norm(mean, axis=1)[~near & still & np.isfinite(force).all(axis=1)]
+    return float(np.median(sizes)) / STANDARD_GRAVITY if len(sizes) > _REST_S * rate_hz else np.nan
 
 
 def _within(clock: Array, spans: Array, around_s: float) -> BoolArray:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.flightlog.names import is_of
@@ -32,9 +32,19 @@ _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
 """Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
 that make it one; and how long a rotor is there, s."""
 
+_LIES, _LIES_S, _HARD, _HARD_S = -0.7, 1.0, 3.0, 1.5
+"""Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity, and how
+long before the end of a flight it may come, s."""
+
+_READS: Final = 0.12
+"""By which an accelerometer at rest may differ from gravity, share of it: the largest offset by its data sheets."""
+
 _UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.2, 0.17, 0.25, 0.15, 1.0
 """How long it is on its back; shares of the voltage, from 4.2 to 3.5 V a cell, over s; and what is lost within s at the
 end of a log that stops in the air."""
+
+_CLIMBS_S: Final = 10.0
+"""Between the autopilot's word for take-off and a height that is surely none of the ground, s."""
 
 _NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
 """By which the autopilot's word for take-off and landing is near that of the signals; by which a clock falls back that
@@ -47,8 +57,8 @@ vehicle below which nothing does."""
 _TRAILS_S: Final = 3.0
 """After a flight that ended early, while what happens still belongs to it, s."""
 
-_MOST_OF_A_KIND: Final = 4
-"""Events of one kind that are listed one by one."""
+_MOST_OF_A_KIND, _MOST_KEPT = 4, 12
+"""Events of one kind that are listed one by one, and of those kinds that matter most."""
 
 _NAV_STATES: Final = """
     manual, altitude, position, mission, hold, return, position slow, , , , acro, , descend, termination, offboard,
@@ -102,6 +112,7 @@ _COPTER_ERRORS: Final = {
     30: "internal error",
     31: "failsafe: dead reckoning",
 }
+_CRASHED, _THRUST_LOST = 12, 25
 _FAILSAFE_PHASES: Final = {1: "radio lost", 2: "landing", 3: "landed", 4: "radio awaited", 6: "rescue by GPS"}
 _BANNER: Final = re.compile(
     r"^(ArduCopter|APM:|PX4: |ChibiOS|NuttX|Frame: |New (mission|rally|fence)|Flight plan|GPS \d: (detected|probing)"
@@ -152,6 +163,7 @@ def timeline(
         *_told(messages),
         *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
+        *_misread(flight),
         *_on_its_back(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_battery(flight),
     ]
@@ -173,18 +185,32 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         begin, end = float(flight.time[first]), float(flight.time[after - 1])
         yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
         lifted, landed = _nearest(lifts, begin), _nearest(lands, end)
+        if lifted is None:
+            # What climbs far is surely off the ground long after it has left it.
+            earlier = [at for at in lifts if begin - _CLIMBS_S < at < begin and at > flight.time[max(before - 1, 0)]]
+            lifted = max(earlier, default=None)
         if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _rests(flight, slice(before, first))):
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
             continue
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows))):
-            yield Event(time_s=end if landed is None else landed, kind="landing", text="lands")
+            yield _landing(flight, end, end if landed is None else landed)
         elif last - end < _AT_END_S and _carries(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
     for what, at in ends:
         words, severity = _MOMENTS[what]
         yield Event(time_s=at, kind=what, text=words, severity=severity)
+
+
+def _landing(flight: LogFlight, end: float, at: float) -> Event:
+    sensor = flight.accelerometer
+    if sensor is not None:
+        rows = (sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S)
+        most = float(np.linalg.norm(sensor.values[rows], axis=1).max(initial=0.0)) / STANDARD_GRAVITY
+        if most > _HARD:
+            return Event(time_s=at, kind="landing", text=f"lands hard, with {most:.2g} g", severity="warning")
+    return Event(time_s=at, kind="landing", text="lands")
 
 
 def _carried_by(flight: LogFlight) -> float:
@@ -298,7 +324,8 @@ def _of_ardupilot(topics: Topics) -> Iterator[Event]:
         # Of 0 an error is over.
         if error is not None and code:
             kind = "failsafe" if error.startswith("failsafe") else "error"
-            yield Event(time_s=at, kind=kind, text=error, severity="danger" if kind == "failsafe" else "warning")
+            worst = kind == "failsafe" or number in (_CRASHED, _THRUST_LOST)
+            yield Event(time_s=at, kind=kind, text=error, severity="danger" if worst else "warning")
 
 
 def _of_betaflight(topics: Topics) -> Iterator[Event]:
@@ -387,6 +414,13 @@ def _clipped(sensor: Samples, scales: Sequence[float], name: str) -> Iterator[Ev
             )
 
 
+def _misread(flight: LogFlight) -> Iterator[Event]:
+    reads = flight.reads_at_rest
+    if abs(reads - 1) > _READS:
+        text = f"the accelerometer reads {reads:.2f} g at rest: calibrate it"
+        yield Event(time_s=float(flight.time[0]), kind="calibration", text=text, severity="warning")
+
+
 def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
     for begin, end in flight.gaps_s[(flight.gaps_s[:, 1] - flight.gaps_s[:, 0]) > _LONG_GAP_S].tolist():
         rows = (flight.time >= begin) & (flight.time <= end)
@@ -422,9 +456,17 @@ def _counted(topics: Topics) -> Iterator[Event]:
 
 def _on_its_back(flight: LogFlight, after_s: float) -> Iterator[Event]:
     up = np.cos(flight.attitude[:, 0]) * np.cos(flight.attitude[:, 1])
+    width = max(1, round(_LIES_S * flight.rate_hz))
     with np.errstate(invalid="ignore"):
-        for begin, end in _held(flight.time, (up < 0) & _flown_or_after(flight, flight.time, after_s), _UPSIDE_DOWN_S):
-            yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
+        over = up < 0
+        # By its attitude and by its weight.
+        force = uniform_filter1d(-np.nan_to_num(flight.specific_force[:, 2]), width)
+        lies = over & (force < _LIES * STANDARD_GRAVITY)
+    for begin, end in _held(flight.time, lies, _LIES_S):
+        yield Event(time_s=begin, until_s=end, kind="lies", text="lies on its back", severity="warning")
+    flips = over & ~binary_dilation(lies, iterations=width) & _flown_or_after(flight, flight.time, after_s)
+    for begin, end in _held(flight.time, flips, _UPSIDE_DOWN_S):
+        yield Event(time_s=begin, until_s=end, kind="upside down", text="upside down")
 
 
 def _battery(flight: LogFlight) -> Iterator[Event]:
@@ -447,9 +489,9 @@ def _battery(flight: LogFlight) -> Iterator[Event]:
 def _merged(found: Sequence[Event]) -> Iterator[Event]:
     for kind in dict.fromkeys(event.kind for event in found):
         own = sorted((event for event in found if event.kind == kind), key=lambda event: event.time_s)
-        if kind == "message":
+        if kind in ("message", "error", "failsafe"):
             yield from _same_texts(own)
-        elif len(own) <= _MOST_OF_A_KIND or kind in _KEPT:
+        elif len(own) <= (_MOST_KEPT if kind in _KEPT else _MOST_OF_A_KIND):
             yield from own
         else:
             yield _as_one(own, _in_words(kind, own))
@@ -471,8 +513,10 @@ def _in_words(kind: str, many: Sequence[Event]) -> str:
     if kind == "mode":
         names = dict.fromkeys(event.text.removeprefix("mode ") for event in many)
         return f"the mode changes {len(many) - 1} times: {', '.join(names)}"
+    lengths = [event.until_s - event.time_s for event in many]
+    if kind == "pause":
+        return f"nothing is logged {len(many)} times, for {sum(lengths):.0f} s in all"
     if kind == "gap":
-        lengths = [event.until_s - event.time_s for event in many]
         return f"{len(many)} gaps, {sum(lengths):.2g} s in all, {max(lengths):.2g} s at most"
     return f"{many[0].text}, {len(many)} times"
 

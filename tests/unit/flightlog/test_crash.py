@@ -172,3 +172,13 @@ def test_a_rotor_that_weakens_high_up_rests_on_nothing(own):
 def test_a_flip_before_landing_is_no_crash(own, known):
     landed = ended.then(ended.joined(own, ended.flips(flight(7.0))), 5.0, roll=0.0)
     assert flown(landed, known).ended == ""
+
+
+def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
+    bench = type(own)(**vars(own))
+    bench.angles, bench.rate = own.angles.copy(), own.rate.copy()
+    bench.angles[:, 0], bench.rate[:, 0] = 0.6 * own.time, 0.6
+    bench.specific_force = np.tile([0.0, 0.0, 9.81], (len(own.time), 1))
+    found = flown(bench, ("force", "upright"))
+    assert not found.flies
+    assert found.reasons[0].startswith("no flight in it: by its attitude it lies on its back for seconds")

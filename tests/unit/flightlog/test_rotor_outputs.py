@@ -41,9 +41,10 @@ def gimbal(own):
     return 1500 + 400 * own.angles[:, 0] + np.random.default_rng(1).normal(size=len(own.time))
 
 
-def test_the_outputs_of_an_older_copter_are_rotors_in_the_form_of_its_frame(own):
-    proposal = proposed(copter(own, pulses(own), "Ch"), "ArduCopter 3.3", {"FRAME": 1.0})
-    assert maps(proposal)["rotor_command"].columns == ("RCOU.Ch1", "RCOU.Ch2", "RCOU.Ch3", "RCOU.Ch4")
+@pytest.mark.parametrize("name", ["Ch", "Chan"])
+def test_the_outputs_of_an_older_copter_are_rotors_in_the_form_of_its_frame(own, name):
+    proposal = proposed(copter(own, pulses(own), name), "ArduCopter 3.3", {"FRAME": 1.0})
+    assert maps(proposal)["rotor_command"].columns == tuple(f"RCOU.{name}{number}" for number in range(1, 5))
     assert not proposal.airframe.is_guess
     assert proposal.airframe.reason == "FRAME = 1 in the log: quad X"
 

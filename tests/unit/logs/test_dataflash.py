@@ -160,3 +160,45 @@ def test_broken_lines_of_text_are_counted_and_left_out(read):
     assert "IMU" not in contents.topics
     assert "IMU[1]" in contents.topics
     assert contents.warnings[0].endswith("the file is damaged in places; what could be read is used")
+
+
+OLD = {
+    "IMU": ("If", "TimeMS,GyrX"),
+    "GPS": ("BIHI", "Status,TimeMS,Week,T"),
+    "EV": ("B", "Id"),
+    "MSG": ("Z", "Message"),
+    "PARM": ("Nf", "Name,Value"),
+}
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_old_events_are_stamped_as_what_comes_before_them(read, text):
+    rows = [
+        ("IMU", (5_000, 0.5)),
+        ("EV", (10,)),
+        ("IMU", (5_100, 0.5)),
+        ("GPS", (3, 403_392_200, 1817, 5_150)),
+        ("EV", (11,)),
+        ("MSG", (b"ArduCopter V3.2.1",)),
+        ("IMU", (5_200, 0.5)),
+    ]
+    contents = read(dataflash(OLD, rows, text=text))
+    assert contents.topics["EV"]["timestamp"].tolist() == [0.0, 0.15]
+    assert contents.messages == ((0.15, "", "ArduCopter V3.2.1"),)
+    # Of GPS the time of its week makes a date, and the log's own clock a stamp.
+    assert contents.topics["GPS"]["timestamp"].tolist() == [0.15]
+    assert contents.flown_at == pytest.approx(315_964_782 + 604_800 * 1817 + 403_392.2 - 0.15, abs=0.01)
+
+
+@pytest.mark.parametrize(("text", "before"), [(False, b"\xa5" * 64), (True, b"58\r\n\r\nArduCopter V3.0.1\r\n")])
+def test_a_log_may_begin_late(read, text, before):
+    late, whole = read(before + log(text=text)), read(log(text=text))
+    assert late.topics.keys() == whole.topics.keys()
+    assert len(late.warnings) == (not text)
+
+
+@pytest.mark.parametrize("more", [[], [("GPS", (3, 1, 1817, 2))]])
+def test_attitudes_without_stamps(read, more):
+    kinds = {"ATT": ("cc", "RollIn,Roll"), "EV": OLD["EV"], "GPS": OLD["GPS"], "PARM": OLD["PARM"], "MSG": OLD["MSG"]}
+    with pytest.raises(InputError, match="have no time stamps, as ArduCopter to 3"):
+        read(dataflash(kinds, [("ATT", (1, 2)), ("EV", (10,)), *more]))

@@ -115,6 +115,13 @@ def test_stated_hover_is_compared_as_thrust():
     assert hover.stated.parameter == "MOT_THST_HOVER"
     assert hover.stated.measured.value == pytest.approx(0.16)
     assert hover.stated.differs
+    # Thin air and force within 5 % of gravity: no finding.
+    for value, differs in ((0.14, False), (0.12, True), (0.165, False)):
+        known = stated | {"MOT_THST_HOVER": value}
+        assert hover_of(still_flight(60.0, RATE, autopilot="ardupilot", parameters=known)).stated.differs == differs
+    # What it adds for a battery is in the commands, and not in its throttle.
+    added = stated | {"MOT_BAT_VOLT_MAX": 16.8}
+    assert hover_of(still_flight(60.0, RATE, autopilot="ardupilot", parameters=added)).stated is None
     asked = still_flight(60.0, RATE, autopilot="ardupilot", parameters=stated, rotors=NO_ROTORS)
     assert hover_of(asked).stated.measured.value == pytest.approx(0.4)
 

@@ -126,8 +126,9 @@ def test_setpoint_of_betaflight_3_follows_from_its_error():
     np.testing.assert_allclose(found.rate_setpoint, on(found, np.radians(asked) @ FLIP), atol=1e-4)
 
 
-def test_rates_in_hundredths_of_old_logs():
-    own = {name: 100 * np.degrees(value) for name, value in named(OWN.rate @ FLIP, "R", "P", "Y").items()}
+@pytest.mark.parametrize("names", [("R", "P", "Y"), ("Rll", "Pit", "Yaw")])
+def test_rates_in_hundredths_of_old_logs(names):
+    own = {name: 100 * np.degrees(value) for name, value in named(OWN.rate @ FLIP, *names).items()}
     own |= {f"{name}Des": value for name, value in own.items()}
     found = read(logs.ardupilot(OWN, more={"RATE": topic(OWN, 1, own)}))
     np.testing.assert_allclose(found.rate_setpoint, on(found, OWN.rate @ FLIP), atol=1e-6)
@@ -206,7 +207,7 @@ def test_a_log_without_a_gyroscope():
     contents = logs.px4(OWN)
     for name in ("sensor_combined", "vehicle_angular_velocity"):
         del contents.topics[name]
-    with pytest.raises(InputError, match=r"log: a log without a gyroscope.*SDLOG_PROFILE"):
+    with pytest.raises(InputError, match=r"^log: a log without a gyroscope.*SDLOG_PROFILE"):
         read(contents)
 
 

@@ -104,7 +104,7 @@ def test_a_crash_tells_its_moments():
         ("impact", 40)
     ]
     assert not of(found, "landing")
-    assert of(found, "upside down")
+    assert of(found, "lies") == [(40.7, "lies on its back")]
     assert next(event for event in found if event.kind == "impact").severity == "danger"
     stops = events(logs.px4(ended.stops_in_the_air(flight(seconds=40.0))))
     assert of(stops, "rotors stop in the air") == [(40.0, "rotors stop in the air")]
@@ -188,3 +188,47 @@ def test_readers_give_messages(tmp_path):
         ulog([(0, 0, [1.0]), (10_000, 0, [2.0])], {"x": "uint64_t timestamp;float a"}) + message("L", said)
     )
     assert log_contents(path).messages == ((1.5, "WARNING", "Low battery"),)
+
+
+def test_a_hard_landing():
+    own = with_ground(flight(seconds=20.0))
+    own.specific_force[np.abs(own.time - 25.1) < 0.02] = [0.0, 0.0, 60.0]
+    found = events(logs.ardupilot(own))
+    assert [(event.text, event.severity) for event in found if event.kind == "landing"] == [
+        ("lands hard, with 6.1 g", "warning")
+    ]
+
+
+def test_what_tips_over_long_after_it_landed():
+    tipped = ended.then(HOP, 5.0, felt=ended.UPSIDE_DOWN, roll=np.pi)
+    (begin, text), *more = of(events(logs.ardupilot(tipped)), "lies")
+    assert (round(begin), text, more) == (round(HOP.time[-1]), "lies on its back", [])
+    # Turned over by its attitude, and upright by its weight, it has not moved.
+    assert not of(events(logs.ardupilot(ended.then(HOP, 5.0, roll=np.pi))), "lies")
+
+
+def test_an_accelerometer_that_reads_wrong_shows_no_hover():
+    own = flight(seconds=20.0)
+    own.specific_force[0] = [0.0, 0.0, 9.80665]
+    assert read(logs.ardupilot(with_ground(own)))[0].reads_at_rest == pytest.approx(1.0, abs=0.01)
+    own.specific_force = 0.79 * own.specific_force
+    contents = logs.ardupilot(with_ground(own))
+    assert [text for _, text in of(events(contents), "calibration")] == [
+        "the accelerometer reads 0.79 g at rest: calibrate it"
+    ]
+    assert not np.isfinite(read(contents)[0].specific_force).any()
+
+
+def test_the_autopilots_word_for_take_off_may_come_long_before():
+    """A flight is surely off the ground at a tenth of its height."""
+    contents = logs.ardupilot(HOP, more={"EV": state([1.0], Id=[28])})
+    assert of(events(contents), "take-off") == [(1.0, "takes off")]
+
+
+def test_errors_that_come_again_are_one_line_and_a_crash_is_no_note():
+    more = {"ERR": state([8, 12, 16], Subsys=[25, 25, 12], ECode=[1, 1, 1])}
+    found = [event for event in events(logs.ardupilot(HOP, more=more)) if event.kind == "error"]
+    assert [(event.text.partition(":")[0], event.text[-7:], event.severity) for event in found] == [
+        ("thrust loss", "2 times", "danger"),
+        ("crash check", "crashed", "danger"),
+    ]
