@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot, version_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.errors import InputError, about
+from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.conversion import (
     BodyFrame,
@@ -52,8 +52,8 @@ _FOLLOWS: Final = 0.6
 _DEBUG_GYRO: Final = 6
 """Of Betaflight's debug_mode: what the gyroscope reads before filters, in deg/s."""
 
-_LEAST_V, _LARGEST_V = 2.0, 100.0
-"""Of any battery of a multirotor."""
+_LEAST_V, _LARGEST_V, _LEAST_W = 2.0, 100.0, 3.0
+"""Of any battery of a multirotor; and the power of a flight below which a current is none: one of 27 g takes 7 W."""
 _BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
@@ -81,9 +81,7 @@ def read_flight(
     InputError
         If the log holds no flight of a multirotor, or no body rates: what it is, and what would tell.
     """
-    if recognition is None:
-        with about(name, InputError):
-            recognition = recognise(topics, units, parameters, system)
+    recognition = recognition or recognise(topics, units, parameters, system)
     # Commands that are rebuilt stand in a topic of their own.
     rebuilt = recognition.rebuilt
     held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
@@ -106,8 +104,8 @@ class _Reader:
         speeds = self.signal("rotor_speed")
         guess = self.recognition.signal("rotor_command")
         commands = self.signal("rotor_command")
-        if commands is not None and guess is not None and guess.columns.unit in SPEED_UNITS:
-            commands = as_shares(commands)
+        asks_speeds = guess is not None and guess.columns.unit in SPEED_UNITS
+        commands = as_shares(commands) if commands is not None and asks_speeds else commands
         rotors = Rotors(commands, guess, self._airframe(), speeds)
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
@@ -116,14 +114,14 @@ class _Reader:
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
         if thrust is not None and float(thrust.values.max()) < ALIVE:
-            raise InputError(f"{self.name}: no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
-        clock = _clock(self.name, rate, driving.command)
-        voltage, current = self._battery()
+            raise InputError(f"no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
+        clock = _clock(rate, driving.command)
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
         on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
         flown = self._flown(clock)
+        voltage, current = self._load(clock, flown)
         return LogFlight(
             name=self.name,
             autopilot=self.autopilot.name if self.autopilot else "",
@@ -139,11 +137,12 @@ class _Reader:
             attitude_setpoint=on_clock(asked, clock, 3),
             attitude=on_clock(attitude, clock, 3),
             collective=on_clock(thrust and _mean(thrust), clock, 1)[:, 0],
-            voltage=on_clock(voltage, clock, 1)[:, 0],
-            current=on_clock(current, clock, 1)[:, 0],
+            voltage=voltage,
+            current=current,
             height=on_clock(height, clock, 1)[:, 0],
             climb_rate=on_clock(climb, clock, 1)[:, 0],
             specific_force=on_clock(force, clock, 3),
+            relative=asks_speeds or (speeds is not None and thrust is not None and thrust.source == speeds.source),
             flown=flown,
             usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
             rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
@@ -165,7 +164,7 @@ class _Reader:
 
     def _nothing_asked(self) -> str:
         faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
-        return f"{self.name}: holds motion, but neither rotors nor anything that was asked of them: {faster}"
+        return f"holds motion, but neither rotors nor anything that was asked of them: {faster}"
 
     def signal(self, name: SignalName) -> Samples | None:
         """Give what is recognised, in SI, that of the body in axes forward, right, down; None where it is not."""
@@ -188,7 +187,7 @@ class _Reader:
         if found is None:
             faster = log_faster("body rates", FAST_HZ, self.system, parameters=self.parameters)
             held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
-            raise InputError(f"{self.name}: a log without a gyroscope (it holds {held}): {faster}")
+            raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 
     def _rate(self, gyroscope: Samples) -> Samples:
@@ -258,6 +257,13 @@ class _Reader:
             voltage, current = (own and own._replace(values=own.values / 100) for own in (voltage, current))
         return None if level < _LEAST_V else voltage, current
 
+    def _load(self, clock: Array, flown: BoolArray) -> tuple[Array, Array]:
+        """Give voltage and current on a clock; a current that carries no vehicle is not known."""
+        voltage, current = (on_clock(own, clock, 1)[:, 0] for own in self._battery())
+        power = (voltage * current)[flown & np.isfinite(voltage * current)]
+        none = len(power) > 0 and float(np.median(power)) < _LEAST_W
+        return voltage, np.full_like(current, np.nan) if none else current
+
     # Where it is.
 
     def _attitudes(self) -> tuple[Samples | None, Samples | None]:
@@ -313,12 +319,12 @@ class _Reader:
 # Clocks.
 
 
-def _clock(name: str, rate: Samples, command: Samples | None) -> Array:
+def _clock(rate: Samples, command: Samples | None) -> Array:
     both = [rate] if command is None else [rate, command]
     hz = min(_MOST_HZ, 2 * min(own.rate_hz for own in both))
     begin, end = max(own.time[0] for own in both), min(own.time[-1] for own in both)
     if end - begin < 2 / hz:
-        raise InputError(f"{name}: body rates and commands are not logged at the same time")
+        raise InputError("body rates and commands are not logged at the same time")
     return np.arange(begin, end, 1 / hz)
 
 

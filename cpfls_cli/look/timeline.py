@@ -44,6 +44,9 @@ _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 """Of a flight that signals leave out near the ground, and at the end of a log, s; and the share of what carries the
 vehicle below which nothing does."""
 
+_MOVES_M_S: Final = 0.5
+"""Climb rate of what surely does not stand, though its estimate drifts."""
+
 _TRAILS_S: Final = 3.0
 """After a flight that ended early, while what happens still belongs to it, s."""
 
@@ -157,6 +160,13 @@ def timeline(
     ]
     # What held before the log began is stamped before it.
     found = [replace(event, time_s=max(event.time_s, 0.0)) for event in found]
+    # On the ground a failsafe keeps it there.
+    found = [
+        replace(event, severity="note")
+        if event.kind == "failsafe" and not _near_flight(flight, event.time_s)
+        else event
+        for event in found
+    ]
     return tuple(sorted(_merged(found), key=lambda event: (event.time_s, event.kind)))
 
 
@@ -193,10 +203,17 @@ def _carried_by(flight: LogFlight) -> float:
     return float(np.median(flown)) if len(flown) else np.nan
 
 
+def _near_flight(flight: LogFlight, at: float) -> bool:
+    return bool(flight.flown[(flight.time > at - _NEAR_S) & (flight.time < at + _NEAR_S)].any())
+
+
 def _rests(flight: LogFlight, part: slice) -> bool:
-    """Tell whether rotors anywhere in a part of the log give much less than in flight."""
-    known = flight.collective[part][np.isfinite(flight.collective[part])]
-    return len(known) > 0 and float(known.min()) < _LESS * _carried_by(flight)
+    """Tell whether rotors in a part of the log give much less than in flight, and it mostly keeps its height."""
+    with np.errstate(invalid="ignore"):
+        less = flight.collective[part] < _LESS * _carried_by(flight)
+    climbs = np.abs(flight.climb_rate[part][less])
+    climbs = climbs[np.isfinite(climbs)]
+    return bool(less.any()) and not (len(climbs) > 0 and float(np.median(climbs)) > _MOVES_M_S)
 
 
 def _carries(flight: LogFlight) -> bool:
@@ -333,7 +350,7 @@ def _limits(flight: LogFlight, after_s: float) -> Iterator[Event]:
     scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
     if flight.accelerometer is not None:
         yield from _clipped(flight.accelerometer, scales, "accelerometer")
-    if len(flight.rotors.time) and flight.rotors_source == "logged":
+    if len(flight.rotors.time) and flight.rotors_source == "logged" and not flight.relative:
         yield from _at_limit(flight, after_s)
 
 
