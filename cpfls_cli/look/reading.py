@@ -52,8 +52,9 @@ _FOLLOWS: Final = 0.6
 _DEBUG_GYRO: Final = 6
 """Of Betaflight's debug_mode: what the gyroscope reads before filters, in deg/s."""
 
-_LEAST_V, _LARGEST_V, _LEAST_W = 2.0, 100.0, 3.0
-"""Of any battery of a multirotor; and the power of a flight below which a current is none: one of 27 g takes 7 W."""
+_LEAST_V, _LARGEST_V, _LEAST_A = 2.0, 100.0, 1.0
+"""Of any battery of a multirotor; and the current below which none flies: one of 27 g takes 2 A of one cell, and more
+cells are for larger ones."""
 _BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
@@ -260,8 +261,8 @@ class _Reader:
     def _load(self, clock: Array, flown: BoolArray) -> tuple[Array, Array]:
         """Give voltage and current on a clock; a current that carries no vehicle is not known."""
         voltage, current = (on_clock(own, clock, 1)[:, 0] for own in self._battery())
-        power = (voltage * current)[flown & np.isfinite(voltage * current)]
-        none = len(power) > 0 and float(np.median(power)) < _LEAST_W
+        known = current[flown & np.isfinite(current)]
+        none = len(known) > 0 and float(np.median(known)) < _LEAST_A
         return voltage, np.full_like(current, np.nan) if none else current
 
     # Where it is.

@@ -294,10 +294,11 @@ def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event
 
 
 def _arming(changes: Iterator[tuple[float, float]]) -> Iterator[Event]:
-    last = 0.0
+    last: float | None = None
     for at, value in changes:
-        if value != last:
-            yield Event(time_s=at, kind="armed", text="armed" if value else "disarmed")
+        text = "armed" if value else "disarmed"
+        if value or last:
+            yield Event(time_s=at, kind="armed", text=text if last is not None else "armed when the log begins")
         last = value
 
 
@@ -424,14 +425,15 @@ def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
 
 def _counted(topics: Topics) -> Iterator[Event]:
     """Read the counters of clipped readings that autopilots keep."""
-    of_px4 = [f"accel_clipping[{axis}]" for axis in range(3)]
-    for topic, names in (("VIBE", ["Clip0", "Clip1", "Clip2", "Clip"]), ("vehicle_imu_status", of_px4)):
+    of_px4 = {f"accel_clipping[{axis}]": label for axis, label in enumerate("xyz")}
+    of_ardupilot = {name: name for name in ("Clip0", "Clip1", "Clip2", "Clip")}
+    for topic, names in (("VIBE", of_ardupilot), ("vehicle_imu_status", of_px4)):
         counted = {name: _field(topics, topic, name) for name in names}
         rises = {name: np.diff(count) for name, (_, count) in counted.items() if len(count) > 1}
         rises = {name: own for name, own in rises.items() if (own > 0).any()}
         if rises:
             where = [(counted[name][0][:-1][own > 0], counted[name][0][1:][own > 0]) for name, own in rises.items()]
-            each = ", ".join(f"{name} {int(own[own > 0].sum())}" for name, own in rises.items())
+            each = ", ".join(f"{names[name]} {int(own[own > 0].sum())}" for name, own in rises.items())
             begin, end = min(float(a[0]) for a, _ in where), max(float(b[-1]) for _, b in where)
             text = f"accelerometers clip ({topic}: {each} times)"
             yield Event(time_s=begin, until_s=end, kind="clipping", text=text, severity="warning")

@@ -58,6 +58,12 @@ def test_what_px4_states():
     }
     told = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
     found = events(logs.px4(HOP, more=more), told)
+    on = {"actuator_armed": state([0, 27], armed=[1, 0])}
+    assert of(events(logs.px4(HOP, more=on)), "armed") == [(0.0, "armed when the log begins"), (27.0, "disarmed")]
+    counted = {
+        "vehicle_imu_status": state([6, 7, 8], **{f"accel_clipping[{axis}]": [0, axis, axis] for axis in range(3)})
+    }
+    assert of(events(logs.px4(HOP, more=counted)), "clipping")[0][1].endswith("(vehicle_imu_status: y 1, z 2 times)")
     assert of(found, "take-off") == [(5.9, "takes off")]
     assert of(found, "landing") == [(24.2, "lands")]
     assert of(found, "armed") == [(4.5, "armed"), (27.0, "disarmed")]
