@@ -22,7 +22,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import file_of, parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
@@ -118,7 +118,8 @@ def run_log(
 ) -> Outcome:
     """Find gains from one log alone, and write those that change where a file is named."""
     contents = log_contents(log)
-    flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
+    with about(log, InputError):
+        flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
     if dry_run:
         return Outcome({"dry_run": True}, (Text(f"{log}: is a log of a multirotor; nothing is computed"),))
     return of_flight(flight, effectiveness(flight), output, asked, force=force)

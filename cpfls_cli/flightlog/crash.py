@@ -267,6 +267,7 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
         return EarlyEnd(after, what, (("rests with its rotors on", at),))
     if stops:
         hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
+        hit = _first_jolt(signs, part) if hit is None else hit
         onto = "" if hit is None else f", impact at {signs.time[hit]:.1f} s"
         moments = [("rotors stop in the air", float(signs.time[after]))]
         moments += [] if hit is None else [("impact", float(signs.time[hit]))]
@@ -372,6 +373,16 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
         light = np.linalg.norm(signs.felt[second], axis=1) < _FALLS
         return any((b - a) * signs.period >= _FALL_S for a, b in runs(light))
     return False
+
+
+def _first_jolt(signs: Signs, part: tuple[int, int]) -> int | None:
+    """Find where a vehicle whose rotors stopped hits, by a force that its flight never had; None where it does not."""
+    if signs.felt is None:
+        return None
+    size, after = np.linalg.norm(signs.felt, axis=1), part[1]
+    least = max(_HARD, _BEYOND * float(size[slice(*part)].max()))
+    struck = np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
+    return after + int(struck[0]) if len(struck) else None
 
 
 def _falls(signs: Signs) -> list[tuple[int, int]]:

@@ -422,7 +422,7 @@ def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int
 
 def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
     size = np.abs(values)
-    level = float(np.median(size[size > 0.3 * float(size.max())]))
+    level = float(np.median(size[size >= 0.3 * float(size.max())]))
     called = f"called {named.group.pattern}, {level:.4g} in flight"
     if _is_electric(named):
         factor = 100.0 if named.known == "Betaflight" else 1.0

@@ -20,6 +20,13 @@ _UNPACK: Final = "unpack it first, and give the log inside"
 _CONVERT_TLOG: Final = (
     "telemetry is too slow for a model; give the log that the autopilot writes itself (.bin of ArduPilot, .ulg of PX4)"
 )
+_SLOW: Final = (
+    "it comes twice a second or so, which is too slow; give the log that the flight controller writes itself (.bbl,"
+    " .bin, .ulg)"
+)
+_CONVERT_SDLOG2: Final = (
+    "convert it to CSV with sdlog2_dump.py of that firmware, or update the firmware, which then writes .ulg"
+)
 _TABLE: Final = (
     _Foreign(b"#ROSBAG V", "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
     _Foreign(b"PK\x03\x04", "a zip archive", _UNPACK),
@@ -33,6 +40,7 @@ _TABLE: Final = (
     _Foreign(b"\x93NUMPY", "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
     _Foreign(b"version https://git-lfs", "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     _Foreign(b"BUILD", "a .DAT of DJI", "convert it to CSV with DatCon or its like", 16),
+    _Foreign(b"\xa3\x95\x80", "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
     _Foreign(b"%PDF", "a PDF", "give the log that it shows"),
     _Foreign(b"\x89PNG", "a picture", "give the log that it shows"),
     _Foreign(b"\xff\xd8\xff", "a picture", "give the log that it shows"),
@@ -45,7 +53,10 @@ _TEXTS: Final = (
     (rb"(?s:<.*)?<kml\b", "a KML track", _TRACK),
     (rb"<!doctype html|<html\b", "a web page", "the download gave a page in the place of the log; save the log itself"),
     (rb"<\?xml", "XML", _AS_CSV),
+    (rb"\[\d{4}-\d\d-\d\d[ t]", "text with a stamp in brackets before each line", _AS_CSV),
     (rb"[{\[]", "JSON", _AS_CSV),
+    (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
+    (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
@@ -82,7 +93,4 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)
 
 
-SDLOG2: Final = (
-    "a log of PX4 before ULog (sdlog2), and no log that can be read: convert it to CSV with sdlog2_dump.py of that"
-    " firmware, or update the firmware, which then writes .ulg"
-)
+SDLOG2: Final = f"a log of PX4 before ULog (sdlog2), and no log that can be read: {_CONVERT_SDLOG2}"

@@ -17,6 +17,7 @@ from cpfls_cli.look.gains import TunedGains
 from cpfls_cli.look.gusts import AxisGusts
 from cpfls_cli.look.hover import Hover
 from cpfls_cli.look.loop import AxisLoop
+from cpfls_cli.look.steady import FEWEST_WINDOWS, WINDOW_S
 from cpfls_cli.look.vibration import Vibration
 from cpfls_cli.result import about, result
 from cpfls_cli.words import joined
@@ -35,6 +36,7 @@ _WHOLE_SPECTRUM_HZ = 900.0
 _SOME_SPECTRUM_HZ = 150.0
 _LEAST_HZ = 200.0
 """Rate that is asked for where no parameter of the autopilot is known that sets it."""
+_LEAST_S = FEWEST_WINDOWS * WINDOW_S
 _SLOWEST_HZ = 20.0
 """Rate of body rates and commands below which no loop of a multirotor can be seen."""
 _SURE_SHARE, _SURE_HOVER, _SURE_EXPONENT = 0.05, 0.03, 0.3
@@ -162,7 +164,7 @@ def _balance(found: Found) -> tuple[str, str, str, str]:
         return "no", "commands of the rotors are not logged", "also rotor commands", ""
     shares = [row.share for row in balance.rotors if row.share is not None]
     if not shares:
-        return "no", "no steady flight in it", "", _HOVER
+        return "no", f"less than {_LEAST_S:.0f} s of steady flight in it", "", _HOVER
     half = max(share.half for share in shares)
     why = f"within {100 * half:.1f} points, {balance.steady_s:.0f} s of steady flight"
     return "yes" if half < _SURE_SHARE else "roughly", why, "", _parting(found, balance)
@@ -184,12 +186,14 @@ def _parting(found: Found, balance: Balance) -> str:
 
 def _hover(found: Found) -> tuple[str, str, str, str]:
     hover = found.hover
+    if found.flight.relative:
+        return "no", "the log does not say what full command is", "", ""
     if hover is None or hover.throttle is None:
         missing = not np.isfinite(found.flight.collective).any()
         return (
             ("no", "commands are not logged", "also rotor commands", "")
             if missing
-            else ("no", "no hover in it", "", _HOVER)
+            else ("no", f"less than {_LEAST_S:.0f} s of hover in it", "", _HOVER)
         )
     why = f"{hover.hover_s:.0f} s of hover, seen by {hover.found_by}"
     return "yes" if hover.throttle.half < _SURE_HOVER else "roughly", why, "", ""
@@ -261,10 +265,10 @@ def _curve(found: Found) -> tuple[str, str, str, str]:
     shape = None if found.hover is None else found.hover.shape
     if shape is None:
         if found.flight.accelerometer is None:
-            return "no", "the accelerometer is not logged", "also the accelerometer", ""
+            return "no", "no accelerometer is logged that feels gravity", "also the accelerometer", ""
         if not np.isfinite(found.flight.specific_force).any():
             return "no", f"the accelerometer reads {found.flight.reads_at_rest:.2f} g at rest", "", ""
-        return "no", "throttle varies too little", "", _PUNCH
+        return "no", "throttle and thrust vary too little together", "", _PUNCH
     why = f"throttle from {shape.lowest:.2f} to {shape.highest:.2f}"
     return "yes" if shape.exponent.half < _SURE_EXPONENT else "roughly", why, "", ""
 

@@ -20,8 +20,9 @@ from cpfls_cli.look.steady import (
 )
 from cpfls_cli.result import Estimate, about, part, result
 
-SOUND = 0.03
-"""Shares of thrust by which sound motors, propellers and batteries differ from the mean; smaller is no finding."""
+SOUND, _KNOWN = 0.03, 0.05
+"""Shares of thrust by which sound motors, propellers and batteries differ from the mean: less is no finding; and half
+of an interval beyond which a finding may stay unseen."""
 _AT_LIMIT, _LIMITED = 0.01, 0.02
 """How near to a limit is at it, share of the range; most share of a window at it."""
 _RARE, _NORMAL = 0.01, 1.96
@@ -67,7 +68,7 @@ class Cause:
 class Balance:
     """Shares of thrust by rotor in steady flight, over their mean, and what may cause them."""
 
-    SHOWN = ("uneven",)
+    SHOWN = ("uneven", "even")
 
     measured_by: str = about("rotor speed (squared), thrust curve (of the autopilot), or command (thrust not known)")
     lacks: str = about("what is missing: empty, steady flight (no shares), or places of the rotors (no causes)")
@@ -95,6 +96,12 @@ class Balance:
             if each.share
         ]
         return tuple(rotor for by, rotor in sorted(apart, reverse=True) if by > SOUND)
+
+    @property
+    def even(self) -> bool:
+        """Whether shares are known well enough to say that no rotor differs."""
+        halves = [each.share.half for each in self.rotors if each.share]
+        return bool(halves) and not self.uneven and max(halves) <= _KNOWN
 
 
 def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:

@@ -79,6 +79,8 @@ class LogFlight:
         Upward, from where it starts.
     climb_rate : array, shape (time,), m/s
     specific_force : array, shape (time, 3), m/s^2
+    relative : bool
+        Whether full is not known, and shares of it are shares of the largest that occurs.
     flown, usable : array of bool, shape (time,)
         Where it flies; and of that where signals are whole: no gap, no crash, not on the wing.
     rotors : Samples
@@ -125,6 +127,7 @@ class LogFlight:
     height: Array
     climb_rate: Array
     specific_force: Array
+    relative: bool = False
     flown: BoolArray
     usable: BoolArray
     rotors: Samples

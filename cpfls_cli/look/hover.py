@@ -109,7 +109,8 @@ def hover_of(flight: LogFlight) -> Hover | None:
     stated = stated_curve(flight)
     found_by, windows, throttle = _hovering(flight, stated)
     both = np.stack([throttle, stated.thrusts(throttle)], axis=1)
-    known = jackknifed(lambda kept: both[kept].mean(axis=0), len(both))
+    # Without a full command a hover is a share of nothing.
+    known = None if flight.relative else jackknifed(lambda kept: both[kept].mean(axis=0), len(both))
     voltage = windows.means(on_clock(flight, flight.voltage))[:, 0]
     time = windows.begin - windows.begin[0] if len(windows.begin) else windows.begin
     drift = jackknifed(lambda kept: _slope(time[kept], throttle[kept]) * np.ptp(time), len(time))

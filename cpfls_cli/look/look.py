@@ -57,6 +57,11 @@ class Look:
         return [event for event in self.events if event.severity == "danger"]
 
     @property
+    def warned(self) -> list[Event]:
+        """Events that want a look, but for what the autopilot said."""
+        return [event for event in self.events if event.severity == "warning" and event.kind != "message"]
+
+    @property
     def uneven(self) -> tuple[int, ...]:
         """Number the rotors that work more or less than sound ones."""
         return () if self.balance is None else self.balance.uneven
@@ -105,7 +110,7 @@ class Look:
         fine = [
             name for name, m in found if m.phase_deg.low >= ACCEPTABLE.phase_deg and m.gain_db.low >= ACCEPTABLE.gain_db
         ]
-        balanced = self.balance is not None and not self.uneven and any(row.share for row in self.balance.rotors)
+        balanced = self.balance is not None and self.balance.even
         return [
             *(["balance"] if balanced else []),
             *(["vibration"] if self.shaken <= self.limit else []),

@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot, version_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.errors import InputError, about
+from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.conversion import (
     BodyFrame,
@@ -57,8 +57,9 @@ _REST_S, _STILL_RAD_S, _MISREADS = 2.0, 0.05, 0.05
 """How far from a flight, and for how long at least, it stands, s; the rate below which it does; and the share by which
 an accelerometer that reads wrong there shows no hover."""
 
-_LEAST_V, _LARGEST_V = 2.0, 100.0
-"""Of any battery of a multirotor."""
+_LEAST_V, _LARGEST_V, _LEAST_A = 2.0, 100.0, 1.0
+"""Of any battery of a multirotor; and the current below which none flies: one of 27 g takes 2 A of one cell, and more
+cells are for larger ones."""
 _BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
@@ -86,10 +87,7 @@ def read_flight(
     InputError
         If the log holds no flight of a multirotor, or no body rates: what it is, and what would tell.
     """
-    if recognition is None:
-        with about(name, InputError):
-            recognition = recognise(topics, units, parameters, system)
-            return read_flight(name, topics, units, parameters, system, recognition)
+    recognition = recognition or recognise(topics, units, parameters, system)
     # Commands that are rebuilt stand in a topic of their own.
     rebuilt = recognition.rebuilt
     held = topics if rebuilt is None else {**topics, REBUILT: rebuilt.topic}
@@ -112,8 +110,8 @@ class _Reader:
         speeds = self.signal("rotor_speed")
         guess = self.recognition.signal("rotor_command")
         commands = self.signal("rotor_command")
-        if commands is not None and guess is not None and guess.columns.unit in SPEED_UNITS:
-            commands = as_shares(commands)
+        asks_speeds = guess is not None and guess.columns.unit in SPEED_UNITS
+        commands = as_shares(commands) if commands is not None and asks_speeds else commands
         rotors = Rotors(commands, guess, self._airframe(), speeds)
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
@@ -124,15 +122,13 @@ class _Reader:
         if thrust is not None and float(thrust.values.max()) < ALIVE:
             raise InputError(f"no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
         clock = _clock(rate, driving.command)
-        voltage, current = self._battery()
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
         on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
-        flown, on_force = self._flown(clock), on_clock(force, clock, 3)
-        reads = _reads_at_rest(flown, on, on_force, 1 / float(clock[1] - clock[0]))
-        if abs(reads - 1) > _MISREADS:
-            on_force = np.full_like(on_force, np.nan)
+        flown = self._flown(clock)
+        felt, reads = _felt(flown, on, on_clock(force, clock, 3), 1 / float(clock[1] - clock[0]))
+        voltage, current = self._load(clock, flown)
         return LogFlight(
             name=self.name,
             autopilot=self.autopilot.name if self.autopilot else "",
@@ -148,11 +144,12 @@ class _Reader:
             attitude_setpoint=on_clock(asked, clock, 3),
             attitude=on_clock(attitude, clock, 3),
             collective=on_clock(thrust and _mean(thrust), clock, 1)[:, 0],
-            voltage=on_clock(voltage, clock, 1)[:, 0],
-            current=on_clock(current, clock, 1)[:, 0],
+            voltage=voltage,
+            current=current,
             height=on_clock(height, clock, 1)[:, 0],
             climb_rate=on_clock(climb, clock, 1)[:, 0],
-            specific_force=on_force,
+            specific_force=felt,
+            relative=asks_speeds or (speeds is not None and thrust is not None and thrust.source == speeds.source),
             flown=flown,
             usable=flown & whole & (np.isfinite(command).all(axis=1) | (driving.command is None)),
             rotors=rotors.samples or Samples(np.empty(0), np.empty((0, 0))),
@@ -268,6 +265,13 @@ class _Reader:
             voltage, current = (own and own._replace(values=own.values / 100) for own in (voltage, current))
         return None if level < _LEAST_V else voltage, current
 
+    def _load(self, clock: Array, flown: BoolArray) -> tuple[Array, Array]:
+        """Give voltage and current on a clock; a current that carries no vehicle is not known."""
+        voltage, current = (on_clock(own, clock, 1)[:, 0] for own in self._battery())
+        known = current[flown & np.isfinite(current)]
+        none = len(known) > 0 and float(np.median(known)) < _LEAST_A
+        return voltage, np.full_like(current, np.nan) if none else current
+
     # Where it is.
 
     def _attitudes(self) -> tuple[Samples | None, Samples | None]:
@@ -348,14 +352,20 @@ def _gaps(*signals: Samples | None) -> Array:
     return np.array(joined, dtype=float).reshape(-1, 2)
 
 
-def _reads_at_rest(flown: BoolArray, rate: Array, force: Array, rate_hz: float) -> float:
-    """Give the size of what an accelerometer reads while it stands, in gravity; NaN where it never does for long."""
+def _felt(flown: BoolArray, rate: Array, force: Array, rate_hz: float) -> tuple[Array, float]:
+    """Give the specific force, NaN where its sensor reads wrong, and what it reads at rest, in gravity.
+
+    The latter is NaN where the vehicle never stands for long.
+    """
     near = binary_dilation(flown, iterations=max(1, round(_REST_S * rate_hz)))
     still = np.linalg.norm(rate - np.nanmedian(rate, axis=0), axis=1) < _STILL_RAD_S
     # Noise and vibration make a force longer, and not its mean.
     mean = uniform_filter1d(np.nan_to_num(force), max(1, round(rate_hz)), axis=0)
     sizes = np.linalg.norm(mean, axis=1)[~near & still & np.isfinite(force).all(axis=1)]
-    return float(np.median(sizes)) / STANDARD_GRAVITY if len(sizes) > _REST_S * rate_hz else np.nan
+    if len(sizes) <= _REST_S * rate_hz:
+        return force, np.nan
+    reads = float(np.median(sizes)) / STANDARD_GRAVITY
+    return np.full_like(force, np.nan) if abs(reads - 1) > _MISREADS else force, reads
 
 
 def _within(clock: Array, spans: Array, around_s: float) -> BoolArray:

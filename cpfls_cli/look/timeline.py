@@ -54,6 +54,9 @@ _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 """Of a flight that signals leave out near the ground, and at the end of a log, s; and the share of what carries the
 vehicle below which nothing does."""
 
+_MOVES_M_S: Final = 0.5
+"""Climb rate of what surely does not stand, though its estimate drifts."""
+
 _TRAILS_S: Final = 3.0
 """After a flight that ended early, while what happens still belongs to it, s."""
 
@@ -169,6 +172,13 @@ def timeline(
     ]
     # What held before the log began is stamped before it.
     found = [replace(event, time_s=max(event.time_s, 0.0)) for event in found]
+    # On the ground a failsafe keeps it there.
+    found = [
+        replace(event, severity="note")
+        if event.kind == "failsafe" and not _near_flight(flight, event.time_s)
+        else event
+        for event in found
+    ]
     return tuple(sorted(_merged(found), key=lambda event: (event.time_s, event.kind)))
 
 
@@ -219,10 +229,17 @@ def _carried_by(flight: LogFlight) -> float:
     return float(np.median(flown)) if len(flown) else np.nan
 
 
+def _near_flight(flight: LogFlight, at: float) -> bool:
+    return bool(flight.flown[(flight.time > at - _NEAR_S) & (flight.time < at + _NEAR_S)].any())
+
+
 def _rests(flight: LogFlight, part: slice) -> bool:
-    """Tell whether rotors anywhere in a part of the log give much less than in flight."""
-    known = flight.collective[part][np.isfinite(flight.collective[part])]
-    return len(known) > 0 and float(known.min()) < _LESS * _carried_by(flight)
+    """Tell whether rotors in a part of the log give much less than in flight, and it mostly keeps its height."""
+    with np.errstate(invalid="ignore"):
+        less = flight.collective[part] < _LESS * _carried_by(flight)
+    climbs = np.abs(flight.climb_rate[part][less])
+    climbs = climbs[np.isfinite(climbs)]
+    return bool(less.any()) and not (len(climbs) > 0 and float(np.median(climbs)) > _MOVES_M_S)
 
 
 def _carries(flight: LogFlight) -> bool:
@@ -303,10 +320,11 @@ def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event
 
 
 def _arming(changes: Iterator[tuple[float, float]]) -> Iterator[Event]:
-    last = 0.0
+    last: float | None = None
     for at, value in changes:
-        if value != last:
-            yield Event(time_s=at, kind="armed", text="armed" if value else "disarmed")
+        text = "armed" if value else "disarmed"
+        if value or last:
+            yield Event(time_s=at, kind="armed", text=text if last is not None else "armed when the log begins")
         last = value
 
 
@@ -360,7 +378,7 @@ def _limits(flight: LogFlight, after_s: float) -> Iterator[Event]:
     scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
     if flight.accelerometer is not None:
         yield from _clipped(flight.accelerometer, scales, "accelerometer")
-    if len(flight.rotors.time) and flight.rotors_source == "logged":
+    if len(flight.rotors.time) and flight.rotors_source == "logged" and not flight.relative:
         yield from _at_limit(flight, after_s)
 
 
@@ -441,14 +459,15 @@ def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
 
 def _counted(topics: Topics) -> Iterator[Event]:
     """Read the counters of clipped readings that autopilots keep."""
-    of_px4 = [f"accel_clipping[{axis}]" for axis in range(3)]
-    for topic, names in (("VIBE", ["Clip0", "Clip1", "Clip2", "Clip"]), ("vehicle_imu_status", of_px4)):
+    of_px4 = {f"accel_clipping[{axis}]": label for axis, label in enumerate("xyz")}
+    of_ardupilot = {name: name for name in ("Clip0", "Clip1", "Clip2", "Clip")}
+    for topic, names in (("VIBE", of_ardupilot), ("vehicle_imu_status", of_px4)):
         counted = {name: _field(topics, topic, name) for name in names}
         rises = {name: np.diff(count) for name, (_, count) in counted.items() if len(count) > 1}
         rises = {name: own for name, own in rises.items() if (own > 0).any()}
         if rises:
             where = [(counted[name][0][:-1][own > 0], counted[name][0][1:][own > 0]) for name, own in rises.items()]
-            each = ", ".join(f"{name} {int(own[own > 0].sum())}" for name, own in rises.items())
+            each = ", ".join(f"{names[name]} {int(own[own > 0].sum())}" for name, own in rises.items())
             begin, end = min(float(a[0]) for a, _ in where), max(float(b[-1]) for _, b in where)
             text = f"accelerometers clip ({topic}: {each} times)"
             yield Event(time_s=begin, until_s=end, kind="clipping", text=text, severity="warning")

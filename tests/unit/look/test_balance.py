@@ -91,6 +91,12 @@ def test_sound_rotors_need_no_cause():
     balance = balance_of(hovering([1.01, 0.99, 1.005, 0.995], gusts=0.005, **CURVE))
     assert balance.uneven == ()
     assert balance.causes == ()
+    assert balance.even
+    assert not balance_of(hovering([1.1, 0.9, 1.0, 1.0], gusts=0.005, **CURVE)).even
+    # Wide intervals show neither.
+    blurred = balance_of(hovering(EVEN, gusts=0.15, **CURVE))
+    assert blurred.uneven == ()
+    assert not blurred.even
 
 
 def test_unknown_thrust_curves_widen_the_centre_of_mass():

@@ -4,6 +4,7 @@ import pytest
 from cpfls_cli.errors import InputError
 from cpfls_cli.look.columns import on_clock
 from cpfls_cli.look.flight import Samples
+from cpfls_cli.look.hover import hover_of
 from cpfls_cli.look.reading import read_flight
 from tests.builders import looked_logs as logs
 from tests.builders.topic_logs import topic
@@ -207,7 +208,7 @@ def test_a_log_without_a_gyroscope():
     contents = logs.px4(OWN)
     for name in ("sensor_combined", "vehicle_angular_velocity"):
         del contents.topics[name]
-    with pytest.raises(InputError, match=r"^log: a log without a gyroscope.*SDLOG_PROFILE"):
+    with pytest.raises(InputError, match=r"^a log without a gyroscope.*SDLOG_PROFILE"):
         read(contents)
 
 
@@ -241,6 +242,10 @@ def test_speeds_of_rotors_act_by_their_squares(names, source):
     largest = np.quantile(np.array(speeds).max(axis=0), 0.999) / logs.FULL
     np.testing.assert_allclose(found.command, made / largest**2, atol=0.02)
     assert 0.3 < np.nanmedian(found.collective) < 1.0
+    # So no throttle that hovers is known.
+    assert found.relative
+    assert hover_of(found).throttle is None
+    assert not read(logs.plain(OWN)).relative
 
 
 def test_a_torque_that_is_asked_for_acts():
@@ -251,3 +256,12 @@ def test_a_torque_that_is_asked_for_acts():
     assert "shares of the largest" in found.command_source
     assert min(turning(found)) > 0.9
     assert np.abs(found.command).max() == pytest.approx(1.0)
+
+
+def test_a_current_that_carries_no_vehicle_is_not_measured():
+    battery = {"voltage_v": 16.0 - 0.01 * OWN.time, "voltage_filtered_v": 16.0 - 0.01 * OWN.time}
+    for current, measured in ((0.1, False), (8.0, True)):
+        own = battery | {"current_a": current + 0.02 * np.sin(OWN.time)}
+        found = read(logs.px4(OWN, more={"battery_status": topic(OWN, 50, own)}))
+        assert np.isfinite(found.current).any() == measured
+        assert np.isfinite(found.voltage).any()

@@ -58,6 +58,12 @@ def test_what_px4_states():
     }
     told = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
     found = events(logs.px4(HOP, more=more), told)
+    on = {"actuator_armed": state([0, 27], armed=[1, 0])}
+    assert of(events(logs.px4(HOP, more=on)), "armed") == [(0.0, "armed when the log begins"), (27.0, "disarmed")]
+    counted = {
+        "vehicle_imu_status": state([6, 7, 8], **{f"accel_clipping[{axis}]": [0, axis, axis] for axis in range(3)})
+    }
+    assert of(events(logs.px4(HOP, more=counted)), "clipping")[0][1].endswith("(vehicle_imu_status: y 1, z 2 times)")
     assert of(found, "take-off") == [(5.9, "takes off")]
     assert of(found, "landing") == [(24.2, "lands")]
     assert of(found, "armed") == [(4.5, "armed"), (27.0, "disarmed")]
@@ -108,6 +114,35 @@ def test_a_crash_tells_its_moments():
     assert next(event for event in found if event.kind == "impact").severity == "danger"
     stops = events(logs.px4(ended.stops_in_the_air(flight(seconds=40.0))))
     assert of(stops, "rotors stop in the air") == [(40.0, "rotors stop in the air")]
+
+
+def test_what_falls_against_the_air_hits_the_ground():
+    own = flight(seconds=40.0)
+    falls = ended.then(own, 1.5, felt=(0.0, 0.0, 4.5), falls=5.3)
+    found = events(logs.px4(ended.then(ended.then(falls, 0.06, felt=(0.0, 40.0, 90.0)), 6.0)))
+    assert [(event.kind, round(event.time_s)) for event in found if event.severity == "danger"] == [
+        ("rotors stop in the air", 40),
+        ("impact", 42),
+    ]
+
+
+def test_what_climbs_has_not_landed():
+    for rate, lands in ((0.0, True), (1.2, False)):
+        contents = logs.px4(OWN)
+        place = contents.topics["vehicle_local_position"]
+        late = np.maximum(place["timestamp"] - 15.0, 0.0)
+        place["z"], place["vz"] = 0.1 * place["z"] - rate * late, 0.1 * place["vz"] - rate * (late > 0)
+        motors = contents.topics["actuator_motors"]
+        for name in (own for own in motors if own.startswith("control")):
+            motors[name] = np.where(motors["timestamp"] > 15.0, 0.2, 1.0) * motors[name]
+        assert bool(of(events(contents), "landing")) == lands
+
+
+def test_a_failsafe_on_the_ground_is_no_danger():
+    for at, severity in ((1.0, "note"), (12.0, "danger")):
+        more = {"vehicle_status": state([0, at, at + 0.5], nav_state=[2, 2, 2], failsafe=[0, 1, 0])}
+        (event,) = [event for event in events(logs.px4(HOP, more=more)) if event.kind == "failsafe"]
+        assert event.severity == severity
 
 
 def test_flips_are_no_crash():
