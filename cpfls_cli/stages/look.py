@@ -279,4 +279,4 @@ def _one(run: Run, path: Path, done: int, total: int) -> Look:
         )
     except InputError as error:
         # It is a log, but holds nothing to look at.
-        raise ComputationError(f"{path}{str(error).removeprefix(path.name)}") from None
+        raise ComputationError(f"{path}: {str(error).removeprefix(f'{path.name}: ')}") from None
