@@ -20,15 +20,16 @@ from scipy import signal
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Controller, Law, chain
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.look.columns import on_clock
 from cpfls_cli.look.effectiveness import PlantModel, effectiveness
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.look.loop import AxisLoop, PlantAndLaw, loops_of
 
 VEHICLES = {
     # gain b of roll and pitch, of yaw, rad/s^2; lag s; damping 1/s; lead of yaw s; hover share of thrust
-    "nano": (230.0, 60.0, 0.035, 1.5, 0.0, 0.5),
-    "racer": (1000.0, 250.0, 0.022, 2.0, 0.02, 0.25),
-    "1.5 kg": (140.0, 20.0, 0.05, 0.8, 0.03, 0.45),
+    "nano": (230.0, 60.0, 0.035, 1.5, 0.03, 0.5),
+    "racer": (1000.0, 150.0, 0.022, 2.0, 0.12, 0.25),
+    "1.5 kg": (140.0, 12.0, 0.05, 0.8, 0.15, 0.45),
 }
 GUSTS = {"none": 0.0, "light": 1.0, "strong": 2.0}
 GUST_SIZE, GUST_S = np.array([3.4, 5.1, 2.0]), np.array([0.31, 1.18, 0.5])
@@ -96,16 +97,19 @@ def draw_case(rng: np.random.Generator, autopilot: str, vehicle: str, gusts: str
     tilt, yaw, lag, damping, lead, hover = VEHICLES[vehicle]
     gain = np.array([tilt, tilt, yaw]) * np.exp(0.2 * rng.standard_normal(3))
     lags = np.full(3, lag * np.exp(0.2 * rng.standard_normal()))
+    leads = np.array([0.0, 0.0, lead * np.exp(0.3 * rng.standard_normal())])
     delay = np.full(3, rng.uniform(0.003, 0.012) if vehicle != "1.5 kg" else rng.uniform(0.005, 0.02))
     values, speed = AUTOPILOTS[autopilot].defaults(), rng.uniform(0.6, 1.0)
     law = AUTOPILOTS[autopilot].law(values)
     for axis in range(3):
         fastest = (CROSSOVER[autopilot] if vehicle == "racer" else 25.0) * (1.0 if axis < 2 else 0.4)
         late = lags[axis] + delay[axis] + law.period + lateness(law.axes[axis])
-        tuned(values, AUTOPILOTS[autopilot], axis, gain[axis], speed * fastest, late)
+        # What accelerates the rotors turns the vehicle too.
+        at_once = gain[axis] * float(np.hypot(1.0, speed * fastest * leads[axis]))
+        tuned(values, AUTOPILOTS[autopilot], axis, at_once, speed * fastest, late)
     return Case(
         autopilot, vehicle, gusts, sticks, AUTOPILOTS[autopilot].law(values), values, gain, delay, lags,
-        damping * np.exp(0.3 * rng.standard_normal(3)), np.array([0.0, 0.0, lead]), min(hover, 1 - hover) * 1.2,
+        damping * np.exp(0.3 * rng.standard_normal(3)), leads, min(hover, 1 - hover) * 1.2,
     )  # fmt: skip
 
 
@@ -226,7 +230,7 @@ def log_of(case: Case, flown: dict[str, np.ndarray], name: str) -> LogFlight:
     def at(values: np.ndarray, hz: float, unit: float = 0.0) -> np.ndarray:
         every = max(round(1 / (hz * (time[1] - time[0]))), 1)
         values = np.round(values[::every] / unit) * unit if unit else values[::every]
-        return np.stack([np.interp(common, time[::every], column) for column in values.T], axis=1)
+        return on_clock(Samples(time[::every], values), common, values.shape[1], cubic=True)
 
     racer = case.autopilot == "betaflight"
     command = flown["acting"] if racer else flown["command"]

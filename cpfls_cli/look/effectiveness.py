@@ -6,6 +6,8 @@ autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -37,30 +39,33 @@ NARROW, NARROW_DELAY_S = 0.4, 0.02
 GAIN_FLOOR, DELAY_FLOOR_S = 0.02, 5e-4
 """Half widths that no interval is below: of straight lines between samples, clocks and the model's shape."""
 FEWEST_BLOCKS = 6
-_WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 25.0
+_WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 50.0
 """Shortest and longest windows, and how often they fit into a flight between."""
-_SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 18.0, 2.0
+_SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 40.0, 2.0
 """Rate of the common clock below which windows are longer; top of the band; periods of its foot in a window."""
 _SLOW_S = 0.3
 """Slower motion is left out."""
-_OF_CLOCK = 0.065
-"""Top of the band, share of the rate of the clock, which is twice that of the slower signal: straight lines between
-samples weaken a signal by 3 % at a tenth of its rate."""
+_OF_CLOCK = 0.1
+"""Top of the band, share of the rate of the clock, which is twice that of the slower signal: cubic splines between samples
+keep all of what moves at a fifth of their rate."""
 _AT_HZ = (0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
 _DELAY_UNIT_S, _MOST_DELAY_S, _LEAST_DELAY = 0.01, 0.3, 0.05
-_LAG_SHARE, _LAG_SPREAD = 0.5, 1.0
+_LAG_SHARE, _LAG_SPREAD = 1.0, 1.2
 """Before: logarithm of lag over delay behind the rotors' commands, rotors of all sizes with their filters."""
 _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 """Before: damping of multirotors, 1/s, and spread of its logarithm."""
 _TIGHT = 0.05
-_LEAD_S, _LEAD_SPREAD = 0.01, 1.0
-"""Before: lead of yaw by the rotors' own angular momentum."""
+_LEAD_S, _LEAD_SPREAD = 0.07, 1.2
+"""Before: lead of yaw by the rotors' own angular momentum, J / (2 k omega) of a rotor whose drag is k omega^2: 0.05 to 0.2 s
+from blades of 5 to 25 cm."""
 _FLOOR, _OPEN = 1e-6, 300.0
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
 _SEEN = 1e-4
 """Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
 _USUAL_DELAY_S, _LATEST_S = 0.012, 0.1
+_USUAL_LEFT = 2.0
+"""Power over its median that noise of one level has in a window, with room: 1.44 the mean of an exponential one."""
 _TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _NORMAL = 1.96
@@ -190,35 +195,57 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
-        late = _USUAL_DELAY_S
-        for last in (False, True):
-            spectra = plant_spectra(flight, axis, values, known, late)
-            if spectra is None:
-                break
-            filters = gyroscope_filters(law, axis, spectra.frequency)
-            if not last:
-                equations = _Equations(spectra, filters, _reference(spectra))
-                push = filters * PlantModel.of(_begun(equations, axis == _YAW), equations.at_hz).push(spectra.frequency)
-                late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
+        filters = partial(gyroscope_filters, law, axis)
+        spectra = plant_spectra(flight, axis, values, known, filters)
+        if spectra is not None:
+            begun = _Model.begun(spectra, filters, axis == _YAW)
+            spectra = plant_spectra(flight, axis, values, known, filters, begun)
         if spectra is None:
             continue
-        found = _of_spectra(AXES[axis], source, spectra, filters)
-        if best is None or (best.strength < STRONG and found.strength > best.strength):
+        found = _of_spectra(AXES[axis], source, spectra, filters(spectra.frequency))
+        if best is None or found.strength > best.strength:
             best = found
+        if best.strength >= STRONG:
+            break
     return best or _none(AXES[axis], chosen.reason or "too short")
 
 
+class _Model(NamedTuple):
+    """A plant near the one that is sought: numbers, the frequency of the effectiveness, and the slope of its phase."""
+
+    values: Array
+    at_hz: float
+    late_s: float
+
+    @classmethod
+    def begun(cls, spectra: BlockSpectra, filters: Callable[[Array], Numbers], yaw: bool) -> _Model:
+        """Estimate it roughly."""
+        passed = filters(spectra.frequency)
+        equations = _Equations(spectra, passed, _reference(spectra))
+        values = _begun(equations, yaw)
+        push = passed * PlantModel.of(values, equations.at_hz).push(spectra.frequency)
+        late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
+        return cls(values, equations.at_hz, late)
+
+
 def plant_spectra(
-    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float
+    flight: LogFlight,
+    axis: int,
+    instrument: Array,
+    usable: BoolArray,
+    filters: Callable[[Array], Numbers],
+    near: _Model | None = None,
 ) -> BlockSpectra | None:
     """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
 
     Parameters
     ----------
-    late : float, s
-        By which windows of the command begin earlier: what entered a window is then what left it, and slow motion of
-        other windows does not leak into the phase.
+    near : _Model, optional
+        By its delay windows of the command begin earlier: what entered a window is then what left it, and slow motion
+        of other windows does not leak into the phase. Windows weigh by what it leaves in them: one flip does not
+        outweigh a flight.
     """
+    late = near.late_s if near else _USUAL_DELAY_S
     early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)
     signals = (instrument, flight.command[:, axis], flight.body_rate[:, axis])
     instrument, command, rate = (without_slow(each, usable, half) for each in signals)
@@ -239,11 +266,22 @@ def plant_spectra(
     ]
     parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
     parts += transforms(rate, begins, length, period, 2)
+    if near:
+        weight = np.sqrt(_calm([each[:, inside] for each in parts], near, filters(frequency[inside]), frequency[inside]))
+        parts = [each * weight[:, None] for each in parts]
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
     if not power.sum() > 0:
         return None
     spectra = block_spectra(parts, cut_blocks(np.sqrt(power)), frequency, inside)
     return spectra if len(spectra.windows) >= FEWEST_BLOCKS else None
+
+
+def _calm(parts: list[Numbers], near: _Model, filters: Numbers, frequency: Array) -> Array:
+    """Weigh windows by what disturbs them, over what disturbs the calmer half: at most 1, shape (window,)."""
+    terms = _terms(near.values, near.at_hz, filters, frequency)
+    left = np.abs(sum(each * terms[:, place] for place, each in enumerate(parts[U:]))) ** 2
+    usual = np.maximum(np.median(left, axis=0), _TINY)
+    return np.asarray(1 / np.maximum((left / usual).mean(axis=1) / _USUAL_LEFT, 1.0))
 
 
 def _lateness(spectra: BlockSpectra, torque: Numbers) -> float:
@@ -270,6 +308,13 @@ def _kept(spectra: Numbers, instrument: int, windows: int) -> Array:
 def _outer(cross: Numbers, power: Numbers) -> Numbers:
     """Give what one signal explains of the spectra of others, shape (frequency, signal, signal)."""
     return np.asarray(cross.conj()[:, :, None] * cross[:, None, :] / np.maximum(power.real, _TINY)[:, None, None])
+
+
+def _terms(values: Array, at_hz: float, filters: Numbers, frequency: Array) -> Numbers:
+    model = PlantModel.of(values[..., None, :], at_hz)
+    push = -filters * model.push(frequency)
+    rest = (model.damping, 1 + model.damping * model.lag, model.lag)
+    return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
 
 
 class _Equations:
@@ -300,10 +345,7 @@ class _Equations:
 
     def terms(self, values: Array) -> Numbers:
         """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
-        model = PlantModel.of(values[..., None, :], self.at_hz)
-        push = -self.filters * model.push(self.spectra.frequency)
-        rest = (model.damping, 1 + model.damping * model.lag, model.lag)
-        return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
+        return _terms(values, self.at_hz, self.filters, self.spectra.frequency)
 
     def __call__(self, values: Array) -> Normal:
         step, numbers = 1e-5, len(values)
@@ -355,8 +397,10 @@ def _begun(equations: _Equations, yaw: bool) -> Array:
     best = (np.inf, prior.mean)
     seen = equations.spectra.total[:, equations.instrument, U:]
     scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, _TINY)
-    for delay, share in product(np.arange(1.0, 16.0, 1.5), (-1.0, 0.5, 2.0)):
-        values = np.concatenate([[0.0, delay, share], prior.mean[3:]])
+    sides = (-1.0, 0.0, 1.0)
+    for delay, share, lead in product(np.arange(1.0, 16.0, 1.5), sides, sides if yaw else sides[:1]):
+        shape = np.array([share, 0.0, *([lead] if yaw else [])])
+        values = np.concatenate([[0.0, delay], prior.mean[2:] + shape * prior.spread[2:]])
         terms = equations.terms(values)
         follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
         weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
@@ -376,8 +420,19 @@ def _reference(spectra: BlockSpectra) -> float:
     return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
 
 
+def _known_best(fit: Fit, spectra: BlockSpectra, at_hz: float) -> float:
+    """Choose the frequency at which the effectiveness has the least error, whatever the model's shape is."""
+    step = 1e-5 * np.concatenate([np.eye(len(fit.values)), -np.eye(len(fit.values))])
+    inside = np.array([each for each in _AT_HZ if spectra.frequency[0] <= each <= spectra.frequency[-1]] or [at_hz])
+    size = np.log(np.abs(PlantModel.of((fit.values + step)[:, None, :], at_hz).acceleration(inside)))
+    slopes = np.diff(size.reshape(2, len(fit.values), -1)[::-1], axis=0)[0].T / 2e-5
+    return float(inside[np.argmin([each @ fit.covariance @ each for each in slopes])])
+
+
 def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers) -> AxisPlant:
-    at_hz, yaw = _reference(spectra), axis == AXES[_YAW]
+    yaw = axis == AXES[_YAW]
+    middle = _reference(spectra)
+    at_hz = _known_best(_fitted(_Equations(spectra, filters, middle), yaw), spectra, middle)
     equations = _Equations(spectra, filters, at_hz)
     fit, plain = _fitted(equations, yaw), _fitted(_Equations(spectra, filters, at_hz, U), yaw)
     first = np.eye(len(fit.values))[0]
@@ -427,7 +482,7 @@ def _delay_at(fit: Fit, at_hz: float) -> Estimate:
 def _judged(fit: Fit, half_gain: float, total: Estimate) -> tuple[str, str]:
     if fit.strength[0] < STRONG:
         return "weak", "the instrument moves the vehicle too little"
-    if not fit.settled or total.high < 0:
+    if not fit.settled or (len(fit.values) <= 4 and total.high < 0):
         return "weak", "no model of a multirotor fits"
     if half_gain > NARROW or total.half > NARROW_DELAY_S:
         return "weak", "the interval is too wide"
