@@ -65,6 +65,8 @@ for one of 5 cm, 0.2 s for one of 25 cm."""
 _FLOOR, _OPEN = 1e-6, 300.0
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
+_SURELY = 0.5
+"""Share of what the instrument says of the command that is not chance, within the band."""
 _SEEN = 1e-4
 """Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
 _USUAL_DELAY_S, _LATEST_S = 0.012, 0.1
@@ -348,6 +350,9 @@ class _Equations:
         self._seen = spectra.cross[:, :, Z, U:]
         self._windows = int(spectra.windows.sum())
         others = spectra.total - spectra.cross
+        # Windows at the ends of a block share samples with its neighbours.
+        others[1:] -= spectra.cross[:-1]
+        others[:-1] -= spectra.cross[1:]
         cross, power = others[:, :, Z, U:], others[:, :, Z, Z].real
         predicted = smoothed(cross, axis=1) / np.maximum(smoothed(power, axis=1), _TINY)[..., None]
         # Where the instrument moves the command no more than by chance it says nothing.
@@ -435,6 +440,12 @@ def _reference(spectra: BlockSpectra) -> float:
     return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
 
 
+def _band(spectra: BlockSpectra) -> Array:
+    """Give the frequencies between which the instrument moves the command by more than chance, shape (2,)."""
+    kept = np.flatnonzero(_kept(spectra.total, int(spectra.windows.sum())) > _SURELY)
+    return np.asarray(spectra.frequency[kept[[0, -1]]] if len(kept) else np.full(2, np.nan))
+
+
 def _known_best(fit: Fit, spectra: BlockSpectra, at_hz: float) -> float:
     """Choose the frequency at which the effectiveness has the least error, whatever the model's shape is."""
     step = 1e-5 * np.concatenate([np.eye(len(fit.values)), -np.eye(len(fit.values))])
@@ -459,7 +470,7 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
         reason=reason,
         instrument=source,
         at_hz=at_hz,
-        band_hz=spectra.frequency[[0, -1]],
+        band_hz=_band(spectra),
         windows=int(spectra.windows.sum()),
         strength=float(fit.strength[0]),
         coherence=float(np.median(spectra.coherence(Z, U))),

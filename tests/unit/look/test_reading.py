@@ -250,3 +250,11 @@ def test_a_torque_that_is_asked_for_acts():
     assert "shares of the largest" in found.command_source
     assert min(turning(found)) > 0.9
     assert np.abs(found.command).max() == pytest.approx(1.0)
+
+
+def test_cubic_keeps_what_lines_weaken():
+    time, clock = np.arange(0, 4, 0.02), np.arange(1, 3, 0.005)
+    slow = Samples(time, np.sin(2 * np.pi * 8 * time)[:, None])
+    actual = np.sin(2 * np.pi * 8 * clock)
+    lines, cubic = (on_clock(slow, clock, 1, cubic=each)[:, 0] for each in (False, True))
+    assert np.std(cubic - actual) < 0.02 < 0.06 < np.std(lines - actual)
