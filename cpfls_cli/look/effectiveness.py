@@ -197,7 +197,7 @@ def effectiveness(flight: LogFlight) -> tuple[AxisPlant, ...]:
 def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     """Estimate the control effectiveness about one axis, by the first instrument that is exogenous and strong."""
     usable = flight.usable & np.isfinite(flight.command[:, axis]) & np.isfinite(flight.body_rate[:, axis])
-    if reason := _unusable(flight, usable, np.isfinite(flight.command[:, axis]).any()):
+    if reason := _unusable(flight, usable, bool(np.isfinite(flight.command[:, axis]).any())):
         return _none(AXES[axis], reason)
     chosen, law = exogenous(flight, axis, usable), flown_law(flight)
     best: AxisPlant | None = None
