@@ -102,8 +102,9 @@ class Fit:
         Values without each block.
     strength : array, shape (number,)
         Conditional F statistic of the instruments of each number.
-    blocks : float
-        So many blocks of equal information would scatter as much.
+    information : array, shape (block, number, number)
+    inverse : array, shape (number, number)
+        Of the information of all blocks and the prior.
     settled : bool
         Whether the steps came to an end.
     """
@@ -112,13 +113,19 @@ class Fit:
     covariance: Array
     left_out: Array
     strength: Array
-    blocks: float
+    information: Array
+    inverse: Array
     settled: bool
 
     def half(self, direction: Array) -> float:
         """Give half of the 95 % interval of ``direction @ values``, by Student's t."""
         error = np.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
-        return float(half_width(np.array(error), np.array(self.blocks)))
+        return float(half_width(np.array(error), np.array(self.blocks(direction))))
+
+    def blocks(self, direction: Array) -> float:
+        """Count the blocks of equal information on ``direction @ values`` that would scatter as much."""
+        before, behind = self.inverse.T @ direction, self.inverse @ direction
+        return effective_blocks(np.einsum("i,bij,j->b", before, self.information, behind))
 
 
 Bounds = tuple[Array, Array]
@@ -189,7 +196,8 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         covariance=jackknife_covariance(left_out) + held,
         left_out=left_out,
         strength=conditional_strength(normal, prior),
-        blocks=effective_blocks(np.trace(normal.information / np.maximum(np.diag(total), _RIDGE), axis1=1, axis2=2)),
+        information=normal.information,
+        inverse=inverse,
         settled=settled,
     )
 

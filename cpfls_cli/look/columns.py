@@ -134,11 +134,16 @@ def _stamped_as_sampled(fields: Mapping[str, Array]) -> Mapping[str, Array]:
     return {**fields, STAMP: taken} if bool(((ahead >= 0) & (ahead < _AHEAD_S)).all()) else fields
 
 
-def on_clock(samples: Samples | None, clock: Array, channels: int) -> Array:
+def on_clock(samples: Samples | None, clock: Array, channels: int, *, cubic: bool = False) -> Array:
     """Put a signal on a uniform clock, shape (time, channel): linear between samples, NaN where there are none.
 
     What comes faster than the clock is filtered first, without shift of phase, so that no vibration is folded into
     the band of the clock.
+
+    Parameters
+    ----------
+    cubic : bool
+        By cubic splines where every sample is known: lines weaken what moves at a tenth of the samples' rate by 3 %.
     """
     if samples is None:
         return np.full((len(clock), channels), np.nan)
@@ -146,7 +151,13 @@ def on_clock(samples: Samples | None, clock: Array, channels: int) -> Array:
     step, rate_hz = float(np.median(np.diff(time))), 1 / float(clock[1] - clock[0])
     if samples.rate_hz > _THINNED * rate_hz:
         values = low_pass(values, samples.rate_hz, _PASSED * rate_hz, 4)
-    own = np.column_stack([np.interp(clock, time, channel, left=np.nan, right=np.nan) for channel in values.T])
+    if cubic and len(time) > 1 and np.isfinite(values).all():
+        from scipy.interpolate import CubicSpline
+
+        own = CubicSpline(time, values)(clock)
+        own[(clock < time[0]) | (clock > time[-1])] = np.nan
+    else:
+        own = np.column_stack([np.interp(clock, time, channel, left=np.nan, right=np.nan) for channel in values.T])
     after = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     own[(time[after] - time[after - 1]) > max(_BRIDGED_STEPS * step, _BRIDGED_S)] = np.nan
     return own

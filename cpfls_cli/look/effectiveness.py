@@ -6,12 +6,15 @@ autopilot. A setpoint that the pilot makes moves the vehicle and knows nothing o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.estimation.estimate import Bounds, Fit, Normal, Prior, estimate, positive_ratio, solve
 from cpfls_cli.estimation.spectra import (
     SHARED_BINS,
@@ -27,6 +30,7 @@ from cpfls_cli.estimation.spectra import (
 )
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
+from cpfls_cli.look.reasons import NO_COMMAND, NO_MODEL, NOT_MOVED, TOO_SLOW, TOO_WIDE, needed_s, too_short
 from cpfls_cli.look.setpoints import exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
@@ -39,36 +43,43 @@ GAIN_FLOOR, DELAY_FLOOR_S = 0.02, 5e-4
 FEWEST_BLOCKS = 6
 _WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 25.0
 """Shortest and longest windows, and how often they fit into a flight between."""
-_SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 18.0, 2.0
+_SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 40.0, 2.0
 """Rate of the common clock below which windows are longer; top of the band; periods of its foot in a window."""
 _SLOW_S = 0.3
 """Slower motion is left out."""
-_OF_CLOCK = 0.065
-"""Top of the band, share of the rate of the clock, which is twice that of the slower signal: straight lines between
-samples weaken a signal by 3 % at a tenth of its rate."""
+_OF_CLOCK = 0.1
+"""Top of the band, share of the rate of the clock, which is twice that of the slower signal: cubic splines between
+samples keep all of what moves at a fifth of their rate."""
+_LEAST_TOP_HZ = 4.0
+"""Top of the band below which no loop of a multirotor is seen."""
 _AT_HZ = (0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
 _DELAY_UNIT_S, _MOST_DELAY_S, _LEAST_DELAY = 0.01, 0.3, 0.05
-_LAG_SHARE, _LAG_SPREAD = 0.5, 1.0
+_LAG_SHARE, _LAG_SPREAD = 1.0, 1.2
 """Before: logarithm of lag over delay behind the rotors' commands, rotors of all sizes with their filters."""
 _DAMPING, _DAMPING_SPREAD = 1.0, 1.0
 """Before: damping of multirotors, 1/s, and spread of its logarithm."""
 _TIGHT = 0.05
-_LEAD_S, _LEAD_SPREAD = 0.01, 1.0
-"""Before: lead of yaw by the rotors' own angular momentum."""
+_LEAD_S, _LEAD_SPREAD = 0.07, 1.2
+"""Before: lead of yaw by the rotors' own angular momentum, J / (2 k omega) of a rotor whose drag is k omega^2: 0.02 s
+for one of 5 cm, 0.2 s for one of 25 cm."""
 _FLOOR, _OPEN = 1e-6, 300.0
 _BY_CHANCE = 4.0
 """F statistic of one frequency that chance reaches once in fifty."""
+_SURELY = 0.5
+"""Share of what the instrument says of the command that is not chance, within the band."""
 _SEEN = 1e-4
 """Share of an instrument's largest power below which it is rounding and what leaks from slower motion."""
 _USUAL_DELAY_S, _LATEST_S = 0.012, 0.1
+_USUAL_LEFT = 2.0
+"""Power over its median that noise of one level has in a window, with room: 1.44 the mean of an exponential one."""
 _TINY = float(np.finfo(float).tiny)
 _DRAWS, _SEED = 200, 65
 _NORMAL = 1.96
 """Standard deviations of half a 95 % interval."""
 _YAW = 2
 
-Z, U, Y, A, J = range(5)
-"""Signals of the spectra: instrument, command, body rate, angular acceleration, its derivative."""
+Z, U, Y, A, J, V = range(6)
+"""Signals of the spectra: instrument, command, body rate and its two derivatives, derivative of the command."""
 
 
 class PlantModel(NamedTuple):
@@ -186,39 +197,75 @@ def effectiveness(flight: LogFlight) -> tuple[AxisPlant, ...]:
 def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     """Estimate the control effectiveness about one axis, by the first instrument that is exogenous and strong."""
     usable = flight.usable & np.isfinite(flight.command[:, axis]) & np.isfinite(flight.body_rate[:, axis])
+    if reason := _unusable(flight, usable, bool(np.isfinite(flight.command[:, axis]).any())):
+        return _none(AXES[axis], reason)
     chosen, law = exogenous(flight, axis, usable), flown_law(flight)
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
-        late = _USUAL_DELAY_S
-        for last in (False, True):
-            spectra = plant_spectra(flight, axis, values, known, late)
-            if spectra is None:
-                break
-            filters = gyroscope_filters(law, axis, spectra.frequency)
-            if not last:
-                equations = _Equations(spectra, filters, _reference(spectra))
-                push = filters * PlantModel.of(_begun(equations, axis == _YAW), equations.at_hz).push(spectra.frequency)
-                late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
+        filters = partial(gyroscope_filters, law, axis)
+        spectra = plant_spectra(flight, axis, values, known, filters)
+        if spectra is not None:
+            begun = _Model.begun(spectra, filters, axis == _YAW)
+            spectra = plant_spectra(flight, axis, values, known, filters, begun)
         if spectra is None:
             continue
-        found = _of_spectra(AXES[axis], source, spectra, filters)
-        if best is None or (best.strength < STRONG and found.strength > best.strength):
+        found = _of_spectra(AXES[axis], source, spectra, filters(spectra.frequency))
+        if best is None or found.strength > best.strength:
             best = found
-    return best or _none(AXES[axis], chosen.reason or "too short")
+        if best.strength >= STRONG:
+            break
+    return best or _none(AXES[axis], chosen.reason or too_short(usable, flight.rate_hz, _window_s(flight)[0]))
+
+
+def _unusable(flight: LogFlight, usable: BoolArray, commanded: bool) -> str:
+    """Say why nothing can be estimated of an axis; empty where something may be."""
+    if not commanded:
+        return NO_COMMAND
+    if _OF_CLOCK * flight.rate_hz < _LEAST_TOP_HZ:
+        return TOO_SLOW
+    shortest = _window_s(flight)[0]
+    if usable.sum() < needed_s(shortest) * flight.rate_hz:
+        return too_short(usable, flight.rate_hz, shortest)
+    return ""
+
+
+class _Model(NamedTuple):
+    """A plant near the one that is sought: numbers, the frequency of the effectiveness, and the slope of its phase."""
+
+    values: Array
+    at_hz: float
+    late_s: float
+
+    @classmethod
+    def begun(cls, spectra: BlockSpectra, filters: Callable[[Array], Numbers], yaw: bool) -> _Model:
+        """Estimate it roughly."""
+        passed = filters(spectra.frequency)
+        equations = _Equations(spectra, passed, _reference(spectra))
+        values = _begun(equations, yaw)
+        push = passed * PlantModel.of(values, equations.at_hz).push(spectra.frequency)
+        late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
+        return cls(values, equations.at_hz, late)
 
 
 def plant_spectra(
-    flight: LogFlight, axis: int, instrument: Array, usable: BoolArray, late: float
+    flight: LogFlight,
+    axis: int,
+    instrument: Array,
+    usable: BoolArray,
+    filters: Callable[[Array], Numbers],
+    near: _Model | None = None,
 ) -> BlockSpectra | None:
     """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
 
     Parameters
     ----------
-    late : float, s
-        By which windows of the command begin earlier: what entered a window is then what left it, and slow motion of
-        other windows does not leak into the phase.
+    near : _Model, optional
+        By its delay windows of the command begin earlier: what entered a window is then what left it, and slow motion
+        of other windows does not leak into the phase. Windows weigh by what it leaves in them: one flip does not
+        outweigh a flight.
     """
+    late = near.late_s if near else _USUAL_DELAY_S
     early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)
     signals = (instrument, flight.command[:, axis], flight.body_rate[:, axis])
     instrument, command, rate = (without_slow(each, usable, half) for each in signals)
@@ -235,15 +282,27 @@ def plant_spectra(
     period = 1 / flight.rate_hz
     parts = [
         *transforms(instrument, begins, length, period),
-        *transforms(np.roll(command, early), begins, length, period),
+        *transforms(rate, begins, length, period, 2),
+        *transforms(np.roll(command, early), begins, length, period, 1),
     ]
-    parts[U] = parts[U] * np.exp(2j * np.pi * frequency * early * period)
-    parts += transforms(rate, begins, length, period, 2)
+    turned = np.exp(2j * np.pi * frequency * early * period)
+    parts = [parts[Z], parts[4] * turned, *parts[1:4], parts[5] * turned]
+    if near:
+        weight = _calm([each[:, inside] for each in parts], near, filters(frequency[inside]), frequency[inside])
+        parts = [each * np.sqrt(weight)[:, None] for each in parts]
     power = (np.abs(parts[Z][:, inside]) ** 2).sum(axis=1)
     if not power.sum() > 0:
         return None
     spectra = block_spectra(parts, cut_blocks(np.sqrt(power)), frequency, inside)
     return spectra if len(spectra.windows) >= FEWEST_BLOCKS else None
+
+
+def _calm(parts: list[Numbers], near: _Model, filters: Numbers, frequency: Array) -> Array:
+    """Weigh windows by what disturbs them, over what disturbs the calmer half: at most 1, shape (window,)."""
+    terms = _terms(near.values, near.at_hz, filters, frequency)
+    left = np.abs(sum(each * terms[:, place] for place, each in enumerate(parts[U:]))) ** 2
+    usual = np.maximum(np.median(left, axis=0), _TINY)
+    return np.asarray(1 / np.maximum((left / usual).mean(axis=1) / _USUAL_LEFT, 1.0))
 
 
 def _lateness(spectra: BlockSpectra, torque: Numbers) -> float:
@@ -256,13 +315,13 @@ def _window_s(flight: LogFlight) -> tuple[float, float]:
     return _SLOW_WINDOW_S if flight.rate_hz < _SLOW_HZ else _WINDOW_S
 
 
-def _kept(spectra: Numbers, instrument: int, windows: int) -> Array:
-    """Give the share of what an instrument says of the command that is not chance, shape (..., frequency)."""
-    cross = np.abs(smoothed(spectra[..., instrument, U])) ** 2
-    parts = smoothed(spectra[..., instrument, instrument].real) * smoothed(spectra[..., U, U].real)
+def _kept(spectra: Numbers, windows: int) -> Array:
+    """Give the share of what the instrument says of the command that is not chance, shape (..., frequency)."""
+    cross = np.abs(smoothed(spectra[..., Z, U])) ** 2
+    parts = smoothed(spectra[..., Z, Z].real) * smoothed(spectra[..., U, U].real)
     coherence = np.minimum(cross / np.maximum(parts, _TINY), 1 - 1e-9)
     statistic = coherence / (1 - coherence) * windows * SMOOTHED_BINS / SHARED_BINS
-    moves = smoothed(spectra[..., instrument, instrument].real)
+    moves = smoothed(spectra[..., Z, Z].real)
     moves = moves >= _SEEN * moves.max(axis=-1, keepdims=True)
     return np.asarray(np.where(moves, np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0), 0.0))
 
@@ -272,6 +331,13 @@ def _outer(cross: Numbers, power: Numbers) -> Numbers:
     return np.asarray(cross.conj()[:, :, None] * cross[:, None, :] / np.maximum(power.real, _TINY)[:, None, None])
 
 
+def _terms(values: Array, at_hz: float, filters: Numbers, frequency: Array) -> Numbers:
+    model = PlantModel.of(values[..., None, :], at_hz)
+    push = -filters * model._replace(lead=0.0).push(frequency)
+    rest = (model.damping, 1 + model.damping * model.lag, model.lag, push * model.lead)
+    return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
+
+
 class _Equations:
     """Equations of one axis: no instrument goes with ``T j + (1 + d T) a + d y - b (1 + s L) e^(-s tau) u``.
 
@@ -279,31 +345,26 @@ class _Equations:
     gusts again.
     """
 
-    def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float, instrument: int = Z) -> None:
-        self.spectra, self.filters, self.at_hz, self.instrument = spectra, filters, at_hz, instrument
-        self._seen = spectra.cross[:, :, instrument, U:]
+    def __init__(self, spectra: BlockSpectra, filters: Numbers, at_hz: float) -> None:
+        self.spectra, self.filters, self.at_hz = spectra, filters, at_hz
+        self._seen = spectra.cross[:, :, Z, U:]
         self._windows = int(spectra.windows.sum())
         others = spectra.total - spectra.cross
-        cross, power = others[:, :, instrument, U:], others[:, :, instrument, instrument].real
+        # Windows at the ends of a block share samples with its neighbours.
+        others[1:] -= spectra.cross[:-1]
+        others[:-1] -= spectra.cross[1:]
+        cross, power = others[:, :, Z, U:], others[:, :, Z, Z].real
         predicted = smoothed(cross, axis=1) / np.maximum(smoothed(power, axis=1), _TINY)[..., None]
         # Where the instrument moves the command no more than by chance it says nothing.
-        kept = _kept(others, instrument, self._windows)
-        if instrument == U:
-            # Least squares takes the command as it is.
-            predicted[..., 0], kept = 1.0, np.ones_like(kept)
+        kept = _kept(others, self._windows)
         self._predicted = predicted * kept[..., None]
-        rest = spectra.total[:, U:, U:] - _outer(
-            spectra.total[:, instrument, U:], spectra.total[:, instrument, instrument]
-        )
+        rest = spectra.total[:, U:, U:] - _outer(spectra.total[:, Z, U:], spectra.total[:, Z, Z])
         shared = SHARED_BINS / SMOOTHED_BINS / self._windows
         self._chance = rest * (shared * (kept**2).mean(axis=0))[:, None, None]
 
     def terms(self, values: Array) -> Numbers:
-        """Give the factors of command, body rate and its two derivatives, shape (..., frequency, 4)."""
-        model = PlantModel.of(values[..., None, :], self.at_hz)
-        push = -self.filters * model.push(self.spectra.frequency)
-        rest = (model.damping, 1 + model.damping * model.lag, model.lag)
-        return np.stack([push, *(np.broadcast_to(each, push.shape) for each in rest)], axis=-1)
+        """Give the factors of the signals behind the instrument, shape (..., frequency, signal)."""
+        return _terms(values, self.at_hz, self.filters, self.spectra.frequency)
 
     def __call__(self, values: Array) -> Normal:
         step, numbers = 1e-5, len(values)
@@ -353,12 +414,15 @@ def _begun(equations: _Equations, yaw: bool) -> Array:
     """Estimate gain and delay with a shape that is all but held, begun at the best of a few delays."""
     prior = _prior(yaw)
     best = (np.inf, prior.mean)
-    seen = equations.spectra.total[:, equations.instrument, U:]
-    scale = np.maximum(equations.spectra.total[:, equations.instrument, equations.instrument].real, _TINY)
-    for delay, share in product(np.arange(1.0, 16.0, 1.5), (-1.0, 0.5, 2.0)):
-        values = np.concatenate([[0.0, delay, share], prior.mean[3:]])
+    seen = equations.spectra.total[:, Z, U:]
+    scale = np.maximum(equations.spectra.total[:, Z, Z].real, _TINY)
+    sides = (-1.0, 0.0, 1.0)
+    for delay, share, lead in product(np.arange(1.0, 16.0, 1.5), sides, sides if yaw else sides[:1]):
+        shape = np.array([share, 0.0, *([lead] if yaw else [])])
+        values = np.concatenate([[0.0, delay], prior.mean[2:] + shape * prior.spread[2:]])
         terms = equations.terms(values)
-        follows, target = -terms[:, 0] * seen[:, 0], (terms[:, 1:] * seen[:, 1:]).sum(axis=1)
+        parts = terms * seen
+        follows, target = -(parts[:, 0] + parts[:, -1]), parts[:, 1:-1].sum(axis=1)
         weight = 1 / (np.abs(terms[:, 0]) ** 2 * scale)
         gain = float((weight * (follows.conj() * target).real).sum() / (weight * np.abs(follows) ** 2).sum())
         left = float((weight * np.abs(target - gain * follows) ** 2).sum())
@@ -371,15 +435,32 @@ def _begun(equations: _Equations, yaw: bool) -> Array:
 def _reference(spectra: BlockSpectra) -> float:
     """Choose the frequency where the log knows effectiveness best: in the middle of what the instrument moves."""
     clear = spectra.coherence(Z, U) * spectra.coherence(Z, Y)
-    weight = _kept(spectra.total, Z, int(spectra.windows.sum())) * clear / np.maximum(1 - clear, 0.02)
+    weight = _kept(spectra.total, int(spectra.windows.sum())) * clear / np.maximum(1 - clear, 0.02)
     middle = float(np.exp((weight * np.log(spectra.frequency)).sum() / max(float(weight.sum()), _TINY)))
     return min(_AT_HZ, key=lambda each: abs(np.log(each / middle)))
 
 
+def _band(spectra: BlockSpectra) -> Array:
+    """Give the frequencies between which the instrument moves the command by more than chance, shape (2,)."""
+    kept = np.flatnonzero(_kept(spectra.total, int(spectra.windows.sum())) > _SURELY)
+    return np.asarray(spectra.frequency[kept[[0, -1]]] if len(kept) else np.full(2, np.nan))
+
+
+def _known_best(fit: Fit, spectra: BlockSpectra, at_hz: float) -> float:
+    """Choose the frequency at which the effectiveness has the least error, whatever the model's shape is."""
+    step = 1e-5 * np.concatenate([np.eye(len(fit.values)), -np.eye(len(fit.values))])
+    inside = np.array([each for each in _AT_HZ if spectra.frequency[0] <= each <= spectra.frequency[-1]] or [at_hz])
+    size = np.log(np.abs(PlantModel.of((fit.values + step)[:, None, :], at_hz).acceleration(inside)))
+    slopes = np.diff(size.reshape(2, len(fit.values), -1)[::-1], axis=0)[0].T / 2e-5
+    return float(inside[np.argmin([each @ fit.inverse @ each for each in slopes])])
+
+
 def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers) -> AxisPlant:
-    at_hz, yaw = _reference(spectra), axis == AXES[_YAW]
+    yaw = axis == AXES[_YAW]
+    middle = _reference(spectra)
+    at_hz = _known_best(_fitted(_Equations(spectra, filters, middle), yaw), spectra, middle)
     equations = _Equations(spectra, filters, at_hz)
-    fit, plain = _fitted(equations, yaw), _fitted(_Equations(spectra, filters, at_hz, U), yaw)
+    fit = _fitted(equations, yaw)
     first = np.eye(len(fit.values))[0]
     half_gain, total = float(np.hypot(fit.half(first), GAIN_FLOOR)), _delay_at(fit, at_hz)
     verdict, reason = _judged(fit, half_gain, total)
@@ -389,18 +470,28 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
         reason=reason,
         instrument=source,
         at_hz=at_hz,
-        band_hz=spectra.frequency[[0, -1]],
+        band_hz=_band(spectra),
         windows=int(spectra.windows.sum()),
         strength=float(fit.strength[0]),
         coherence=float(np.median(spectra.coherence(Z, U))),
         effectiveness=_exponential(fit.values[0], half_gain) if verdict == "identified" else None,
         total_delay=total if verdict == "identified" else None,
-        least_squares=_exponential(plain.values[0], plain.half(first)),
+        least_squares=_direct(equations),
         bound=None if verdict == "identified" else _bound(equations, fit.values),
         **_apart(fit, verdict),
         draws=_drawn(fit, at_hz) if verdict == "identified" else np.zeros((0, 5)),
         **_curves(equations, fit),
     )
+
+
+def _direct(equations: _Equations) -> Estimate:
+    """Give the effectiveness by least squares of the acceleration on the command around its frequency."""
+    spectra = equations.spectra
+    cross = smoothed(np.concatenate([spectra.total[None], spectra.total - spectra.cross])[..., U, :], axis=1)
+    near = int(np.argmin(np.abs(spectra.frequency - equations.at_hz)))
+    ratio = np.abs(cross[:, near, A]) / np.maximum(np.abs(equations.filters[near] * cross[:, near, U]), _TINY)
+    size = np.log(np.maximum(ratio, _TINY))
+    return _exponential(size[0], float(half_width(jackknife_error(size[1:]), len(size) - 1)))
 
 
 def _exponential(value: float, half: float) -> Estimate:
@@ -426,11 +517,11 @@ def _delay_at(fit: Fit, at_hz: float) -> Estimate:
 
 def _judged(fit: Fit, half_gain: float, total: Estimate) -> tuple[str, str]:
     if fit.strength[0] < STRONG:
-        return "weak", "the instrument moves the vehicle too little"
-    if not fit.settled or total.high < 0:
-        return "weak", "no model of a multirotor fits"
+        return "weak", NOT_MOVED
+    if not fit.settled or (len(fit.values) <= 4 and total.high < 0):
+        return "weak", NO_MODEL
     if half_gain > NARROW or total.half > NARROW_DELAY_S:
-        return "weak", "the interval is too wide"
+        return "weak", TOO_WIDE
     return "identified", ""
 
 

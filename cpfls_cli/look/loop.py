@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.autopilots.law import Law
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.estimation.spectra import (
+    SHARED_BINS,
     BlockSpectra,
     block_spectra,
     cut_blocks,
@@ -21,18 +22,19 @@ from cpfls_cli.estimation.spectra import (
 from cpfls_cli.look.effectiveness import FEWEST_BLOCKS, AxisPlant, PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
+from cpfls_cli.look.reasons import NO_SETPOINT, NOT_MOVED, TOO_SLOW, too_short
 from cpfls_cli.look.setpoints import Exogenous, exogenous
 from cpfls_cli.result import Estimate, about, part, result
-from cpfls_cli.tuning.margins import crossing_margins, disk_of, is_stable
 
-CLEAR = 0.5
-"""Coherence, of instrument with setpoint and with body rate, below which the response is not measured any more."""
+CLEAR = 0.2
+"""Standard error of the gain's logarithm from which on the response is not measured any more."""
 _WINDOW_S, _SHOWN_S, _SETTLES_S = 2.0, 0.6, (0.3, 0.5)
 _TOP_HZ, _OF_CLOCK, _FADES = 60.0, 0.2, 1.6
 """Top of the band; the same, share of the clock; frequencies over which a cut step fades, by its end."""
-_USUAL_LATE_S = 0.04
-_POINTS, _LOWEST_HZ, _OF_NYQUIST = 400, 0.1, 0.98
+_SLOWEST_HZ, _FEWEST_WINDOWS, _USUAL_LATE_S = 20.0, 18, 0.04
 _CERTAIN = 0.975
+_AGREES = 0.05
+"""Share of a step by which plant and law may leave the interval of the measured one."""
 _HALF_POWER = 0.5**0.5
 _TINY = float(np.finfo(float).tiny)
 Z, X, Y = 0, 1, 2
@@ -44,26 +46,12 @@ _OVER_TIME = ("step", "step_low", "step_high", "law_step")
 class StepNumbers:
     """What a step of the rate setpoint does."""
 
-    overshoot: Estimate = part()
-    """Share of the step."""
+    overshoot: Estimate | None = part(default=None)
+    """Share of the step; None where the response is not measured down to half its power, and a cut one overshoots."""
     rise_s: Estimate = part()
     """From a tenth to nine tenths."""
     half_s: Estimate = part()
     """Until half of it."""
-
-
-@result
-class LoopMargins:
-    """How far the rate loop is from instability, cut at the command, over all plants that the log leaves possible."""
-
-    gain_db: Estimate = part()
-    phase_deg: Estimate = part()
-    disk_deg: Estimate = part()
-    delay_s: Estimate = part()
-    """Delay that the loop bears more."""
-    crossover_hz: Estimate = part()
-    stable: float = about("share of the plants with which the loop is stable")
-    extrapolated: bool = about("whether the loop crosses above the frequencies that were measured")
 
 
 @result
@@ -80,9 +68,9 @@ class AxisLoop:
     bandwidth_hz: Estimate | None = part(default=None)
     by_step: StepNumbers | None = part(default=None)
     """Of the measured response, deconvolved."""
+    law_explains: bool = about("whether the stated law with the plant steps as measured, over the measured band")
     by_law: StepNumbers | None = part(default=None)
-    """Of the plant and the law that flew."""
-    margins: LoopMargins | None = part(default=None)
+    """Of plant and law, over all frequencies; None where they do not explain what was measured."""
     frequency: np.ndarray = about("of the response", "frequency", unit="Hz", brief=False)
     gain: np.ndarray = about("of body rate by setpoint", "frequency", gaps=True, brief=False)
     phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
@@ -98,9 +86,8 @@ class AxisLoop:
 
     @property
     def overshoot(self) -> Estimate | None:
-        """Overshoot by plant and law where both are known, else by the deconvolved step."""
-        known = self.by_law or self.by_step
-        return known.overshoot if known else None
+        """Overshoot of the measured step."""
+        return self.by_step.overshoot if self.by_step else None
 
 
 def loops_of(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop, ...]:
@@ -112,7 +99,7 @@ def loops_of(flight: LogFlight, plants: tuple[AxisPlant, ...]) -> tuple[AxisLoop
 def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) -> AxisLoop:
     asked, rate = flight.rate_setpoint[:, axis], flight.body_rate[:, axis]
     usable = flight.usable & np.isfinite(asked) & np.isfinite(rate)
-    chosen = exogenous(flight, axis, usable) if usable.any() else Exogenous((), "no rate setpoint is logged")
+    chosen = _instruments(flight, axis, usable)
     length = round(_WINDOW_S * flight.rate_hz)
     time = np.arange(round(_SHOWN_S * flight.rate_hz)) / flight.rate_hz
     found, source, reason = None, "", chosen.reason
@@ -120,9 +107,9 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         found, source = _response(flight, values, asked, rate, usable & np.isfinite(values), length), name
         if found is not None:
             break
-        reason = "too short, or the setpoint moves too little"
+        reason = _why_not(flight, usable & np.isfinite(values))
     every = _measured(found, time, length) if found else {}
-    loop = PlantAndLaw.of(plant, law, axis)
+    loop = PlantAndLaw.of(plant, law, axis) if found else None
     power = float(np.mean(asked[usable] ** 2)) if usable.any() else 0.0
     return AxisLoop(
         axis=AXES[axis],
@@ -132,6 +119,19 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         tracking=float(np.sqrt(np.mean((asked - rate)[usable] ** 2) / power)) if power > 0 else np.nan,
         **_whole({**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})}),
     )
+
+
+def _instruments(flight: LogFlight, axis: int, usable: BoolArray) -> Exogenous:
+    if not np.isfinite(flight.rate_setpoint[:, axis]).any():
+        return Exogenous((), NO_SETPOINT)
+    if 0.5 * flight.rate_hz < _SLOWEST_HZ:
+        return Exogenous((), TOO_SLOW)
+    return exogenous(flight, axis, usable)
+
+
+def _why_not(flight: LogFlight, usable: BoolArray) -> str:
+    short = len(window_starts(usable, round(_WINDOW_S * flight.rate_hz))) < _FEWEST_WINDOWS
+    return too_short(usable, flight.rate_hz, _WINDOW_S) if short else NOT_MOVED
 
 
 def _whole(given: dict[str, Any]) -> dict[str, Any]:
@@ -184,7 +184,8 @@ def _response(
     if len(spectra.windows) < FEWEST_BLOCKS:
         return None
     coherence = np.minimum(spectra.coherence(Z, X), spectra.coherence(Z, Y))
-    unclear = np.flatnonzero(smoothed(coherence) < CLEAR)
+    seen = np.maximum(smoothed(coherence), _TINY)
+    unclear = np.flatnonzero((1 - seen) / (2 * seen * spectra.windows.sum() / SHARED_BINS) > CLEAR**2)
     unclear = unclear[unclear > 1]
     ends = float(spectra.frequency[unclear[0]] if len(unclear) else spectra.frequency[-1])
     return _Response(spectra, coherence, ends) if ends >= _FADES / _WINDOW_S * 2 else None
@@ -209,11 +210,12 @@ def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
     steps = _stepped(gains, frequency, found.clear_hz, length, len(time))
     half = half_width(jackknife_error(steps[1:]), blocks)
     magnitude = np.log(np.maximum(np.abs(gains), _TINY))
+    bandwidth = _jackknifed(np.array([_bandwidth(frequency, np.abs(each), found.clear_hz) for each in gains]))
     return {
         "windows": int(found.spectra.windows.sum()),
         "clear_hz": found.clear_hz,
-        "bandwidth_hz": _jackknifed(np.array([_bandwidth(frequency, np.abs(each), found.clear_hz) for each in gains])),
-        "by_step": _numbers(time, steps, _jackknifed),
+        "bandwidth_hz": bandwidth,
+        "by_step": _numbers(time, steps, _jackknifed, bandwidth is not None),
         "frequency": frequency,
         "gain": np.abs(gains[0]),
         "phase": np.unwrap(np.angle(gains[0])),
@@ -228,7 +230,7 @@ def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
 
 def _nothing() -> dict[str, Any]:
     curves = ("frequency", "time", *_OVER_FREQUENCY, *_OVER_TIME)
-    return {"windows": 0, "clear_hz": np.nan, **dict.fromkeys(curves, np.zeros(0))}
+    return {"windows": 0, "clear_hz": np.nan, "law_explains": False, **dict.fromkeys(curves, np.zeros(0))}
 
 
 def _jackknifed(values: Array) -> Estimate | None:
@@ -257,8 +259,10 @@ def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _numbers(time: Array, steps: Array, of: Callable[[Array], Estimate | None]) -> StepNumbers | None:
-    """Read overshoot and times from steps, shape (1 + other, time)."""
+def _numbers(
+    time: Array, steps: Array, of: Callable[[Array], Estimate | None], whole: bool = True
+) -> StepNumbers | None:
+    """Read overshoot, of whole responses, and times from steps, shape (1 + other, time)."""
     settled = steps[:, (time >= _SETTLES_S[0]) & (time <= _SETTLES_S[1])].mean(axis=1)
     level = np.where(settled > 0, settled, np.nan)
 
@@ -270,8 +274,9 @@ def _numbers(time: Array, steps: Array, of: Callable[[Array], Estimate | None]) 
         part_ = (share * level - before) / np.where(first > 0, steps[rows, first] - before, 1.0)
         return np.where(above.any(axis=1), (first - 1 + np.where(first > 0, part_, 1.0)) * (time[1] - time[0]), np.nan)
 
-    over, rise, half = of(steps.max(axis=1) - 1.0), of(reached(0.9) - reached(0.1)), of(reached(0.5))
-    if over is None or rise is None or half is None:
+    over = of(steps.max(axis=1) - 1.0) if whole else None
+    rise, half = of(reached(0.9) - reached(0.1)), of(reached(0.5))
+    if rise is None or half is None:
         return None
     return StepNumbers(overshoot=over, rise_s=rise, half_s=half)
 
@@ -282,7 +287,6 @@ class PlantAndLaw(NamedTuple):
     plants: PlantModel
     law: Law
     axis: int
-    band_hz: float
 
     @classmethod
     def of(cls, plant: AxisPlant, law: Law | None, axis: int) -> PlantAndLaw | None:
@@ -290,7 +294,7 @@ class PlantAndLaw(NamedTuple):
         if law is None or not plant.identified:
             return None
         every = np.concatenate([plant.parameters[None], plant.draws])
-        return cls(PlantModel(*(every[:, [place]] for place in range(5))), law, axis, float(plant.band_hz[1]))
+        return cls(PlantModel(*(every[:, [place]] for place in range(5))), law, axis)
 
     def closed(self, frequency: Array) -> Numbers:
         """Evaluate the logged body rate by its setpoint, shape (1 + draw, frequency)."""
@@ -298,37 +302,29 @@ class PlantAndLaw(NamedTuple):
         filters = gyroscope_filters(self.law, self.axis, frequency)
         return np.asarray(filters * moved * control.forward / (1 + moved * control.feedback))
 
-    def fields(self, time: Array, rate_hz: float, length: int, measured: dict[str, Any]) -> dict[str, Any]:
-        """Give the fields of an `AxisLoop` that plant and law have."""
+    def steps(self, time: Array, rate_hz: float, length: int, ends: float = np.inf) -> Array:
+        """Step the body rate, shape (1 + draw, time), over all frequencies or as a measurement shows it."""
         frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate_hz)[1:], dtype=np.float64)
-        frequency = frequency[frequency < 0.45 * self.law.rate_hz]
+        frequency = frequency[frequency < min(0.45 * self.law.rate_hz, _FADES * ends)]
         response = self.closed(frequency)
         gains = np.concatenate([np.ones((len(response), 1)), response], axis=1)
         whole = np.concatenate([[0.0], frequency])
-        steps = _stepped(gains, whole, float(frequency[-1]) / _FADES, length, len(time))
-        shown = measured.get("frequency", np.zeros(0))
-        assert isinstance(shown, np.ndarray)
-        own = np.interp(shown, whole, gains[0].real) + 1j * np.interp(shown, whole, gains[0].imag)
+        return _stepped(gains, whole, min(ends, float(frequency[-1]) / _FADES), length, len(time))
+
+    def fields(self, time: Array, rate_hz: float, length: int, measured: dict[str, Any]) -> dict[str, Any]:
+        """Give the fields of an `AxisLoop` that plant and law have where they step as it was measured."""
+        banded = self.steps(time, rate_hz, length, measured["clear_hz"])
+        low, high = np.quantile(banded[1:], [1 - _CERTAIN, _CERTAIN], axis=0)
+        room = np.hypot(0.5 * (measured["step_high"] - measured["step_low"]), 0.5 * (high - low))
+        if (np.abs(banded[0] - measured["step"]) > room + _AGREES).any():
+            return {}
+        shown = measured["frequency"]
+        own = np.concatenate([[1.0], self.closed(shown[1:])[0]])
+        steps = self.steps(time, rate_hz, length)
         return {
             "by_law": _numbers(time, steps, _drawn),
-            "margins": self.margins(),
-            "time": time,
+            "law_explains": True,
             "law_step": steps[0],
             "law_gain": np.abs(own),
             "law_phase": np.unwrap(np.angle(own)),
         }
-
-    def margins(self) -> LoopMargins | None:
-        """Compute the margins; None where the loop that flew would not be stable: then one of both is not as found."""
-        frequency = np.geomspace(_LOWEST_HZ, _OF_NYQUIST * 0.5 * self.law.rate_hz, _POINTS)
-        loop = self.plants.rate(frequency) * self.law.response(self.axis, frequency).feedback
-        stable = is_stable(frequency, loop)
-        if not stable[0] or stable.mean() < 0.5:
-            return None
-        gain, phase, crossover = crossing_margins(frequency, loop[stable])
-        disk = np.degrees(2 * np.arctan(disk_of(loop[stable]) / 2))
-        values = {"gain_db": gain, "phase_deg": phase, "disk_deg": disk, "delay_s": phase / 360 / crossover}
-        found: dict[str, Any] = {name: _drawn(each) for name, each in {**values, "crossover_hz": crossover}.items()}
-        if None in found.values():
-            return None
-        return LoopMargins(**found, stable=float(stable.mean()), extrapolated=bool(crossover[0] > self.band_hz))

@@ -124,7 +124,7 @@ class _Reader:
         clock = _clock(rate, driving.command)
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
-        on, command = on_clock(rate, clock, 3), on_clock(driving.command, clock, 3)
+        on, command = (on_clock(each, clock, 3, cubic=True) for each in (rate, driving.command))
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
         flown = self._flown(clock)
         felt, reads = _felt(flown, on, on_clock(force, clock, 3), 1 / float(clock[1] - clock[0]))
@@ -139,7 +139,7 @@ class _Reader:
             body_rate=on,
             command=command,
             command_source=driving.source,
-            rate_setpoint=on_clock(setpoint, clock, 3),
+            rate_setpoint=on_clock(setpoint, clock, 3, cubic=True),
             stick=on_clock(sticks, clock, 3),
             attitude_setpoint=on_clock(asked, clock, 3),
             attitude=on_clock(attitude, clock, 3),

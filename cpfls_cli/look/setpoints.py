@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.look.flight import LogFlight
+from cpfls_cli.look.reasons import AT_REST, NO_STICK, too_short
 
 MADE_BY_STICKS = 0.95
 """Share of the variance of a setpoint that the stick explains, from which it is not fed by the state."""
@@ -43,9 +44,10 @@ def exogenous(flight: LogFlight, axis: int, usable: BoolArray) -> Exogenous:
     """
     stick, every = flight.stick[:, axis], usable & np.isfinite(flight.stick[:, axis])
     if every.sum() < _FEWEST_S * flight.rate_hz:
-        return Exogenous((), "no stick is logged, so that setpoints may come from the state")
+        short = np.isfinite(stick).any()
+        return Exogenous((), too_short(every, flight.rate_hz, 1.0) if short else NO_STICK)
     if float(np.std(stick[every])) < _AT_REST:
-        return Exogenous((), "the stick rests, and setpoints come from the state")
+        return Exogenous((), AT_REST)
     found = [("stick", stick)]
     for name, values in (("attitude setpoint", flight.attitude_setpoint), ("rate setpoint", flight.rate_setpoint)):
         setpoint = values[:, axis]
@@ -56,7 +58,10 @@ def exogenous(flight: LogFlight, axis: int, usable: BoolArray) -> Exogenous:
 
 
 def explained(setpoint: Array, stick: Array, usable: BoolArray, rate_hz: float) -> float:
-    """Compute the share of a setpoint's variance that a stick explains by its values of the last third of a second."""
+    """Compute the share of a setpoint's variance that a stick explains by its values of the last third of a second.
+
+    The smaller one of the setpoint and of its changes: what a slow stick asks for may hide faster answers to the state.
+    """
     step = max(round(rate_hz / _RATE_HZ), 1)
     count = len(stick) // step
     good = usable[: count * step].reshape(count, step).all(axis=1)
@@ -73,7 +78,12 @@ def explained(setpoint: Array, stick: Array, usable: BoolArray, rate_hz: float) 
     whole = np.convolve(good, np.concatenate([np.zeros(max(lags)), np.ones(max(lags) + 1)]), "same") > max(lags)
     if whole.sum() < 2 * columns.shape[1]:
         return 0.0
-    target = sampled(setpoint)[whole]
-    rest = target - columns[whole] @ np.linalg.lstsq(columns[whole], target, rcond=None)[0]
+    target, pairs = sampled(setpoint), whole & np.concatenate([[False], whole[:-1]])
+    changes = [np.concatenate([[0.0], np.diff(target)]), np.diff(columns, axis=0, prepend=columns[:1])]
+    return min(_share(target[whole], columns[whole]), _share(changes[0][pairs], changes[1][pairs]))
+
+
+def _share(target: Array, columns: Array) -> float:
+    rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
     power = float(target @ target)
     return 1.0 - float(rest @ rest) / power if power > 0 else 0.0

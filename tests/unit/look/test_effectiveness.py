@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.look import reasons
 from cpfls_cli.look.effectiveness import PlantModel, axis_effectiveness, effectiveness
+from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.look.setpoints import MADE_BY_STICKS, explained
 from tests.builders.looked_flights import TRUTH, flown, without_sticks
 
 
@@ -32,8 +35,13 @@ def test_the_setpoint_identifies_what_least_squares_misses(plant):
     assert abs(plant.least_squares.value / actual - 1) > 2 * abs(plant.effectiveness.value / actual - 1)
 
 
-def test_the_delay_is_found_within_two_milliseconds_in_calm_air():
-    found = axis_effectiveness(flown(np.random.default_rng(2), gusts=0.5, sticks=4.0), 0)
+@pytest.fixture(scope="module")
+def calm():
+    return flown(np.random.default_rng(2), gusts=0.5, sticks=4.0)
+
+
+def test_the_delay_is_found_within_two_milliseconds_in_calm_air(calm):
+    found = axis_effectiveness(calm, 0)
     turn = 2 * np.pi * found.at_hz
     actual = TRUTH.delay + np.arctan(turn * TRUTH.lag) / turn
     assert found.total_delay.value == pytest.approx(actual, abs=0.002)
@@ -78,3 +86,69 @@ def test_numbers_do_not_hang_on_what_is_not_usable(flight, plant):
     usable[5000:5200] = False
     found = axis_effectiveness(replace(flight, body_rate=broken, usable=usable), 0)
     assert found.effectiveness.value == pytest.approx(plant.effectiveness.value, rel=0.1)
+
+
+def test_the_phase_is_that_of_the_vehicle_above_its_crossover(calm):
+    found = axis_effectiveness(calm, 0)
+    assert found.band_hz[1] > 5
+    apart = np.angle(found.model.rate(np.array([5.0, 10.0])) / truth([5.0, 10.0]) * 2j * np.pi * np.array([5.0, 10.0]))
+    assert np.degrees(np.abs(apart)).max() < 10
+
+
+def test_one_flip_does_not_outweigh_a_flight(calm):
+    """A flip whose torque is not the model's leaves the estimate where it was."""
+    inside = (calm.time > 20) & (calm.time < 20.6)
+    flip = np.where(inside, 6.0 * np.sin(np.pi * (calm.time - 20) / 0.6) ** 2, 0.0)[:, None]
+    rate, asked, stick = calm.body_rate + 3 * flip, calm.rate_setpoint + flip, calm.stick + flip / 3
+    found = axis_effectiveness(replace(calm, body_rate=rate, rate_setpoint=asked, stick=stick), 0)
+    assert found.effectiveness.value == pytest.approx(float(np.abs(truth(found.at_hz))), rel=0.1)
+
+
+def turned_by_rotors(rng, lead):
+    """Turn about yaw by a command that sticks make alone, with the momentum of accelerated rotors, at 400 Hz."""
+    steps, period, hand = 16000, 1 / 400, np.hanning(48)
+    stick = np.convolve(np.repeat(rng.standard_normal(400), 40), hand / hand.sum(), "same")[:steps]
+    rate, lagged, sent, rates = 0.0, 0.0, 0.2 * stick, np.zeros(steps)
+    for step in range(4, steps):
+        change = (sent[step - 4] - lagged) * (1 - np.exp(-period / 0.02))
+        lagged += change
+        rates[step] = rate
+        rate += period * (100 * (lagged + lead * change / period) - 2 * rate + rng.standard_normal())
+    time, nothing = np.arange(steps) * period, np.full((steps, 3), np.nan)
+
+    def yaw(values):
+        return np.stack([0 * values, 0 * values, values], axis=1)
+
+    return LogFlight(
+        name="yaw", rate_hz=400.0, time=time, body_rate=yaw(rates), command=yaw(sent), rate_setpoint=yaw(stick),
+        stick=yaw(stick), attitude_setpoint=nothing, attitude=nothing, collective=nothing[:, 0],
+        voltage=nothing[:, 0], current=nothing[:, 0], height=nothing[:, 0], climb_rate=nothing[:, 0],
+        specific_force=nothing, flown=np.ones(steps, bool), usable=np.ones(steps, bool),
+        rotors=Samples(np.zeros(0), np.zeros((0, 4))), gyroscope=Samples(time, yaw(rates)), gaps_s=np.zeros((0, 2)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("lead", [0.03, 0.15])
+def test_yaw_leads_by_the_momentum_of_its_rotors(lead):
+    found = axis_effectiveness(turned_by_rotors(np.random.default_rng(6), lead), 2)
+    assert found.identified
+    assert found.model.lead == pytest.approx(lead, rel=0.15)
+    actual = PlantModel(100.0, 0.01, 0.02, 2.0, lead)
+    assert found.effectiveness.value == pytest.approx(np.abs(actual.acceleration(found.at_hz)), rel=0.05)
+
+
+def test_reasons_name_what_is_missing(flight):
+    silent = np.full_like(flight.command, np.nan)
+    assert axis_effectiveness(replace(flight, rate_hz=20.0), 0).reason == reasons.TOO_SLOW
+    assert axis_effectiveness(replace(flight, command=silent), 0).reason == reasons.NO_COMMAND
+    short = axis_effectiveness(replace(flight, usable=flight.time < 7), 0).reason
+    assert short == "7 s are usable in pieces of at least 1 s; 10 s are needed"
+
+
+def test_a_setpoint_whose_changes_answer_the_state_is_no_instrument():
+    rng, usable = np.random.default_rng(8), np.ones(20000, dtype=bool)
+    slow, fast = (
+        np.convolve(rng.standard_normal(20400), np.ones(each) / each**0.5, "same")[:20000] for each in (400, 20)
+    )
+    assert explained(2.0 * slow, slow, usable, 500.0) > 0.99
+    assert explained(2.0 * slow + 0.2 * fast, slow, usable, 500.0) < MADE_BY_STICKS

@@ -1,11 +1,14 @@
 """The loop that flew against the loop that was simulated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.autopilots.law import Controller
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.look.effectiveness import PlantModel, axis_effectiveness
+from cpfls_cli.look import reasons
+from cpfls_cli.look.effectiveness import axis_effectiveness
 from cpfls_cli.look.loop import loops_of
 from tests.builders.looked_flights import PARAMETERS, RATE_HZ, TRUTH, flown, without_sticks
 
@@ -45,25 +48,34 @@ def test_overshoot_is_that_of_a_simulated_step(loop):
     assert (loop.step_low <= loop.step_high).all()
 
 
-def test_margins_hold_those_of_the_vehicle(loop):
-    frequency = np.geomspace(0.5, 100, 20000)
-    law = AUTOPILOTS["crazyflie"].law(PARAMETERS)
-    model = PlantModel(TRUTH.gain, TRUTH.delay, TRUTH.lag, TRUTH.damping, 0.0)
-    opened = model.rate(frequency) * law.response(0, frequency).feedback
-    phase = np.unwrap(np.angle(opened)) / np.pi * 180
-    turned, crosses = np.argmax(phase < -180), np.argmax(np.abs(opened) < 1)
-    actual = {
-        "gain_db": -20 * np.log10(np.abs(opened[turned])),
-        "phase_deg": 180 + phase[crosses],
-        "disk_deg": np.degrees(2 * np.arctan(0.5 / np.abs(0.5 * (1 - opened) / (1 + opened)).max())),
-        "crossover_hz": frequency[crosses],
-    }
-    for name, value in actual.items():
-        found = getattr(loop.margins, name)
-        assert found.low <= value <= found.high, name
-    assert loop.margins.delay_s.value == pytest.approx(
-        loop.margins.phase_deg.value / 360 / loop.margins.crossover_hz.value, rel=1e-6
-    )
+def test_the_law_explains_what_it_flew_and_another_does_not(flight, loop):
+    assert loop.law_explains
+    assert loop.overshoot == loop.by_step.overshoot
+    other = replace(flight, parameters={**PARAMETERS, "pid_rate.roll_kp": 3 * PARAMETERS["pid_rate.roll_kp"]})
+    found = loops_of(other, tuple(axis_effectiveness(other, axis) for axis in range(3)))[0]
+    assert not found.law_explains
+    assert found.by_law is None
+    assert found.overshoot.value == pytest.approx(loop.overshoot.value)
+
+
+def test_a_response_that_is_cut_shows_no_overshoot(flight):
+    # What follows at once has its whole power where the measurement ends.
+    at_once = replace(flight, body_rate=flight.rate_setpoint + 0.02 * flight.body_rate)
+    found = loops_of(at_once, tuple(axis_effectiveness(flight, axis) for axis in range(3)))[0]
+    assert found.measured
+    assert found.bandwidth_hz is None
+    assert found.overshoot is None
+
+
+def test_reasons_name_what_is_missing(flight):
+    plants = tuple(axis_effectiveness(flight, axis) for axis in range(3))
+
+    def reason(**changed):
+        return loops_of(replace(flight, **changed), plants)[0].reason
+
+    assert reason(rate_setpoint=np.full_like(flight.rate_setpoint, np.nan)) == reasons.NO_SETPOINT
+    assert reason(rate_hz=20.0) == reasons.TOO_SLOW
+    assert reason(usable=flight.time < 12) == "12 s are usable in pieces of at least 2 s; 19 s are needed"
 
 
 def test_the_response_is_that_of_plant_and_law_where_it_is_clear(loop):
@@ -81,5 +93,5 @@ def test_resting_sticks_measure_no_response(flight):
     assert not found.measured
     assert "rests" in found.reason
     assert found.by_step is None
-    assert found.margins is None
+    assert found.overshoot is None
     assert np.isfinite(found.tracking)
