@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.look_study import draw_case, log_of, simulate, truth
 from cpfls_cli.look.effectiveness import effectiveness
-from cpfls_cli.report.canvas import GREY, in_columns, line, plot, style_of
+from cpfls_cli.report.canvas import GREY, band, in_columns, line, plot, style_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,20 +36,18 @@ def main() -> None:
 
     def draw(figure: Figure) -> None:
         for axes, plant in zip(in_columns(figure, 2, 2).ravel(), plants, strict=False):
-            hz = plant.frequency
+            inside = plant.frequency <= plant.band_hz[1]
+            hz, gain = plant.frequency[inside], plant.gain[inside]
             index = ("roll", "pitch").index(plant.axis)
             true = np.abs(truth(case, index, hz))
-            axes.errorbar(
-                hz,
-                plant.gain,
-                1.96 * plant.gain * plant.gain_error,
-                fmt="o",
-                markersize=3,
-                linewidth=0.8,
-                color=style_of(0)["color"],
+            filters = plant.model_gain[inside] / np.abs(plant.model.acceleration(hz))
+            possible = (
+                filters * np.abs(plant.possible.acceleration(hz)) if plant.identified else np.full((2, len(hz)), np.nan)
             )
-            line(axes, hz, plant.model_gain, label="by the setpoint", **style_of(0))
-            axes.plot(hz, plant.direct_gain, color=GREY, linestyle="--", label="least squares")
+            band(axes, hz, *np.quantile(possible, [0.025, 0.975], axis=0), color="#b8cde2", label="95 % interval")
+            axes.plot(hz, gain, ".", color=style_of(0)["color"], markersize=4)
+            line(axes, hz, plant.model_gain[inside], label="by the setpoint", **style_of(0))
+            axes.plot(hz, plant.direct_gain[inside], color=GREY, linestyle="--", label="least squares")
             line(axes, hz, true, label="truth", color="black", linewidth=1.2)
             axes.set_title(plant.axis, color=GREY, fontsize="medium")
             axes.set_xlabel("Hz")
