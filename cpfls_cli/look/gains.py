@@ -27,8 +27,9 @@ HOLDS = 0.95
 """Share of the plants with which proposed gains hold the asked margins."""
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
-_ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
-"""Margins from which on a loop is usually accepted: what has them and flies is not slowed down."""
+_ACCEPTABLE = 2 * np.tan(np.radians(25.0) / 2)
+"""Disk margin, of 25 deg and so of 4 dB, from which on a loop is accepted: what may have it and flies is not slowed
+down."""
 _AT_ONCE = 1.25
 """Factor by which a gain changes at most from one log to the next."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
@@ -363,8 +364,8 @@ class _Work:
         return [*rows, *self._raised(axis, rows)]
 
     def _acceptable(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
-        """Keep gains that are higher than asked margins allow where the loop has those that every guide accepts."""
-        if float(np.median(self._held(axis, self.values))) < _ACCEPTABLE.disk:
+        """Keep gains that are higher than asked margins allow unless the loop surely has too little to be accepted."""
+        if float(np.quantile(self._held(axis, self.values), HOLDS)) < _ACCEPTABLE:
             return rows
         return [
             replace(row, proposed=row.today, direction="keep", why="") if row.direction == "lower" else row

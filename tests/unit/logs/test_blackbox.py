@@ -134,7 +134,7 @@ def test_of_several_flights_the_longest_is_read(read):
     files = [header() + b"".join([*frames(rows), END]) for rows in (short, long, short)]
     contents = read(b"".join(files))
     held(contents, long)
-    assert contents.warnings == ("holds 3 flights; the longest, number 2, is read: 0 s",)
+    assert contents.warnings == ("holds 3 flights; the longest, number 2, is read: 0 s; `cpfls look` looks at each",)
 
 
 @pytest.mark.parametrize(
