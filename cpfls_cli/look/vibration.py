@@ -398,7 +398,8 @@ def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Lin
         group, stage, kind = (*parameter.role.split("."), "", "")[:3]
         own = getattr(law.axes[AXES.index(group) if group in AXES else 0], stage) if stage in STAGES else ()
         hz = stated[parameter.name] * parameter.scale
-        for each in (each for each in own if each.kind == kind.rstrip("2") and each.hz == hz):
+        kinds = {"first": ("first", "second")}.get(kind.rstrip("2"), (kind.rstrip("2"),))
+        for each in (each for each in own if each.kind in kinds and each.hz == hz):
             if (stage, each) not in seen:
                 seen.add((stage, each))
                 phase = -float(np.angle(chain((each,), back, law.period))[0])
