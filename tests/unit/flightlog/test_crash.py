@@ -172,3 +172,14 @@ def test_a_rotor_that_weakens_high_up_rests_on_nothing(own):
 def test_a_flip_before_landing_is_no_crash(own, known):
     landed = ended.then(ended.joined(own, ended.flips(flight(7.0))), 5.0, roll=0.0)
     assert flown(landed, known).ended == ""
+
+
+def test_a_long_turn_pushed_along_its_side_is_no_rest(own):
+    """Air that is as strong as the weight, as a dive has it, while the vehicle turns slowly all the time."""
+    dives = type(own)(**vars(own))
+    inside = (own.time > 15) & (own.time < 20)
+    dives.rate = np.where(inside[:, None], [0.35, 0.0, 0.3], own.rate)
+    dives.specific_force = np.where(inside[:, None], [9.0, 1.0, 0.0], own.specific_force)
+    assert flown(dives, ("force",)).ended == ""
+    dives.rate = np.where(inside[:, None], np.median(own.rate, axis=0), own.rate)
+    assert "rests on something" in flown(dives, ("force",)).ended
