@@ -14,8 +14,8 @@ ALIVE = 0.02
 """Share of the largest command below which rotors stand."""
 
 _REST_S, _CALM_RAD_S, _TURNED_RAD_S, LIVELY_RAD_S = 1.5, 0.5, 0.15, 0.05
-"""For how long it rests at least, the rate below which it does, however it shakes, and in all, by which it would turn by
-some 10 degrees; and that above which it surely flies."""
+"""For how long it rests at least, the rate below which it does, however it shakes, and in all, by which it would turn
+by some 10 degrees; and that above which it surely flies."""
 
 SLOW_S = 0.5
 """Means over so long hold no vibration."""

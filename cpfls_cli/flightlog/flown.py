@@ -51,17 +51,16 @@ _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
 """Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
 of the height that is estimated for it."""
 
-_SWINGS, _SWINGS_S, _AS_HELD, _OF_MEAN = 0.01, 2.0, 0.6, 0.1
-"""Change of the sine of a lean within s from which on forces are held against it, and slope and correlation of both from
-which on a stand holds the vehicle: in the air, what it feels along its sides follows its speed, which is late. Share of
-the mean below which a rotor hardly works; without one of four nothing hovers that does not spin."""
+_SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
+"""Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
+vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin."""
 
 _UNMOVED_M = 0.01
 """Range of heights that no hover keeps to."""
 
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
-"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
-below which it falls, on the mean over s."""
+"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in
+weights below which it falls, on the mean over s."""
 
 _LONGEST_CUT_S = 3.0
 """Longer than that no throttle is cut in flight: a fall of 44 m."""
@@ -323,16 +322,17 @@ def _held(signs: Signs, active: BoolArray) -> str:
         idle = np.flatnonzero(works < _OF_MEAN * works.mean())
         if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
             return f"rotor {idle[0] + 1} hardly works, and it does not spin"
-    if signs.upright is None or signs.felt is None:
+    if signs.body_rate is None or signs.felt is None:
         return ""
-    lean = np.sqrt(np.clip(1 - signs.upright**2, 0.0, 1.0))
-    both = np.column_stack([lean, np.linalg.norm(signs.felt[:, :2], axis=1)])
-    both = averaged(both, signs.period, _TURN_S) - averaged(both, signs.period, _SWINGS_S)
-    power = both[active].T @ both[active] / active.sum()
-    if power[0, 0] < _SWINGS**2:
+    # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis.
+    turns, felt = (averaged(each, signs.period, _TURN_S) for each in (signs.body_rate, signs.felt))
+    turned = -np.cross(turns - np.median(turns, axis=0), felt)[active, :2]
+    moved = np.gradient(felt, signs.period, axis=0)[active, :2]
+    power, both = float((turned**2).mean()), float((turned * moved).mean())
+    if power < _SWINGS_RAD_S**2:
         return ""
-    slope, alike = power[0, 1] / power[0, 0], power[0, 1] / np.sqrt(power[0, 0] * power[1, 1])
-    return "what it feels along its sides follows its lean at once" if min(slope, alike) > _AS_HELD else ""
+    alike = both / np.sqrt(power * float((moved**2).mean()) + 1e-12)
+    return "the weight turns through it as it turns" if min(both / power, alike) > _AS_HELD else ""
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:

@@ -102,7 +102,8 @@ class GainRow:
     high: float = about("largest of the best values; not finite where noise or a range sets the value", gaps=True)
     direction: str = about("raise, lower or keep")
     why: str = about(
-        "margins, noise, range, step: the way there in one log, or with: it goes with another parameter of its axis; empty where kept"
+        "margins, noise, range, step: the way there in one log, with: it goes with another parameter of its axis, "
+        "accepted: higher than the margins asked for, and kept, since it flew with enough; empty: not sure"
     )
 
 
@@ -113,8 +114,9 @@ class AxisGains:
     axis: str = about("roll, pitch or yaw")
     changed: bool = about("whether a change is sure")
     reason: str = about(
-        "why nothing is proposed: weak, law (with the plant it would not fly), feedback (what flew is not as stated), margins (no gains keep them), band (the "
-        "loop would cross above what is identified); empty where gains are proposed or kept"
+        "why nothing is proposed: weak, law (with the plant it would not fly), feedback (what flew is not as stated), "
+        "margins (no gains keep them), band (the loop would cross above what is identified); empty where gains are "
+        "proposed or kept"
     )
     fact: str = about("more about the reason")
     attitude: bool = about("whether the loop of the attitude is closed around that of the rate")
@@ -248,7 +250,7 @@ class _Work:
         return [self._axis(axis, rows, *reasons.get(axis, ("", ""))) for axis in range(len(AXES))], rows
 
     def _other_feedback(self, axis: int) -> str:
-        """Say how the feedback that flew differs from the stated one where the loop crosses; empty where it does not."""
+        """Say how the feedback that flew differs from the stated one where the loop crosses; empty where it fits."""
         flown = flown_feedback(self.flight, axis, self.law)
         crosses = self._margins(axis, self.values).crossover_hz.value
         if flown is None or flown.fits(crosses):
@@ -323,7 +325,8 @@ class _Work:
             reason=reason,
             fact=fact,
             attitude=bool(self.attitude[axis]),
-            before=self._margins(axis, self.values) if identified else None,
+            # Of another law than the one that flew, margins say nothing.
+            before=self._margins(axis, self.values) if identified and reason not in ("law", "feedback") else None,
             after=self._margins(axis, {**self.values, **new}) if identified and not reason else None,
         )
 
@@ -368,7 +371,7 @@ class _Work:
         if float(np.quantile(self._held(axis, self.values), HOLDS)) < _ACCEPTABLE:
             return rows
         return [
-            replace(row, proposed=row.today, direction="keep", why="") if row.direction == "lower" else row
+            replace(row, proposed=row.today, direction="keep", why="accepted") if row.direction == "lower" else row
             for row in rows
         ]
 
