@@ -317,7 +317,9 @@ def _still(signs: Signs, active: BoolArray) -> bool:
 
 def _held(signs: Signs, active: BoolArray) -> str:
     """Say by what something else than rotors is seen to hold a vehicle whose rotors turn; empty where nothing is."""
-    if signs.rotors is not None and signs.rotors.shape[1] == 4 and signs.slow is not None:
+    if signs.rotors is None:
+        return ""
+    if signs.rotors.shape[1] == 4 and signs.slow is not None:
         works = np.median(np.nan_to_num(signs.rotors)[active], axis=0)
         idle = np.flatnonzero(works < _OF_MEAN * works.mean())
         if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
