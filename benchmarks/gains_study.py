@@ -23,10 +23,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.look_study import GUST_S, GUST_SIZE, GUSTS, GYRO_NOISE, Case, Lanes, flights
-from cpfls_cli.look.effectiveness import effectiveness
-
 from cpfls_cli.autopilots.law import AXES, Law
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.gains import TunedGains, tuned_gains
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, frequencies, moved_by
 from cpfls_cli.tuning.plant import AxisPlant

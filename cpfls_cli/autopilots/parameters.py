@@ -21,12 +21,21 @@ _ORDER: tuple[tuple[Stage, FilterKind, str], ...] = (
     ("measured", "second", "measured.second"),
     ("target", "first", "target.first"),
     ("error", "first", "error.first"),
+    ("slope", "notch", "slope.notch"),
     ("slope", "first", "slope.first"),
     ("slope", "first", "slope.first2"),
     ("slope", "second", "slope.second"),
     ("output", "first", "output.first"),
 )
 """Filters that a law may have, in the order in which a signal passes them."""
+
+_KINDS: tuple[tuple[FilterKind, int, float], ...] = (
+    ("first", 1, 1.0),
+    ("second", 1, 1.0),
+    ("first", 2, (2**0.5 - 1) ** -0.5),
+    ("first", 3, (2 ** (1 / 3) - 1) ** -0.5),
+)
+"""Low-passes by number: kind, how many in series, and the cut-off of each over that of all."""
 
 
 @dataclass(frozen=True)
@@ -275,7 +284,8 @@ def _axis(found: Mapping[str, float], *, slope_of_error: bool) -> AxisLaw:
     filters: dict[Stage, list[Filter]] = {}
     for stage, kind, name in _ORDER:
         if found.get(name, 0.0) > 0 and found.get(f"{name}_on", 1.0) > 0:
-            filters.setdefault(stage, []).append(Filter(kind, found[name], _width(found, name)))
+            own, count, higher = _KINDS[int(found.get(f"{name}_kind", 0))] if kind == "first" else (kind, 1, 1.0)
+            filters.setdefault(stage, []).extend([Filter(own, higher * found[name], _width(found, name))] * count)
     angle_integral = found.get("angle_i", 0.0)
     # A limit of 0 is none.
     return AxisLaw(

@@ -122,7 +122,8 @@ def run_log(
         flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
     if dry_run:
         return Outcome({"dry_run": True}, (Text(f"{log}: is a log of a multirotor; nothing is computed"),))
-    return of_flight(flight, effectiveness(flight), output, asked, force=force)
+    found = of_flight(flight, effectiveness(flight), output, asked, force=force)
+    return replace(found, blocks=(*(Text(f"{log}: {each}", "warning") for each in contents.warnings), *found.blocks))
 
 
 def of_flight(

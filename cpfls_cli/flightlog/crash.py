@@ -13,8 +13,9 @@ from cpfls_cli.units import STANDARD_GRAVITY
 ALIVE = 0.02
 """Share of the largest command below which rotors stand."""
 
-_REST_S, _CALM_RAD_S, _LIVELY_RAD_S = 1.5, 0.5, 0.05
-"""For how long it rests at least, the rate below which it does, and that above which it surely flies."""
+_REST_S, _CALM_RAD_S, _TURNED_RAD_S, LIVELY_RAD_S = 1.5, 0.5, 0.15, 0.05
+"""For how long it rests at least, the rate below which it does, however it shakes, and in all, by which it would turn
+by some 10 degrees; and that above which it surely flies."""
 
 SLOW_S = 0.5
 """Means over so long hold no vibration."""
@@ -183,11 +184,13 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     It also rests where its rotors ask it to turn and it does not.
     """
     nowhere = np.zeros(len(active), dtype=bool)
-    if signs.slow is None or not active.any():
+    if signs.slow is None or signs.body_rate is None or not active.any():
         return Resting(nowhere, nowhere)
-    lively = active & (signs.slow > _LIVELY_RAD_S)
+    lively = active & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else active
+    turned = averaged(signs.body_rate - np.median(signs.body_rate, axis=0), signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
+    calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
     rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)

@@ -10,6 +10,7 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.crash import (
     ALIVE,
+    LIVELY_RAD_S,
     SLOW_S,
     Resting,
     Signs,
@@ -51,11 +52,16 @@ _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
 """Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
 of the height that is estimated for it."""
 
+_SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
+"""Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
+vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin."""
+
 _UNMOVED_M = 0.01
 """Range of heights that no hover keeps to."""
 
-_TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
-"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
+_TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
+"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in
+weights below which it falls, on the mean over s."""
 
 _LONGEST_CUT_S = 3.0
 """Longer than that no throttle is cut in flight: a fall of 44 m."""
@@ -195,11 +201,13 @@ def find_flown(signs: Signs) -> FlownPart:
         why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
         return FlownPart(None, (f"no flight in it: {why}: it stands, and the attitude is wrong",), flies=False)
     rests = resting(signs, active)
-    active = smoothed(active & ~rests.carried, signs.period, _SHORT_S)
+    active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
     if not active.any():
         return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
     if _still(signs, active):
         return FlownPart(None, ("no flight in it: the vehicle neither turns nor moves",), flies=False)
+    if held := _held(signs, active):
+        return FlownPart(None, (f"no flight in it: {held}, as on a test stand",), flies=False)
     return _longest(signs, active, rests, told)
 
 
@@ -242,6 +250,8 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
     if rate is not None and carrying.any():
         turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
         lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+        if signs.felt is not None:
+            lively |= averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S) < _FALLS
         stands = level <= ALIVE
         for first, after in runs(stands):
             # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
@@ -249,6 +259,18 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         first, last = np.flatnonzero(carrying)[[0, -1]]
         carrying[first:last] |= (~stands & lively)[first:last]
     return smoothed(carrying, signs.period, _SHORT_S)
+
+
+def _lifted(signs: Signs, active: BoolArray) -> BoolArray:
+    """Begin stretches with their first motion, where no height shows that rotors turn on the ground before it."""
+    if signs.height is not None or signs.slow is None:
+        return active
+    lifted = active.copy()
+    for first, after in runs(active):
+        moves = np.flatnonzero(signs.slow[first:after] > LIVELY_RAD_S)
+        if first > 0 and len(moves):
+            lifted[first : first + moves[0]] = False
+    return lifted
 
 
 def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArray:
@@ -295,6 +317,28 @@ def _still(signs: Signs, active: BoolArray) -> bool:
         return True
     soft = turning < _SOFT_RAD_S and height is not None
     return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
+
+
+def _held(signs: Signs, active: BoolArray) -> str:
+    """Say by what something else than rotors is seen to hold a vehicle whose rotors turn; empty where nothing is."""
+    if signs.rotors is None:
+        return ""
+    if signs.rotors.shape[1] == 4 and signs.slow is not None:
+        works = np.median(np.nan_to_num(signs.rotors)[active], axis=0)
+        idle = np.flatnonzero(works < _OF_MEAN * works.mean())
+        if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
+            return f"rotor {idle[0] + 1} hardly works, and it does not spin"
+    if signs.body_rate is None or signs.felt is None:
+        return ""
+    # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis.
+    turns, felt = (averaged(each, signs.period, _TURN_S) for each in (signs.body_rate, signs.felt))
+    turned = -np.cross(turns - np.median(turns, axis=0), felt)[active, :2]
+    moved = np.gradient(felt, signs.period, axis=0)[active, :2]
+    power, both = float((turned**2).mean()), float((turned * moved).mean())
+    if power < _SWINGS_RAD_S**2:
+        return ""
+    alike = both / np.sqrt(power * float((moved**2).mean()) + 1e-12)
+    return "the weight turns through it as it turns" if min(both / power, alike) > _AS_HELD else ""
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:

@@ -2,7 +2,9 @@
 
 import re
 import struct
+from bisect import bisect_left
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from math import nan, pi
 from pathlib import Path
@@ -18,34 +20,71 @@ from cpfls_cli.logs.records import bytes_of, date
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 
+_MOST_CELLS, _HUNDREDTHS = 15, 100
+"""Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths."""
+
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read the fields of the longest flight in a file on one clock, ``time``, what changes slowly held in between."""
     del wanted
+    every = flights(path)
+    lasts = [own.topics[""]["time"][-1] for own in every]
+    longest = max(range(len(every)), key=lambda number: len(every[number].topics[""]["time"]))
+    several = (
+        f"holds {len(every)} flights; the longest, number {longest + 1}, is read: {lasts[longest]:.0f} s; `cpfls look` "
+        "looks at each"
+    )
+    own = every[longest]
+    return replace(own, warnings=(several, *own.warnings)) if len(every) > 1 else own
+
+
+def flights(path: Path) -> list[LogContents]:
+    """Read all flights in a file, those without readable frames left out."""
     content = bytes_of(path)
     begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
     if not begins:
         raise InputError(f"{path}: not a blackbox log: it does not start like one")
     try:
-        flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
-        longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
-        header, rows, slow, broken = flights[longest]
-        columns, units = _scaled_columns(header, rows)
-        columns |= {name: held for name, held in _slow_columns(header, slow, len(rows)).items() if name not in columns}
+        found = [_contents(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
     except KeyError as error:
         raise InputError(f"{path}: a broken blackbox log: its header lacks the line {error}") from None
     except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: a broken blackbox log: its header: {error}") from None
-    if len(rows) < 2:
+    whole = [own for own in found if len(own.topics[""]["time"]) > 1]
+    if not whole:
         raise InputError(f"{path}: a blackbox log without readable frames")
-    several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
+    return whole
+
+
+def _contents(content: bytes) -> LogContents:
+    header, rows, slow, broken = _flight(content)
+    columns, units = _scaled_columns(header, rows)
+    columns |= {name: held for name, held in _slow_columns(header, slow, len(rows)).items() if name not in columns}
+    kept = _in_order(columns["time"])
+    if len(kept) < len(rows):
+        broken += len(rows) - len(kept)
+        columns = {name: values[kept] for name, values in columns.items()}
     lost = f"{broken} frames are broken; everything up to the next whole frame is missing"
-    warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
     # Lines that are not about the log itself.
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
-    system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])}
-    return LogContents({"": columns}, units, parameters, system, warnings, _flown_at(header), first)
+    system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])} if len(rows) else {}
+    return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
+
+
+def _in_order(time: Array) -> IntArray:
+    """Give the rows of the longest series whose stamps rise: damaged frames may have any."""
+    if (np.diff(time) > 0).all():
+        return np.arange(len(time))
+    least, at, before = list[float](), list[int](), np.full(len(time), -1)
+    for row, stamp in enumerate(time.tolist()):
+        place = bisect_left(least, stamp)
+        least[place : place + 1], at[place : place + 1] = [stamp], [row]
+        before[row] = at[place - 1] if place else -1
+    kept = at[-1:]
+    while kept and before[kept[-1]] >= 0:
+        kept.append(int(before[kept[-1]]))
+    return np.array(kept[::-1], dtype=np.int64)
 
 
 def _flown_at(header: Mapping[str, str]) -> float:
@@ -125,7 +164,8 @@ def _fields(header: Mapping[str, str]) -> Fields:
 def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header tells in that unit."""
     names = header["Field I name"].split(",")
-    stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)
+    # A small step back is that of a damaged frame.
+    stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < -ROLLOVER // 2)
     # The number of a frame follows from which frames are left out, which nothing here needs.
     columns = {name: rows[:, place].astype(float) for place, name in enumerate(names) if name != "loopIteration"}
     columns["time"] = 1e-6 * (stamps - stamps[:1])
@@ -159,9 +199,14 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
     if int(header.get("acc_1G", "0")) > 0:
         scales += [("accSmooth[", 1 / int(header["acc_1G"]), "g")]
     if version[0] == "Betaflight" and version[1] >= (3, 1):
-        scales += [("vbatLatest", 0.01 if version[1] >= (4, 0) else 0.1, "V")]
         scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
         scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
+    cells = max(_integers(header, "vbatcellvoltage", "0"))
+    hundredths = cells >= _HUNDREDTHS if cells else version[1] >= (4, 0)
+    # In the unit of a cell; before 2017 it is what the converter reads.
+    known = int(header.get("vbatref", "0")) < _MOST_CELLS * cells
+    if known if cells else version[0] == "Betaflight" and version[1] >= (3, 1):
+        scales += [("vbatLatest", 0.01 if hundredths else 0.1, "V")]
     if version[0] == "INAV":
         scales += [("vbat", 0.01, "V"), ("attitude[", 0.1, "deg")]
     if int(header.get("motor_poles", "0")) > 0:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from math import nan
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from cpfls_cli.errors import InputError, about, install_command
@@ -183,6 +184,18 @@ def is_log(path: Path) -> bool:
 
 def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read the wanted columns of a log, flat or ``topic.field``, as numbers; if none is named, all that are numbers."""
+    contents: LogContents = _reader(path).contents(path, wanted)
+    return contents
+
+
+def log_flights(path: Path) -> list[LogContents]:
+    """Read all columns that are numbers, of each flight that a file holds."""
+    reader = _reader(path)
+    return reader.flights(path) if hasattr(reader, "flights") else [reader.contents(path, None)]
+
+
+def _reader(path: Path) -> ModuleType:
+    """Load what reads a log, and refuse what none does."""
     form = _format_of(path)
     if _first_line(path).startswith(_ENCRYPTED_MAGIC):
         raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
@@ -200,8 +213,7 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
         raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must hold one of {free}")
     _refuse_other_content(path, form)
     _require_packages(path, form)
-    contents: LogContents = import_module(form.reader).contents(path, wanted)
-    return contents
+    return import_module(form.reader)
 
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:

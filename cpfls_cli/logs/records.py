@@ -1,6 +1,7 @@
 """Binary records of several kinds, mixed in one file, as tables of numbers."""
 
 import re
+import time
 from collections.abc import Sequence
 from math import nan
 from pathlib import Path
@@ -11,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 
 # Of 2005 and 2100: nothing flew a multirotor that logs before, or has yet after.
-_FIRST_DATE, _LAST_DATE = 1.1e9, 4.1e9
+_FIRST_DATE, _DAY_S = 1.1e9, 86400.0
 
 
 def bytes_of(path: Path) -> bytes:
@@ -41,8 +42,8 @@ def plain(text: str) -> str:
 
 
 def date(second: float) -> float:
-    """Give s since 1970 began, or NaN for what is no date: a clock that was never set begins in 1970 or 1980."""
-    return float(second) if _FIRST_DATE < second < _LAST_DATE else nan
+    """Give s since 1970 began, or NaN for what is no date: a clock that was never set is in 1970, 1980 or to come."""
+    return float(second) if _FIRST_DATE < second < time.time() + _DAY_S else nan
 
 
 def seconds(stamps: np.ndarray, origin: int, per_second: int) -> Array:

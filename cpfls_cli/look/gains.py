@@ -27,8 +27,8 @@ HOLDS = 0.95
 """Share of the plants with which proposed gains hold the asked margins."""
 _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
-ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
-"""Margins from which on a loop is usually accepted: what has them and flies is not slowed down."""
+ACCEPTABLE = AskedMargins(4.0, 25.0, 25.0)
+"""Margins from which on a loop is accepted: what may have them and flies is not slowed down."""
 _AT_ONCE = 1.25
 """Factor by which a gain changes at most from one log to the next."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
@@ -101,7 +101,8 @@ class GainRow:
     high: float = about("largest of the best values; not finite where noise or a range sets the value", gaps=True)
     direction: str = about("raise, lower or keep")
     why: str = about(
-        "margins, noise, range, step: the way there in one log, or with: it goes with another parameter of its axis; empty where kept"
+        "margins, noise, range, step: the way there in one log, with: it goes with another parameter of its axis, "
+        "accepted: higher than the margins asked for, and kept, since it flew with enough; empty: not sure"
     )
 
 
@@ -112,8 +113,9 @@ class AxisGains:
     axis: str = about("roll, pitch or yaw")
     changed: bool = about("whether a change is sure")
     reason: str = about(
-        "why nothing is proposed: weak, law (with the plant it would not fly), feedback (what flew is not as stated), margins (no gains keep them), band (the "
-        "loop would cross above what is identified); empty where gains are proposed or kept"
+        "why nothing is proposed: weak, law (with the plant it would not fly), feedback (what flew is not as stated), "
+        "margins (no gains keep them), band (the loop would cross above what is identified); empty where gains are "
+        "proposed or kept"
     )
     fact: str = about("more about the reason")
     attitude: bool = about("whether the loop of the attitude is closed around that of the rate")
@@ -247,7 +249,7 @@ class _Work:
         return [self._axis(axis, rows, *reasons.get(axis, ("", ""))) for axis in range(len(AXES))], rows
 
     def _other_feedback(self, axis: int) -> str:
-        """Say how the feedback that flew differs from the stated one where the loop crosses; empty where it does not."""
+        """Say how the feedback that flew differs from the stated one where the loop crosses; empty where it fits."""
         flown = flown_feedback(self.flight, axis, self.law)
         crosses = self._margins(axis, self.values).crossover_hz.value
         if flown is None or flown.fits(crosses):
@@ -322,7 +324,8 @@ class _Work:
             reason=reason,
             fact=fact,
             attitude=bool(self.attitude[axis]),
-            before=self._margins(axis, self.values) if identified else None,
+            # Of another law than the one that flew, margins say nothing.
+            before=self._margins(axis, self.values) if identified and reason not in ("law", "feedback") else None,
             after=self._margins(axis, {**self.values, **new}) if identified and not reason else None,
         )
 
@@ -363,11 +366,11 @@ class _Work:
         return [*rows, *self._raised(axis, rows)]
 
     def _acceptable(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
-        """Keep gains that are higher than asked margins allow where the loop has those that every guide accepts."""
-        if float(np.median(self._held(axis, self.values))) < ACCEPTABLE.disk:
+        """Keep gains that are higher than asked margins allow unless the loop surely has too little to be accepted."""
+        if float(np.quantile(self._held(axis, self.values), HOLDS)) < ACCEPTABLE.disk:
             return rows
         return [
-            replace(row, proposed=row.today, direction="keep", why="") if row.direction == "lower" else row
+            replace(row, proposed=row.today, direction="keep", why="accepted") if row.direction == "lower" else row
             for row in rows
         ]
 

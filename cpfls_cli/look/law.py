@@ -2,43 +2,47 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.law import Law, chain
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.estimation.spectra import block_spectra, cut_blocks, smoothed, transforms, window_starts
 from cpfls_cli.look.flight import LogFlight
-from cpfls_cli.result import about, result
 
-_WINDOW_S, _SLOW_WINDOW_S, _SLOW_HZ = 1.0, 4.0, 150.0
+_WINDOW_S, _SLOW_WINDOW_S, _SLOW_HZ = 2.0, 4.0, 150.0
 """Windows, those of slow logs, and the rate of the clock below which a log is one."""
 _OF_CLOCK, _FEWEST_BLOCKS = 0.065, 6
-_EXPLAINED = 0.8
-"""Least share of the command that setpoint and body rate explain where the feedback is seen."""
-_MOST_DB, _MOST_DEG = 3.0, 20.0
+_FOLLOWS = 0.9
+"""Least share of what the setpoint leaves of the command that goes with the body rate: less, and rounding of the body
+rate makes the feedback seem smaller by as much."""
+_MOST_DB, _MOST_DEG = 2.0, 15.0
 """By which the feedback that flew may differ from the stated one, so that margins of the latter count."""
-_AROUND = 1.5
+_AROUND, _TINY = 1.5, float(np.finfo(float).tiny)
 """Frequencies around a crossover that decide its margins, a factor to both sides."""
 
 
-@result
-class FlownFeedback:
-    """The feedback about one axis as it flew, over that of the stated law."""
+class FlownFeedback(NamedTuple):
+    """The feedback about one axis as it flew, over that of the stated law.
 
-    axis: str = about("roll, pitch or yaw")
-    frequency: Array = about("at which setpoint and body rate explain the command", "frequency", unit="Hz", brief=False)
-    ratio: Array = about("size of what flew over that of the law", "frequency", brief=False)
-    ratio_error: Array = about("standard error of its logarithm", "frequency", brief=False)
-    turned: Array = about("phase of what flew less that of the law", "frequency", unit="rad", brief=False)
+    Attributes
+    ----------
+    frequency : array, shape (frequency,), Hz
+        Where the command is seen to follow the body rate.
+    over : array of complex, shape (frequency,)
+    """
+
+    frequency: Array
+    over: Numbers
 
     def near(self, hz: float) -> tuple[float, float] | None:
         """Give size, as a ratio, and phase, rad, around a crossover; None where the log does not show them."""
         inside = np.abs(np.log(self.frequency / hz)) < np.log(_AROUND)
         if not inside.any():
             return None
-        return float(np.exp(np.median(np.log(self.ratio[inside])))), float(np.median(self.turned[inside]))
+        return float(np.median(np.abs(self.over[inside]))), float(np.median(np.angle(self.over[inside])))
 
     def fits(self, hz: float) -> bool:
         """Whether margins of the stated law count at a crossover; so they do where the log does not show it."""
@@ -82,22 +86,12 @@ def flown_feedback(flight: LogFlight, axis: int, law: Law) -> FlownFeedback | No
     spectra = block_spectra(parts, cut_blocks((np.abs(parts[2]) ** 2).sum(axis=1)), frequency, inside)
     if len(spectra.windows) < _FEWEST_BLOCKS:
         return None
-    total = smoothed(np.concatenate([spectra.total[None], spectra.total - spectra.cross]), axis=1)
-    power = total[..., 2, 2].real
-    solved = np.linalg.solve(
-        total[..., :2, :2] + 1e-12 * np.trace(total[..., :2, :2], axis1=-2, axis2=-1)[..., None, None] * np.eye(2),
-        total[..., :2, 2:],
-    )
-    explained = (total[0, :, :2, 2].conj() * solved[0, :, :, 0]).sum(axis=1).real / np.maximum(
-        power[0], np.finfo(float).tiny
-    )
-    over = -solved[..., 1, 0] / law.response(axis, spectra.frequency).feedback
-    clear = (explained > _EXPLAINED) & (np.abs(over) > 0).all(axis=0)
-    size = np.log(np.abs(over[:, clear]))
-    return FlownFeedback(
-        axis=("roll", "pitch", "yaw")[axis],
-        frequency=spectra.frequency[clear],
-        ratio=np.exp(size[0]),
-        ratio_error=jackknife_error(size[1:]),
-        turned=np.angle(over[0, clear]),
-    )
+    total = smoothed(spectra.total[None], axis=1)[0]
+    # Of body rate and command, what goes with the setpoint is taken off.
+    rest = total[:, 1:, 1:] - total[:, 1:, :1] * total[:, :1, 1:] / np.maximum(total[:, :1, :1].real, _TINY)
+    powers = rest[:, 0, 0].real * rest[:, 1, 1].real
+    clear = (powers > _TINY) & (np.abs(rest[:, 0, 1]) ** 2 > _FOLLOWS * powers)
+    seen = spectra.frequency[clear]
+    # The logged body rate has passed filters that are part of the law's feedback.
+    stated = law.response(axis, seen).feedback / gyroscope_filters(law, axis, seen)
+    return FlownFeedback(seen, -rest[clear, 0, 1] / rest[clear, 0, 0].real / stated)

@@ -13,6 +13,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error
 from cpfls_cli.look.flight import AXES, LogFlight, Samples
+from cpfls_cli.look.law import flown_law
 from cpfls_cli.look.steady import Windows, number, windows_of
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.noise import Noise
@@ -136,7 +137,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     spectra = {name: power.spectrum(name) for name, power in parts.items() if power}
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
-    law = _law(flight, autopilot)
+    law = flown_law(flight)
     noise = main.noise() if main and law else None
     if noise and law and filtered and before is None:
         noise = noise.before_filters(law)
@@ -230,13 +231,6 @@ class _Power(NamedTuple):
         passed = rfft(values, axis=1) / (1 + (_ABOVE_HZ / np.maximum(frequency, 1e-9)) ** 8)
         quick = irfft(passed, len(even), axis=1).T
         return np.asarray(np.sqrt(np.mean(self.windows.means(Samples(even, quick**2)), axis=0)))
-
-
-def _law(flight: LogFlight, autopilot: Autopilot | None) -> Law | None:
-    if autopilot is None or autopilot.firmware.too_old(flight.system):
-        return None
-    values = autopilot.in_log(flight.parameters)
-    return autopilot.law(autopilot.of_log(values)) if values else None
 
 
 def _map(flight: LogFlight, power: _Power) -> tuple[Array, Array, Array]:
@@ -404,7 +398,8 @@ def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Lin
         group, stage, kind = (*parameter.role.split("."), "", "")[:3]
         own = getattr(law.axes[AXES.index(group) if group in AXES else 0], stage) if stage in STAGES else ()
         hz = stated[parameter.name] * parameter.scale
-        for each in (each for each in own if each.kind == kind.rstrip("2") and each.hz == hz):
+        kinds = {"first": ("first", "second")}.get(kind.rstrip("2"), (kind.rstrip("2"),))
+        for each in (each for each in own if each.kind in kinds and each.hz == hz):
             if (stage, each) not in seen:
                 seen.add((stage, each))
                 phase = -float(np.angle(chain((each,), back, law.period))[0])

@@ -29,6 +29,7 @@ _REASONS: Final = {
 }
 _WHY: Final = {
     "": "no change is sure",
+    "accepted": "kept: the loop that flew may bear enough",
     "margins": "asked margins",
     "step": "a step on the way: load it, fly, and look again",
     "noise": "noise: not more at once",
@@ -45,7 +46,7 @@ def answer(gains: TunedGains) -> Iterator[Block]:
         return
     told = [sentence(_axis(each)) for each in gains.axes if each.before is not None and not each.reason]
     changes = len(gains.changes)
-    title = f"{name}: {'change ' + str(changes) if changes else 'no change'} of {len(gains.rows)} gains is sure"
+    title = f"{name}: " + (f"change {changes} of {len(gains.rows)} gains" if changes else "keep the gains")
     if not gains.rows:
         title = f"{name}: no gains"
     yield Box("GAINS", sentence(title), told, "good" if told else "warning")
@@ -91,8 +92,8 @@ def _table(gains: TunedGains) -> Table:
     ]
     header = ("Parameter", "Gain", "Today", "Proposed", "Best, 95 %", "By")
     caption = (
-        f"Gains that hold a disk margin of {number(gains.required, 3)}° with {percent(HOLDS, 2)} of the vehicles that "
-        "the log leaves possible."
+        f"Best gains hold a disk margin of {number(gains.required, 3)}° with {percent(HOLDS, 2)} of the vehicles that "
+        "the log leaves possible; one log bears one step to them."
     )
     legend = (
         "Best: the values that would suit each of these vehicles alone. A gain changes where today's value suits none."

@@ -14,7 +14,7 @@ import typer
 
 from cpfls_cli.chart import Axis, Chart, span
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.logs.formats import log_contents, suffixes_in_words
+from cpfls_cli.logs.formats import LogContents, log_flights, suffixes_in_words
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES
 from cpfls_cli.look.look import Look, look_at
@@ -247,10 +247,10 @@ def look(
         run.take({"log": path}, name)
     if run.dry_run:
         return None
-    found = {}
+    found: dict[str, Look] = {}
     for done, (name, path) in enumerate(named.items()):
         try:
-            found[name] = _one(run, path, done, len(named))
+            found |= _every(run, name, path, done, len(named))
         except (InputError, ComputationError) as error:
             if len(named) == 1:
                 raise
@@ -262,21 +262,35 @@ def look(
     return found
 
 
-def _one(run: Run, path: Path, done: int, total: int) -> Look:
+def _every(run: Run, name: str, path: Path, done: int, total: int) -> dict[str, Look]:
+    """Look at each flight that a file holds."""
     run.progress(done, total, f"reads {path.name}")
-    contents = log_contents(path)
-    try:
-        return look_at(
-            path.name,
-            contents.topics,
-            contents.units,
-            contents.parameters,
-            contents.system,
-            messages=contents.messages,
-            flown_at=contents.flown_at,
-            warnings=contents.warnings,
-            progress=lambda what: run.progress(done, total, f"{path.name}: {what}"),
-        )
-    except InputError as error:
-        # It is a log, but holds nothing to look at.
-        raise ComputationError(f"{path}: {str(error).removeprefix(f'{path.name}: ')}") from None
+    flights, found = log_flights(path), dict[str, Look]()
+    if len(flights) == 1:
+        try:
+            return {name: _one(run, path.name, flights[0], done, total)}
+        except InputError as error:
+            # It is a log, but holds nothing to look at.
+            raise ComputationError(f"{path}: {str(error).removeprefix(f'{path.name}: ')}") from None
+    for number, contents in enumerate(flights, 1):
+        own, title = f"{name}-flight-{number}", f"{path.name}, flight {number} of {len(flights)}"
+        run.take({"log": path}, own)
+        try:
+            found[own] = _one(run, title, contents, done, total)
+        except InputError as error:
+            found[own] = Look(name=title, refused=str(error).removeprefix(f"{title}: "))
+    return found
+
+
+def _one(run: Run, title: str, contents: LogContents, done: int, total: int) -> Look:
+    return look_at(
+        title,
+        contents.topics,
+        contents.units,
+        contents.parameters,
+        contents.system,
+        messages=contents.messages,
+        flown_at=contents.flown_at,
+        warnings=contents.warnings,
+        progress=lambda what: run.progress(done, total, f"{title}: {what}"),
+    )

@@ -34,6 +34,13 @@ def _axis(axis: str, gains: tuple[float, ...]) -> list[Parameter]:
     ]
 
 
+def _notch(name: str, role: str, meaning: str) -> tuple[Parameter, Parameter]:
+    return (
+        Parameter(f"{name}_hz", role, 0.0, 0.0, 1000.0, meaning, "Hz", step=1.0),
+        Parameter(f"{name}_cutoff", f"{role}_lower", 0.0, 0.0, 1000.0, "its lower end", "Hz", step=1.0),
+    )
+
+
 BETAFLIGHT = Autopilot(
     name="betaflight",
     title="Betaflight",
@@ -107,8 +114,8 @@ BETAFLIGHT = Autopilot(
             step=1.0,
             absent=0.0,
         ),
-        Parameter("gyro_notch1_hz", "all.measured.notch", 0.0, 0.0, 1000.0, "notch of the gyroscope", "Hz", step=1.0),
-        Parameter("gyro_notch1_cutoff", "all.measured.notch_lower", 0.0, 0.0, 1000.0, "its lower end", "Hz", step=1.0),
+        *_notch("gyro_notch1", "all.measured.notch", "notch of the gyroscope"),
+        *_notch("gyro_notch2", "all.measured.notch2", "second notch of the gyroscope"),
         Parameter(
             "dterm_lpf1_dyn_min_hz",
             "all.slope.first",
@@ -128,6 +135,17 @@ BETAFLIGHT = Autopilot(
             1000.0,
             "second low-pass of the derivative",
             "Hz",
+            step=1.0,
+            absent=0.0,
+        ),
+        *_notch("dterm_notch", "all.slope.notch", "notch of the derivative"),
+        Parameter(
+            "dterm_lpf1_type",
+            "all.slope.first_kind",
+            0.0,
+            0.0,
+            3.0,
+            "of the low-pass of the derivative: one pole, two of Butterworth, two, three",
             step=1.0,
             absent=0.0,
         ),
@@ -174,8 +192,9 @@ BETAFLIGHT = Autopilot(
         "dterm_lowpass_hz": ("dterm_lpf1_dyn_min_hz",),
         "dterm_lowpass_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
         "dterm_lowpass2_hz": ("dterm_lpf2_static_hz",),
-        "gyro_notch_hz": ("gyro_notch1_hz",),
-        "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
+        "gyro_notch_hz": ("gyro_notch1_hz", "gyro_notch2_hz"),
+        "gyro_notch_cutoff": ("gyro_notch1_cutoff", "gyro_notch2_cutoff"),
+        "dterm_filter_type": ("dterm_lpf1_type",),
     },
     filtered=("gyroADC",),
     cross=((-1, -1, -1), (1, -1, 1), (-1, 1, 1), (1, 1, -1)),

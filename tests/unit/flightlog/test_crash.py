@@ -182,3 +182,14 @@ def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
     found = flown(bench, ("force", "upright"))
     assert not found.flies
     assert found.reasons[0].startswith("no flight in it: by its attitude it lies on its back for seconds")
+
+
+def test_a_long_turn_pushed_along_its_side_is_no_rest(own):
+    """Air that is as strong as the weight, as a dive has it, while the vehicle turns slowly all the time."""
+    dives = type(own)(**vars(own))
+    inside = (own.time > 15) & (own.time < 20)
+    dives.rate = np.where(inside[:, None], [0.35, 0.0, 0.3], own.rate)
+    dives.specific_force = np.where(inside[:, None], [9.0, 1.0, 0.0], own.specific_force)
+    assert flown(dives, ("force",)).ended == ""
+    dives.rate = np.where(inside[:, None], np.median(own.rate, axis=0), own.rate)
+    assert "rests on something" in flown(dives, ("force",)).ended

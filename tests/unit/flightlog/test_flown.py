@@ -85,3 +85,51 @@ def test_height_alone_tells_a_flight():
 def test_what_does_not_fly_is_said_to(level, height, rate, reason):
     flown = flown_by(level, height, rate)
     assert (flown.flies, flown.reasons) == (False, (reason,))
+
+
+def test_a_stand_feels_the_weight_turn_and_a_flight_does_not():
+    lean = 0.2 * np.sin(4 * TIME)
+
+    def flown(side):
+        signs = Signs(
+            time=TIME,
+            rotors=np.full((len(TIME), 4), 0.4),
+            body_rate=np.gradient(lean, 0.01)[:, None] * [0.0, 1.0, 0.0],
+            force=np.column_stack([side, 0 * TIME, np.cos(lean)]),
+        )
+        return find_flown(signs)
+
+    stand = flown(-np.sin(lean))
+    assert not stand.flies
+    assert stand.reasons == ("no flight in it: the weight turns through it as it turns, as on a test stand",)
+    # Drag follows speed, which the lean makes, late; an acceleration of the world has the other sign.
+    assert flown(0.05 * np.cos(4 * TIME)).flies
+    assert flown(np.sin(lean)).flies
+
+
+def test_a_quadrotor_without_one_rotor_spins_or_is_held():
+    rotors = np.full((len(TIME), 4), 0.4) * [1, 1, 1, 0.01]
+    wobbles = 0.3 * np.sin(9 * TIME)[:, None] * [1.0, 1.0, 0.0]
+    held = find_flown(Signs(time=TIME, rotors=rotors, body_rate=0.1 * wobbles))
+    assert held.reasons == ("no flight in it: rotor 4 hardly works, and it does not spin, as on a test stand",)
+    spinning = wobbles + np.cumsum(np.where(TIME < 38, 0.002, -0.04))[:, None] * [0, 0, 1.0]
+    assert find_flown(Signs(time=TIME, rotors=rotors, body_rate=spinning)).flies
+
+
+def test_a_cut_throttle_in_free_fall_is_part_of_the_flight():
+    level = between(5, 35, 0.5) - between(15, 17, 0.5)
+    falls = between(15.1, 17, -0.95)
+    signs = Signs(
+        time=TIME,
+        rotors=np.repeat(level[:, None], 4, axis=1),
+        body_rate=(turning(5, 15, 3.0) + turning(17, 35, 3.0))[:, None] * [1.0, 0.0, 0.0],
+        force=(1 + falls)[:, None] * [0.0, 0.0, 1.0],
+    )
+    flown = find_flown(signs)
+    assert flown.moments == ()
+    assert len(flown.stretches_s) == 1
+
+
+def test_rotors_that_rise_on_the_ground_do_not_fly_before_it_moves():
+    flown = flown_by(between(5, 35, 0.5), None, turning(20, 35))
+    assert flown.stretches_s[0][0] == pytest.approx(20.5, abs=0.4)

@@ -6,8 +6,20 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import log_contents
-from tests.builders.blackbox_logs import BEEP, END, FACTS, FIELDS, NAMES, RESUMED, SLOW, flight, frames, header
+from cpfls_cli.logs.formats import log_contents, log_flights
+from tests.builders.blackbox_logs import (
+    BATTERY,
+    BEEP,
+    END,
+    FACTS,
+    FIELDS,
+    NAMES,
+    RESUMED,
+    SLOW,
+    flight,
+    frames,
+    header,
+)
 
 
 @pytest.fixture
@@ -134,7 +146,7 @@ def test_of_several_flights_the_longest_is_read(read):
     files = [header() + b"".join([*frames(rows), END]) for rows in (short, long, short)]
     contents = read(b"".join(files))
     held(contents, long)
-    assert contents.warnings == ("holds 3 flights; the longest, number 2, is read: 0 s",)
+    assert contents.warnings == ("holds 3 flights; the longest, number 2, is read: 0 s; `cpfls look` looks at each",)
 
 
 @pytest.mark.parametrize(
@@ -159,3 +171,43 @@ def test_what_is_no_log(read, content, message):
     with pytest.raises(InputError) as caught:
         read(content)
     assert message in str(caught.value)
+
+
+def test_stamps_of_damaged_frames_do_not_shift_the_others(read):
+    rows = flight(begin_us=1_000_000)
+    rows[17, 1] += 900_000
+    contents = read(header() + b"".join(frames(rows)))
+    # The two whole frames after it are taken for steps back.
+    held(contents, np.delete(rows, range(17, 32), axis=0))
+    assert contents.warnings == ("2 frames are broken; everything up to the next whole frame is missing",)
+
+
+def test_volts_are_in_the_unit_of_a_cell(read):
+    def factor(revision, cells, reference):
+        rows = flight()
+        place = NAMES.index("vbatLatest")
+        changes = {"Firmware revision": revision, "vbatcellvoltage": cells, "vbatref": str(reference)}
+        # Frames hold the difference to the reference.
+        read_as = rows[3, place] - BATTERY + reference
+        return read(header(**changes) + b"".join(frames(rows))).topics[""]["vbatLatest"][3] / read_as
+
+    assert factor("Betaflight 3.0.1 (48b7b4f) X", "33,35,43", 163) == pytest.approx(0.1)
+    assert factor("Cleanflight 2.5.0 (08348b705) X", "33,35,43", 151) == pytest.approx(0.1)
+    assert factor("Betaflight 4.3.1 (8d4f005) X", "330,350,430", 1667) == pytest.approx(0.01)
+    # The converter's numbers, of which no header gives the scale.
+    assert factor("bdaf8ec", "33,35,43", 1840) == 1
+
+
+def test_each_flight_of_a_file_is_read(tmp_path):
+    path, made = tmp_path / "dump.bbl", [flight(16), flight(40, seed=2)]
+    path.write_bytes(b"".join(header() + b"".join([*frames(rows), END]) for rows in made) + header())
+    for contents, rows in zip(log_flights(path), made, strict=True):
+        held(contents, rows)
+
+
+def test_a_date_to_come_is_none(read):
+    dated = [
+        read(header(**{"Log start datetime": f"{year}-06-28T01:04:00.000+00:00"}) + b"".join(frames(flight())))
+        for year in (2025, 2091)
+    ]
+    assert [np.isfinite(own.flown_at) for own in dated] == [True, False]

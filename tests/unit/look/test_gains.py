@@ -18,10 +18,15 @@ from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked
 HELD_DISK = 2 * np.tan(np.radians(45) / 2)
 
 
+AT_ONCE, ACCEPTABLE = cpfls_cli.look.gains._AT_ONCE, cpfls_cli.look.gains._ACCEPTABLE
+
+
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch):
-    """Tune for fewer plants one by one, which takes a quarter of the time."""
+    """Tune for fewer plants one by one, which takes a quarter of the time, and all the way at once."""
     monkeypatch.setattr(cpfls_cli.look.gains, "DRAWS", 10)
+    monkeypatch.setattr(cpfls_cli.look.gains, "_AT_ONCE", 1e6)
+    monkeypatch.setattr(cpfls_cli.look.gains, "_ACCEPTABLE", np.inf)
 
 
 def found(autopilot, values=None, own=None, **options):
@@ -101,6 +106,33 @@ def test_what_is_far_off_is_moved(factor, direction):
     rows = by_term(found("px4", {name: factor * value for name, value in suited.items()}))
     assert rows["P"].direction == direction
     assert {row.direction for row in rows.values()} <= {direction, "keep"}
+
+
+def test_one_log_bears_one_step(monkeypatch):
+    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    monkeypatch.setattr(cpfls_cli.look.gains, "_AT_ONCE", AT_ONCE)
+    row = by_term(found("px4", {name: 0.3 * value for name, value in suited.items()}))["P"]
+    assert (row.direction, row.why) == ("raise", "step")
+    assert row.proposed == pytest.approx(1.25 * row.today, rel=0.01)
+    assert row.proposed <= 1.25 * row.today
+    assert row.low > row.proposed
+
+
+def test_gains_go_down_only_where_margins_are_surely_too_small(monkeypatch):
+    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    monkeypatch.setattr(cpfls_cli.look.gains, "_ACCEPTABLE", ACCEPTABLE)
+
+    def way(factor, spread=NARROW):
+        own = looked_plant(*PLANTS["px4"], spread)
+        gains = found("px4", {name: factor * value for name, value in suited.items()}, own=own)
+        return by_term(gains)["P"].direction, gains.axes[0].before.disk_deg
+
+    kept, acceptable = way(1.3)
+    assert (kept, acceptable.value > 25) == ("keep", True)
+    lowered, little = way(2.5)
+    assert (lowered, little.high < 25) == ("lower", True)
+    # The same loop with a vehicle that is hardly known may have enough.
+    assert way(2.5, (0.4, 0.004, 0.3))[0] == "keep"
 
 
 def test_the_factor_on_all_gains_stays():
