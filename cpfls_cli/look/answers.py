@@ -316,7 +316,7 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     steps = [*first, *logged, *flights[len(first) :]] if urgent else [*flights[:_TRIED], *logged]
     model = NextStep(
         what="for a model, with mass and arm",
-        command=f"cpfls init {shlex.quote(found.flight.name)} --mass KG --arm M -o study.yaml",
+        command=f"cpfls init {shlex.quote(found.flight.name.partition(', flight ')[0])} --mass KG --arm M -o study.yaml",
         why=answers[-1].question,
     )
     return (*steps[:_TRIED], model)

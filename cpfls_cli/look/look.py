@@ -57,6 +57,11 @@ class Look:
         return [event for event in self.events if event.severity == "danger"]
 
     @property
+    def file(self) -> str:
+        """Name of the file, of which this may be one flight."""
+        return self.name.partition(", flight ")[0]
+
+    @property
     def warned(self) -> list[Event]:
         """Events that want a look, but for what the autopilot said."""
         return [event for event in self.events if event.severity == "warning" and event.kind != "message"]
