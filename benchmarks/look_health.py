@@ -68,8 +68,12 @@ def gusts():
         row(f"gusts of {memory} s, size", [each.size for each in found], 3.0)
 
 
-if __name__ == "__main__":
+def main() -> None:
     print("| what | truth | found | inside | half-width |\n|---|---|---|---|---|")
     balances()
     hovers()
     gusts()
+
+
+if __name__ == "__main__":
+    main()

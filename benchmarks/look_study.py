@@ -388,6 +388,10 @@ def table(rows: list[dict[str, object]]) -> None:
         print("| " + " | ".join([name, *(str(column(own)) for column in columns.values())]) + " |")
 
 
-if __name__ == "__main__":
+def main() -> None:
     seed, count = (int(each) for each in (*sys.argv[1:3], *("4", "200")[len(sys.argv) - 1 :]))
     table([row for case, log, _ in flights(seed, count) for row in rows_of(case, log)])
+
+
+if __name__ == "__main__":
+    main()

@@ -18,8 +18,9 @@ _OF_CLOCK, _FEWEST_BLOCKS = 0.065, 6
 _FOLLOWS = 0.9
 """Least share of what the setpoint leaves of the command that goes with the body rate: less, and rounding of the body
 rate makes the feedback seem smaller by as much."""
-_MOST_DB, _MOST_DEG = 2.0, 15.0
-"""By which the feedback that flew may differ from the stated one, so that margins of the latter count."""
+_MOST_DB, _MOST_DEG = 3.0, 20.0
+"""By which the feedback that flew may differ from the stated one, so that margins of the latter count: about half of
+those that are usually asked for."""
 _AROUND, _TINY = 1.5, float(np.finfo(float).tiny)
 """Frequencies around a crossover that decide its margins, a factor to both sides."""
 

@@ -18,7 +18,7 @@ from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked
 HELD_DISK = 2 * np.tan(np.radians(45) / 2)
 
 
-AT_ONCE, ACCEPTABLE = cpfls_cli.look.gains._AT_ONCE, cpfls_cli.look.gains._ACCEPTABLE
+AT_ONCE, ACCEPTABLE = cpfls_cli.look.gains._AT_ONCE, cpfls_cli.look.gains._LEAST_DISK
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +26,7 @@ def few_draws(monkeypatch):
     """Tune for fewer plants one by one, which takes a quarter of the time, and all the way at once."""
     monkeypatch.setattr(cpfls_cli.look.gains, "DRAWS", 10)
     monkeypatch.setattr(cpfls_cli.look.gains, "_AT_ONCE", 1e6)
-    monkeypatch.setattr(cpfls_cli.look.gains, "_ACCEPTABLE", np.inf)
+    monkeypatch.setattr(cpfls_cli.look.gains, "_LEAST_DISK", np.inf)
 
 
 def found(autopilot, values=None, own=None, **options):
@@ -120,7 +120,7 @@ def test_one_log_bears_one_step(monkeypatch):
 
 def test_gains_go_down_only_where_margins_are_surely_too_small(monkeypatch):
     suited = {row.parameter: row.proposed for row in found("px4").rows}
-    monkeypatch.setattr(cpfls_cli.look.gains, "_ACCEPTABLE", ACCEPTABLE)
+    monkeypatch.setattr(cpfls_cli.look.gains, "_LEAST_DISK", ACCEPTABLE)
 
     def way(factor, spread=NARROW):
         own = looked_plant(*PLANTS["px4"], spread)
