@@ -171,6 +171,7 @@ def test_patterns_are_named_and_no_rotor_is_called_weak():
     assert "M3 \\+" in weak.splitlines()[0]
     assert "It may be rotor 3 (propeller, motor or speed controller), or a centre of mass" in weak
     assert "together with a steady yaw torque" in weak
+    assert re.search(r"off the middle, (ahead|behind) and (left|right)\b", weak)
     assert "weak" not in weak
 
 
