@@ -314,9 +314,10 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     urgent = any(each.answer == "no" and each.log for each in open_)
     first = flights[:1] if cause else []
     steps = [*first, *logged, *flights[len(first) :]] if urgent else [*flights[:_TRIED], *logged]
+    file = found.flight.name.partition(", flight ")[0]
     model = NextStep(
         what="for a model, with mass and arm",
-        command=f"cpfls init {shlex.quote(found.flight.name.partition(', flight ')[0])} --mass KG --arm M -o study.yaml",
+        command=f"cpfls init {shlex.quote(file)} --mass KG --arm M -o study.yaml",
         why=answers[-1].question,
     )
     return (*steps[:_TRIED], model)
