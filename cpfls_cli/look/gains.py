@@ -29,7 +29,6 @@ _HARDEST = 10
 """Of the plants that have to hold, so many of the hardest are tuned for together."""
 ACCEPTABLE = AskedMargins(4.0, 30.0, 25.0)
 """Margins from which on a loop is usually accepted: what may have that of the disk, and flies, is not slowed down."""
-_LEAST_DISK = 2 * np.tan(np.radians(ACCEPTABLE.disk_deg) / 2)
 _AT_ONCE = 1.25
 """Factor by which a gain changes at most from one log to the next."""
 _TERMS = {"p": "P", "i": "I", "d": "D", "angle": "P of the angle"}
@@ -368,7 +367,7 @@ class _Work:
 
     def _acceptable(self, axis: int, rows: list[GainRow]) -> list[GainRow]:
         """Keep gains that are higher than asked margins allow unless the loop surely has too little to be accepted."""
-        if float(np.quantile(self._held(axis, self.values), HOLDS)) < _LEAST_DISK:
+        if float(np.quantile(self._held(axis, self.values), HOLDS)) < 2 * np.tan(np.radians(ACCEPTABLE.disk_deg) / 2):
             return rows
         return [
             replace(row, proposed=row.today, direction="keep", why="accepted") if row.direction == "lower" else row

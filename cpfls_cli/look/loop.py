@@ -252,9 +252,12 @@ def _drawn(values: Array) -> Estimate | None:
 def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     """Give the frequency at which a response has half its power; NaN where that is not below an end."""
     below = np.flatnonzero((gain < _HALF_POWER) & (frequency > 0))
-    if not len(below) or below[0] == 0 or frequency[below[0]] > ends:
+    if not len(below) or frequency[below[0]] > ends:
         return np.nan
     at = below[0]
+    # What is below it from the first frequency on does not cross it.
+    if at == 0 or gain[at - 1] < _HALF_POWER:
+        return np.nan
     share = (gain[at - 1] - _HALF_POWER) / max(gain[at - 1] - gain[at], _TINY)
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 

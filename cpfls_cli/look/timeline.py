@@ -203,8 +203,10 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
             continue
-        if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows))):
-            yield _landing(flight, end, end if landed is None else landed)
+        touch = _landing(flight, end, end if landed is None else landed)
+        stopped = touch.severity == "warning"
+        if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
+            yield touch
         elif last - end < _AT_END_S and _carries(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
@@ -216,10 +218,12 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
 def _landing(flight: LogFlight, end: float, at: float) -> Event:
     sensor = flight.accelerometer
     if sensor is not None:
-        rows = (sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S)
-        most = float(np.linalg.norm(sensor.values[rows], axis=1).max(initial=0.0)) / STANDARD_GRAVITY
-        if most > _HARD:
-            return Event(time_s=at, kind="landing", text=f"lands hard, with {most:.2g} g", severity="warning")
+        rows = np.flatnonzero((sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S))
+        sizes = np.nan_to_num(np.linalg.norm(sensor.values[rows], axis=1)) / STANDARD_GRAVITY
+        if sizes.max(initial=0.0) > _HARD:
+            # It is then that it touches the ground; the autopilot takes a while to be sure.
+            touches, text = float(sensor.time[rows[sizes.argmax()]]), f"lands hard, with {sizes.max():.2g} g"
+            return Event(time_s=touches, kind="landing", text=text, severity="warning")
     return Event(time_s=at, kind="landing", text="lands")
 
 
@@ -233,13 +237,16 @@ def _near_flight(flight: LogFlight, at: float) -> bool:
     return bool(flight.flown[(flight.time > at - _NEAR_S) & (flight.time < at + _NEAR_S)].any())
 
 
-def _rests(flight: LogFlight, part: slice) -> bool:
-    """Tell whether rotors in a part of the log give much less than in flight, and it mostly keeps its height."""
+def _rests(flight: LogFlight, part: slice, stopped: bool = False) -> bool:
+    """Tell whether rotors in a part of the log give much less than in flight, and it mostly keeps its height.
+
+    What has `stopped` hard keeps it, whatever a climb rate of an accelerometer that reads wrong says.
+    """
     with np.errstate(invalid="ignore"):
         less = flight.collective[part] < _LESS * _carried_by(flight)
     climbs = np.abs(flight.climb_rate[part][less])
     climbs = climbs[np.isfinite(climbs)]
-    return bool(less.any()) and not (len(climbs) > 0 and float(np.median(climbs)) > _MOVES_M_S)
+    return bool(less.any()) and (stopped or not (len(climbs) > 0 and float(np.median(climbs)) > _MOVES_M_S))
 
 
 def _carries(flight: LogFlight) -> bool:

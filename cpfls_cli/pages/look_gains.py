@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.look.gains import HOLDS, AxisGains, AxisMargins, GainRow, TunedGains
 from cpfls_cli.look.manoeuvres import Manoeuvre
+from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.report.content import Block, Box, Cell, Table, Text
 from cpfls_cli.report.numbers import number, percent, sentence
 from cpfls_cli.result import Estimate
@@ -40,15 +41,16 @@ _WHY: Final = {
 
 def answer(gains: TunedGains) -> Iterator[Block]:
     """Say which gains to change, what margins that gives, and what to fly for the others."""
-    name = gains.version or gains.title or "gains"
+    name = gains.version or gains.title
+    of = f"{name}: " if name else ""
     if gains.reason:
-        yield Box("GAINS", sentence(f"{name}: none"), [sentence(_NOTHING[gains.reason])], "warning")
+        yield Box("GAINS", sentence(f"{of}none"), [sentence(_NOTHING[gains.reason])], "warning")
         return
     told = [sentence(_axis(each)) for each in gains.axes if each.before is not None and not each.reason]
     changes = len(gains.changes)
-    title = f"{name}: " + (f"change {changes} of {len(gains.rows)} gains" if changes else "keep the gains")
+    title = of + (f"change {changes} of {len(gains.rows)} gains" if changes else "keep the gains")
     if not gains.rows:
-        title = f"{name}: no gains"
+        title = f"{of}no gains"
     yield Box("GAINS", sentence(title), told, "good" if told else "warning")
     if gains.rows:
         yield _table(gains)
@@ -56,6 +58,8 @@ def answer(gains: TunedGains) -> Iterator[Block]:
     for each in gains.axes:
         if each.reason:
             fly = f" {sticks[each.axis]}" if each.axis in sticks else ""
+            # No flight shows what is not logged.
+            fly = " `cpfls look` says what to set." if each.fact == TOO_SLOW else fly
             yield Text(sentence(f"{each.axis}: {_REASONS[each.reason].format(fact=each.fact)}") + fly, "warning")
 
 

@@ -12,6 +12,7 @@ from cpfls_cli.look.balance import balance_of
 from cpfls_cli.look.gains import AxisGains, AxisMargins, TunedGains
 from cpfls_cli.look.logged import Logged
 from cpfls_cli.look.look import Look
+from cpfls_cli.look.timeline import Event
 from cpfls_cli.result import Estimate
 from tests.builders import looked_logs
 from tests.builders.blackbox_logs import signed
@@ -165,11 +166,12 @@ def test_patterns_are_named_and_no_rotor_is_called_weak():
     ahead = balance_of(hovering(1 + 0.1 * np.sign(CROSS[:, 0]), seconds=60, heading=lambda t: np.pi * (t > 30)))
     said = words_of(balance=ahead)
     assert "as if its centre of mass were" in said
-    assert "ahead of the middle" in said
+    assert "off the middle, ahead" in said
     weak = words_of(balance=balance_of(hovering(np.ones(4), seconds=60, weak={2: 0.8})))
     assert "M3 \\+" in weak.splitlines()[0]
     assert "It may be rotor 3 (propeller, motor or speed controller), or a centre of mass" in weak
     assert "together with a steady yaw torque" in weak
+    assert re.search(r"off the middle, (ahead|behind) and (left|right)\b", weak)
     assert "weak" not in weak
 
 
@@ -204,3 +206,9 @@ def test_margins_are_judged_by_their_intervals():
     assert looked(20.0, 28.0, 40.0) == "# Flies; margins of roll may be small {unsure}"
     assert looked(35.0, 40.0, 45.0) == "# Flies; good, as far as this log shows: margins of roll {good}"
     assert looked(25.0, 40.0, 45.0).startswith("# Flies; whether rotors")
+
+
+def test_a_headline_says_when_before_what():
+    text = "the accelerometer reads 0.79 g at rest: calibrate it"
+    found = (Event(time_s=0.0, kind="calibration", text=text, severity="warning"),)
+    assert words_of(events=found).startswith(f"# Flies; at 0.0 s: {text}")

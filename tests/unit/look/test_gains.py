@@ -11,6 +11,9 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.tune import of_flight
 from cpfls_cli.look.flight import AXES
 from cpfls_cli.look.gains import tuned_gains
+from cpfls_cli.look.reasons import TOO_SLOW
+from cpfls_cli.pages.look_gains import answer
+from cpfls_cli.report.content import Text
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.margins import crossing_margins
 from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked_plant, weak_plant
@@ -18,7 +21,7 @@ from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked
 HELD_DISK = 2 * np.tan(np.radians(45) / 2)
 
 
-AT_ONCE, ACCEPTABLE = cpfls_cli.look.gains._AT_ONCE, cpfls_cli.look.gains._LEAST_DISK
+AT_ONCE, ACCEPTABLE = cpfls_cli.look.gains._AT_ONCE, cpfls_cli.look.gains.ACCEPTABLE
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +29,7 @@ def few_draws(monkeypatch):
     """Tune for fewer plants one by one, which takes a quarter of the time, and all the way at once."""
     monkeypatch.setattr(cpfls_cli.look.gains, "DRAWS", 10)
     monkeypatch.setattr(cpfls_cli.look.gains, "_AT_ONCE", 1e6)
-    monkeypatch.setattr(cpfls_cli.look.gains, "_LEAST_DISK", np.inf)
+    monkeypatch.setattr(cpfls_cli.look.gains, "ACCEPTABLE", AskedMargins(4.0, 30.0, 179.0))
 
 
 def found(autopilot, values=None, own=None, **options):
@@ -120,7 +123,7 @@ def test_one_log_bears_one_step(monkeypatch):
 
 def test_gains_go_down_only_where_margins_are_surely_too_small(monkeypatch):
     suited = {row.parameter: row.proposed for row in found("px4").rows}
-    monkeypatch.setattr(cpfls_cli.look.gains, "_LEAST_DISK", ACCEPTABLE)
+    monkeypatch.setattr(cpfls_cli.look.gains, "ACCEPTABLE", ACCEPTABLE)
 
     def way(factor, spread=NARROW):
         own = looked_plant(*PLANTS["px4"], spread)
@@ -228,3 +231,18 @@ def test_axes_are_in_their_order():
     gains = tuned_gains(looked_flight("px4"), [looked_plant(*PLANTS["px4"], axis=axis) for axis in AXES])
     assert [axis.axis for axis in gains.axes] == list(AXES)
     assert replace(gains, rows=()).changes == ()
+
+
+def test_what_is_logged_too_slowly_is_not_asked_to_be_flown():
+    gains = found("betaflight")
+    weak = gains.axes[1]
+    said = [each.text for each in answer(gains) if isinstance(each, Text)]
+    assert "To see it: fly acro and move the pitch stick" in said[0]
+    slow = replace(gains, axes=(replace(weak, fact=TOO_SLOW),))
+    (said,) = [each.text for each in answer(slow) if isinstance(each, Text)]
+    assert said == "Pitch: logged too slowly. `cpfls look` says what to set."
+
+
+def test_a_log_of_nobody_known_has_no_name_in_its_answer():
+    nobody = replace(found("betaflight"), version="", title="", reason="autopilot", axes=(), rows=(), fly=())
+    assert [block.title for block in answer(nobody)] == ["None."]

@@ -9,7 +9,7 @@ from cpfls_cli.autopilots.law import Controller
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look import reasons
 from cpfls_cli.look.effectiveness import axis_effectiveness
-from cpfls_cli.look.loop import loops_of
+from cpfls_cli.look.loop import _bandwidth, loops_of
 from tests.builders.looked_flights import PARAMETERS, RATE_HZ, TRUTH, flown, without_sticks
 
 
@@ -95,3 +95,11 @@ def test_resting_sticks_measure_no_response(flight):
     assert found.by_step is None
     assert found.overshoot is None
     assert np.isfinite(found.tracking)
+
+
+def test_a_response_that_begins_below_half_power_has_no_bandwidth():
+    frequency = np.arange(6.0)
+    assert _bandwidth(frequency, np.array([1.0, 1.0, 1.0, 0.5, 0.1, 0.1]), 5.0) == pytest.approx(
+        2.0 + (1 - np.sqrt(0.5)) / 0.5
+    )
+    assert np.isnan(_bandwidth(frequency, np.full(6, 0.5), 5.0))

@@ -232,6 +232,13 @@ def test_a_hard_landing():
     assert [(event.text, event.severity) for event in found if event.kind == "landing"] == [
         ("lands hard, with 6.1 g", "warning")
     ]
+    # The autopilot is sure of it later, and it is when it touches that counts.
+    late = logs.ardupilot(own, more={"EV": state([27.0], Id=[18])})
+    assert of(events(late), "landing") == [(25.1, "lands hard, with 6.1 g")]
+    # What stops hard has landed, whatever the climb rate of an estimator that drifts away says.
+    drifting = logs.ardupilot(own)
+    drifting.topics["XKF1"]["VD"] += 5.0
+    assert of(events(drifting), "landing") == [(25.1, "lands hard, with 6.1 g")]
 
 
 def test_what_tips_over_long_after_it_landed():
