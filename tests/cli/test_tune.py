@@ -1,9 +1,7 @@
 """Command `tune`."""
 
 import json
-import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -242,8 +240,8 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypa
     own = looked_flight("px4")
     plants = [looked_plant(*PLANTS["px4"], axis=axis) for axis in ("roll", "pitch", "yaw")]
     # Reading and the estimate of plants have tests of their own.
-    monkeypatch.setitem(sys.modules, "cpfls_cli.look.reading", SimpleNamespace(read_flight=lambda *_: own))
-    monkeypatch.setitem(sys.modules, "cpfls_cli.look.effectiveness", SimpleNamespace(effectiveness=lambda _: plants))
+    monkeypatch.setattr("cpfls_cli.commands.tune.read_flight", lambda *_: own)
+    monkeypatch.setattr("cpfls_cli.commands.tune.effectiveness", lambda _: plants)
     log = folder / "log.csv"
     save(log, np.zeros((9, 2)), "t,p")
     answered = cpfls("tune", log, "-o", folder / "looked", "--json")
