@@ -265,7 +265,7 @@ def _curve(found: Found) -> tuple[str, str, str, str]:
     shape = None if found.hover is None else found.hover.shape
     if shape is None:
         if found.flight.accelerometer is None:
-            return "no", "no accelerometer is logged that feels gravity", "also the accelerometer", ""
+            return "no", "no accelerometer is seen to feel gravity, as if it were off or not logged", "", ""
         if not np.isfinite(found.flight.specific_force).any():
             return "no", f"the accelerometer reads {found.flight.reads_at_rest:.2f} g at rest", "", ""
         return "no", "throttle and thrust vary too little together", "", _PUNCH
