@@ -31,6 +31,7 @@ from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.gains import Plant, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
+from cpfls_cli.look.vibration import Change, vibration_of
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.look_gains import answer as answer_of_log
 from cpfls_cli.pages.source import source_of
@@ -122,50 +123,61 @@ def run_log(
         flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
     if dry_run:
         return Outcome({"dry_run": True}, (Text(f"{log}: is a log of a multirotor; nothing is computed"),))
-    found = of_flight(flight, effectiveness(flight), output, asked, force=force)
+    vibration = vibration_of(flight)
+    filters = () if vibration is None else vibration.changes
+    found = of_flight(flight, effectiveness(flight), output, asked, filters=filters, force=force)
     return replace(found, blocks=(*(Text(f"{log}: {each}", "warning") for each in contents.warnings), *found.blocks))
 
 
 def of_flight(
-    flight: LogFlight, plants: Sequence[Plant], output: Path | None, asked: AskedMargins, *, force: bool = False
+    flight: LogFlight,
+    plants: Sequence[Plant],
+    output: Path | None,
+    asked: AskedMargins,
+    *,
+    filters: Sequence[Change] = (),
+    force: bool = False,
 ) -> Outcome:
-    """Find gains from what a log shows of a vehicle."""
+    """Find gains, and filters that its spectra ask for, from what a log shows of a vehicle."""
     gains = tuned_gains(flight, plants, asked)
     blocks = [*answer_of_log(gains)]
-    if output is None or not gains.changes:
+    blocks += [Text(f"{each.parameter}: {each.now:g} -> {each.proposed:g} Hz, {each.reason}") for each in filters]
+    summary = plain(gains) | {"filters": [plain(each) for each in filters]}
+    rows = _changed(gains, flight, filters) if output is not None and (gains.changes or filters) else []
+    if output is None or not rows:
         said = [Text(f"{output}: not written, nothing changes")] if output else []
-        return Outcome(plain(gains), (*blocks, *said))
-    autopilot = AUTOPILOTS[gains.autopilot]
-    suffix, text = file_of(
-        autopilot, gains.version, f"gains of cpfls from {flight.name}", _changed(autopilot, gains, flight)
-    )
+        return Outcome(summary, (*blocks, *said))
+    suffix, text = file_of(AUTOPILOTS[gains.autopilot], gains.version, f"gains of cpfls from {flight.name}", rows)
     file = output.with_suffix(suffix)
     check_output(file, force)
     write_text(file, text)
     return Outcome(
-        plain(gains) | {"file": str(file)}, (*blocks, Text(f"{file}: written, for the ground station")), written=file
+        summary | {"file": str(file)}, (*blocks, Text(f"{file}: written, for the ground station")), written=file
     )
 
 
-def _changed(autopilot: Autopilot, gains: TunedGains, flight: LogFlight) -> list[ParameterRow]:
-    """Give the parameters that change as a file has them."""
+def _changed(gains: TunedGains, flight: LogFlight, filters: Sequence[Change]) -> list[ParameterRow]:
+    """Give the parameters that change as a file has them; filters whose ranges are not known are left to the pilot."""
+    autopilot = AUTOPILOTS[gains.autopilot]
     names = autopilot.firmware.names(flight.system)
     known = {names.get(each.name, each.name): each for each in autopilot.parameters}
+    changes = [(row.parameter, row.today, row.proposed) for row in gains.changes]
+    changes += [(each.parameter, each.now, each.proposed) for each in filters if each.parameter in known]
     return [
         ParameterRow(
-            name=row.parameter,
+            name=name,
             meaning=own.meaning,
             unit=own.unit,
-            today=row.today,
+            today=today,
             default=own.default,
-            proposed=row.proposed,
-            wanted=row.proposed,
+            proposed=proposed,
+            wanted=proposed,
             low=own.low,
             high=own.high,
             clipped=False,
         )
-        for row in gains.changes
-        for own in (known[row.parameter],)
+        for name, today, proposed in changes
+        for own in (known[name],)
     ]
 
 

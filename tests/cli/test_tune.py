@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import yaml
 from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.look.vibration import Change
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
@@ -242,13 +244,21 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypa
     # Reading and the estimate of plants have tests of their own.
     monkeypatch.setattr("cpfls_cli.commands.tune.read_flight", lambda *_: own)
     monkeypatch.setattr("cpfls_cli.commands.tune.effectiveness", lambda _: plants)
+    notch, other = (
+        Change(parameter=name, now=20.0, proposed=hz, reason="notch off the line")
+        for name, hz in (("IMU_GYRO_NF0_FRQ", 81.0), ("another", 60.0))
+    )
+    monkeypatch.setattr("cpfls_cli.commands.tune.vibration_of", lambda _: SimpleNamespace(changes=(notch, other)))
     log = folder / "log.csv"
     save(log, np.zeros((9, 2)), "t,p")
     answered = cpfls("tune", log, "-o", folder / "looked", "--json")
     assert answered.exit_code == 0
     told = json.loads(answered.stdout)
     changed = written(folder, "px4", "looked")
-    assert changed == pytest.approx({row["parameter"]: row["proposed"] for row in told["changes"]})
+    gains = {row["parameter"]: row["proposed"] for row in told["changes"]}
+    # What has no known range is said, and left to the pilot.
+    assert changed == pytest.approx({**gains, "IMU_GYRO_NF0_FRQ": 81.0})
+    assert [each["parameter"] for each in told["filters"]] == ["IMU_GYRO_NF0_FRQ", "another"]
     again = cpfls("tune", log, "-o", folder / "looked")
     assert again.exit_code == 2
     assert "--force" in again.stderr
