@@ -81,7 +81,8 @@ def interval(estimate: Any, unit: str = "", factor: float = 1.0) -> str:
     """Write an estimate with its 95 % interval, as ``163 ± 37``; by both ends where it is not in their middle."""
     if estimate is None or not np.isfinite(estimate.value):
         return UNKNOWN
-    value, low, high = (factor * each for each in (estimate.value, estimate.low, estimate.high))
+    value, *ends = (factor * each for each in (estimate.value, estimate.low, estimate.high))
+    low, high = sorted(ends)
     shown = [printed(each) for each in with_interval(value, low, high)]
     behind = f" {unit}" if unit else ""
     half = 0.5 * (high - low)

@@ -111,6 +111,7 @@ def test_a_name_that_a_result_lacks_is_an_error(tmp_path):
         (estimate(163.2, 126.0, 200.4), "", 1.0, "163 ± 37"),
         (estimate(0.251, 0.230, 0.272), "%", 100.0, "25.1 ± 2.1 %"),
         (estimate(-5.0, -6.04, -3.96), "ms", 1.0, "−5.0 ± 1.0 ms"),
+        (estimate(-5.0, -6.04, -3.96), "ms", -1.0, "5.0 ± 1.0 ms"),
         (estimate(10.0, 9.0, 14.0), "Hz", 1.0, "10.0 [9.0, 14.0] Hz"),
         (estimate(3.0, np.nan, np.nan), "", 1.0, "3"),
         (estimate(np.nan, np.nan, np.nan), "Hz", 1.0, "—"),
