@@ -73,7 +73,7 @@ def code(text: object) -> Markup:
 
 
 def toned(value: Any, tone: Tone) -> Markup:
-    """Write a value that stands out."""
+    """Write a highlighted value."""
     return Markup(f"{escaped(value)} {{{tone}}}" if tone in TONES else escaped(value))
 
 

@@ -181,6 +181,11 @@ class Estimate:
     low: float = about("lower end of the 95 % interval", gaps=True)
     high: float = about("upper end of the 95 % interval", gaps=True)
 
+    @classmethod
+    def around(cls, value: float, half: float) -> Estimate:
+        """Make one whose value is in the middle."""
+        return cls(value=float(value), low=float(value - half), high=float(value + half))
+
     @property
     def half(self) -> float:
         """Half the width of the interval."""

@@ -21,7 +21,7 @@ class Track:
     labels: tuple[str, ...] = about("name of each signal", "channel")
     time: Array = about("from the first stamp of the log", "sample", unit="s", brief=False)
     values: NDArray[np.float32] = about("of each signal", "sample", "channel", unit="SI", gaps=True, brief=False)
-    dashed: bool = about("whether it is what was asked for, beside what was flown", default=False)
+    dashed: bool = about("whether it is what was asked for, drawn over what was flown", default=False)
 
 
 def track(

@@ -22,7 +22,7 @@ MOST_VALUES = 1_500_000
 _TICK_S, _MOST_TICKS = 1e-4, 2**32 - 1
 """Time is kept to so much, in so many steps at most."""
 _LEVELS = 65535
-"""Values are kept to so many steps of their range; 0 stands for none."""
+"""Values are kept to so many steps of their range; 0 is none."""
 _OF_NOISE = 16.0
 """Steps in the usual change from sample to sample."""
 _STILL = 1200
@@ -98,7 +98,7 @@ _VENDOR = ("uPlot.LICENSE.txt", "uPlot.min.css", "uPlot.iife.min.js")
 
 
 def _in_script(data: Any) -> str:
-    """Write data as JSON that cannot end the script it stands in."""
+    """Write data as JSON that cannot end the script it is in."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 

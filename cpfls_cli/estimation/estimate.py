@@ -205,9 +205,9 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
 def conditional_strength(normal: Normal, prior: Prior) -> Array:
     """Compute the F statistic of each number jointly with all others, shape (number,).
 
-    What the instruments tell of a number, cleared of what tells the others as far as the prior does not, over what
-    chance would show of it; where that is not stated, over its scatter over blocks, with instruments that were found
-    without the block.
+    What the instruments identify of a number, cleared of what identifies the others as far as the prior does not, over
+    what chance would show of it; where that is not stated, over its scatter over blocks, with instruments that were
+    found without the block.
 
     References
     ----------
@@ -218,12 +218,12 @@ def conditional_strength(normal: Normal, prior: Prior) -> Array:
     # Columns: what is left of each number when the others have moved with it.
     cleared = inverse / alone
     each = np.einsum("ji,bjk,ki->bi", inverse.T / alone, normal.information, cleared)
-    told = np.maximum(each.sum(axis=0), 0.0)
+    explained = np.maximum(each.sum(axis=0), 0.0)
     if normal.chance is not None:
         chance = np.einsum("ji,jk,ki->i", cleared, normal.chance, cleared)
-        return np.asarray(told / np.maximum(chance, _TINY))
+        return np.asarray(explained / np.maximum(chance, _TINY))
     scatter = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
-    return np.asarray((told / np.maximum(scatter, _TINY)) ** 2)
+    return np.asarray((explained / np.maximum(scatter, _TINY)) ** 2)
 
 
 def effective_blocks(information: Array) -> float:

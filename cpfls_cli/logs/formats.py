@@ -56,7 +56,7 @@ class LogContents:
         Stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there; an empty
         name is that of all stamps.
     messages : tuple of (float, str, str)
-        What the autopilot told its pilot: when, s, how bad, empty where that is not said, and the text.
+        Messages of the autopilot to its pilot: when, s, how bad, empty where that is not said, and the text.
     """
 
     topics: dict[str, dict[str, "Array"]]

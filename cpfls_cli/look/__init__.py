@@ -1,1 +1,1 @@
-"""What one ordinary log tells of a multirotor: no mass, no inertia, no second flight."""
+"""What one ordinary log shows of a multirotor: no mass, no inertia, no second flight."""

@@ -135,7 +135,7 @@ class AxisPlant:
 
     Its numbers are of the vehicle from the command to the body rate in front of the gyroscope's filters where the log
     states these, else behind them; its curves are of the body rate as logged. The delay is all that lies between a
-    logged command and its effect, so that a loop of it and a law needs no step of computing or holding beside it.
+    logged command and its effect, so that a loop of it and a law needs no further step of computing or holding.
     """
 
     SHOWN = ("identified",)
@@ -512,7 +512,7 @@ def _delay_at(fit: Fit, at_hz: float) -> Estimate:
     step = 1e-5 * np.eye(len(fit.values))
     direction = (delay(fit.values + step) - delay(fit.values - step)) / 2e-5
     value, half = float(delay(fit.values)), float(np.hypot(fit.half(direction), DELAY_FLOOR_S))
-    return Estimate(value=value, low=value - half, high=value + half)
+    return Estimate.around(value, half)
 
 
 def _judged(fit: Fit, half_gain: float, total: Estimate) -> tuple[str, str]:

@@ -57,7 +57,7 @@ class LogFlight:
         Of the common clock: twice that of the slower of body rate and command, at most 1000.
     time : array, shape (time,), s
     body_rate : array, shape (time, 3), rad/s
-        As the control law takes it: after the autopilot's filters where the log tells both.
+        As the control law takes it: after the autopilot's filters where the log has both.
     command : array, shape (time, 3)
         What acts on the vehicle about each axis, share of the full command of the autopilot (1: the mixer moves each
         rotor by its full share), positive as the body rate that it causes.

@@ -1,4 +1,4 @@
-"""All that one ordinary log tells, in one result."""
+"""All that one ordinary log shows, in one result."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from cpfls_cli.words import joined
 
 @result
 class Look:
-    """What one log tells of its vehicle."""
+    """What one log shows of its vehicle."""
 
     FORMAT: ClassVar = "cpfls/look"
 
@@ -135,7 +135,7 @@ def look_at(
     warnings: tuple[str, ...] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Look:
-    """Compute all that one log tells.
+    """Compute all that one log shows.
 
     Raises
     ------

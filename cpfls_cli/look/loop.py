@@ -237,8 +237,7 @@ def _jackknifed(values: Array) -> Estimate | None:
     """Give a number from its value and those without each block; None where it is not always there."""
     if not np.isfinite(values).all():
         return None
-    half = float(half_width(jackknife_error(values[1:]), len(values) - 1))
-    return Estimate(value=float(values[0]), low=float(values[0] - half), high=float(values[0] + half))
+    return Estimate.around(values[0], float(half_width(jackknife_error(values[1:]), len(values) - 1)))
 
 
 def _drawn(values: Array) -> Estimate | None:

@@ -209,7 +209,7 @@ class _Reader:
         return found
 
     def _in_unit_of_rates(self, samples: Samples, gyroscope: Samples) -> Samples:
-        """Scale columns of RATE by the unit of the rates beside them."""
+        """Scale columns of RATE by the unit of the rates in the same topic."""
         rates = next(self.log.found("rate"), samples)
         return samples._replace(values=_unit_by(rates, gyroscope) * samples.values)
 
@@ -379,7 +379,7 @@ def _within(clock: Array, spans: Array, around_s: float) -> BoolArray:
 
 
 def _unit_by(samples: Samples, gyroscope: Samples) -> float:
-    """Give 1, or 0.01 where a rate is logged in hundredths of its unit, by its size beside the gyroscope."""
+    """Give 1, or 0.01 where a rate is logged in hundredths of its unit, by its size against the gyroscope."""
     along, factor = along_each(samples, gyroscope)
     close = np.abs(factor[along > _FOLLOWS])
     return 0.01 if len(close) and float(np.median(close)) < 0.1 else 1.0

@@ -91,8 +91,7 @@ class Known(NamedTuple):
 
     def estimate(self, index: int = 0) -> Estimate:
         """Give one of them with its interval."""
-        value, half = float(self.value[index]), float(self.half[index])
-        return Estimate(value=value, low=value - half, high=value + half)
+        return Estimate.around(self.value[index], self.half[index])
 
     def moved(self, matrix: Array) -> Known:
         """Map them linearly, shape (new, number)."""

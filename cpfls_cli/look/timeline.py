@@ -158,7 +158,7 @@ def timeline(
     topics : mapping from topic to mapping from field to array
         As the reader of the log gives them.
     messages : sequence of (float, str, str)
-        What the autopilot told its pilot: s, how bad, text.
+        Messages of the autopilot to its pilot: s, how bad, text.
     """
     found = [
         *_flights(flight, topics, recognition),
@@ -251,8 +251,8 @@ def _rests(flight: LogFlight, part: slice, stopped: bool = False) -> bool:
 
 def _carries(flight: LogFlight) -> bool:
     """Tell whether rotors carry the vehicle in the last samples."""
-    beside = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
-    return bool(np.isfinite(beside).any()) and float(np.nanmin(beside)) > _LESS * _carried_by(flight)
+    after = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
+    return bool(np.isfinite(after).any()) and float(np.nanmin(after)) > _LESS * _carried_by(flight)
 
 
 def _nearest(stated: Sequence[float], at: float) -> float | None:

@@ -38,8 +38,6 @@ _STRONG_DB, _DELAY_HZ = 10.0, 5.0
 """Height of a line that filters are judged by, and where the delay of a filter is given."""
 _BY_SPEED = ("rpm_filter_harmonics", "gyro_rpm_notch_harmonics")
 """Betaflight's notches at the speeds that motors report: with them, dynamic notches serve other lines."""
-_CLIPPED_GYROSCOPE, _CLIPPED_ACCELEROMETER = np.radians(1990.0), (78.0, 156.0, 313.0)
-"""Ends of the range of usual sensors: 2000 deg/s; 8, 16, 32 g."""
 LIMITS = {"ardupilot": (30.0, 60.0), "px4": (4.905, 9.81)}
 """Vibration of the accelerometer, m/s^2: from where on there may be trouble, and from where on there is: ArduPilot's
 guide to measuring vibration (of its VIBE, above 5 Hz), and the colours of PX4's Flight Review (of its metric)."""
@@ -53,7 +51,6 @@ class Spectrum:
     source: str = about("columns of the log")
     rate_hz: float = about("as logged", unit="Hz")
     rms: Array = about("root mean square above 20 Hz, by channel; rad/s, m/s^2 or share", "channel")
-    clipped: float = about("share of samples at the end of the sensor's range")
     frequency: Array = about("frequencies", "frequency", unit="Hz", brief=False)
     density: Array = about("single-sided, squared unit per Hz", "frequency", "channel", brief=False)
 
@@ -201,16 +198,11 @@ class _Power(NamedTuple):
 
     def spectrum(self, name: str) -> Spectrum:
         """Average over windows."""
-        size = np.abs(self.samples.values).max(axis=1)
-        ends = {"accelerometer": _CLIPPED_ACCELEROMETER, "commands": ()}.get(name, (_CLIPPED_GYROSCOPE,))
-        # A range that is passed is not that of the sensor.
-        clipped = [np.mean(size >= end) for end in ends if size.max() < 1.02 * end]
         return Spectrum(
             signal=name,
             source=self.samples.source,
             rate_hz=self.samples.rate_hz,
             rms=self._above(),
-            clipped=float(clipped[0]) if clipped else 0.0,
             frequency=self.frequency,
             density=self.density.mean(axis=0),
         )
@@ -350,7 +342,7 @@ class _Table:
         value = highest(whole)
         left_out = np.array([highest(whole - each) for each in ridge])
         half = float(half_width(jackknife_error(left_out), _BLOCKS)) + coarse
-        return Estimate(value=value, low=value - half, high=value + half)
+        return Estimate.around(value, half)
 
     def line(self, power: _Power) -> Line:
         """Describe the highest."""

@@ -46,12 +46,12 @@ def answer(gains: TunedGains) -> Iterator[Block]:
     if gains.reason:
         yield Box("GAINS", sentence(f"{of}none"), [sentence(_NOTHING[gains.reason])], "warning")
         return
-    told = [sentence(_axis(each)) for each in gains.axes if each.before is not None and not each.reason]
+    judged = [sentence(_axis(each)) for each in gains.axes if each.before is not None and not each.reason]
     changes = len(gains.changes)
     title = of + (f"change {changes} of {len(gains.rows)} gains" if changes else "keep the gains")
     if not gains.rows:
         title = f"{of}no gains"
-    yield Box("GAINS", sentence(title), told, "good" if told else "warning")
+    yield Box("GAINS", sentence(title), judged, "good" if judged else "warning")
     if gains.rows:
         yield _table(gains)
     sticks = {each.axis: _stick(each) for each in gains.fly}
