@@ -52,7 +52,8 @@ def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
 
 def sources(*records, times=()):
     """A report about records."""
-    given = [Source("s.h5", "", record, {}, None, 0, found=Origin(stage="reduce")) for record in records]
+    named = [record.with_header(Header("1", 0, "")) if isinstance(record, Record) else record for record in records]
+    given = [Source("s.h5", "", record, {}, None, 0, found=Origin(stage="reduce")) for record in named]
     return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 
