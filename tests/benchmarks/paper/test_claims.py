@@ -31,6 +31,7 @@ from benchmarks.paper.search_claims import (
     TYPICAL_ERRORS_CLAIM,
     paired_ratio,
 )
+from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Source
