@@ -855,10 +855,25 @@ def verify_export(
 
 
 @_command()
-def info(file: FileArgument, *, common: Common) -> None:
-    """Show what the command that wrote an artifact answered, what it holds and where it comes from."""
+def info(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Any artifact.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--format", metavar="NAME", help="Describe the datasets of a format, such as flight.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Show what the command that wrote an artifact answered, what it holds and where it comes from.
+
+    Without FILE, list all formats, or describe one.
+    """
     with messages_for_errors():
-        tell(_of("show").info(file), common)
+        if file is None:
+            tell(_of("formats").run(name), common)
+        elif name is None:
+            tell(_of("show").info(file), common)
+        else:
+            raise InputError("--format describes files of a format in general: leave out FILE or --format")
 
 
 @_command()
