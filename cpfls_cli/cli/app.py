@@ -314,10 +314,8 @@ def simulate(
         typer.Option(
             "--model",
             metavar="MODEL",
-            help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
-            "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
-            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top. Along "
-            "a FLIGHT: fly it beside the vehicle of the config.",
+            help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
+            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
         ),
     ] = None,
     mode: Annotated[
@@ -325,8 +323,8 @@ def simulate(
         typer.Option(
             "--mode",
             metavar="MODE",
-            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it; "
-            "computed-torque: attitude control by --model. Overrides simulation.mode.",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
+            "Overrides simulation.mode.",
         ),
     ] = None,
     effect: Annotated[
