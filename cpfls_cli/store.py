@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from dataclasses import MISSING, dataclass, field
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
-from cpfls_cli.artifacts.check import dataset_of, opened_file
-from cpfls_cli.artifacts.formats import stage_of_format
+from cpfls_cli.artifacts.check import Origin as Origin
+from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_of
+from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
-from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, InputFile
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.result import AXES, About, Described, described_fields
-from cpfls_cli.version import __version__
 from cpfls_cli.words import some
 
 T = TypeVar("T")
@@ -38,34 +38,12 @@ Lengths = MutableMapping[str, tuple[int, str]]
 """Length of each axis, and the dataset that it is known from."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Origin:
-    """Where a result comes from.
-
-    Attributes
-    ----------
-    inputs : mapping of str to InputFile
-        By role.
-    seed : int or None
-        None where nothing is drawn.
-    config : str
-        The resolved study; empty where there is none.
-    cautions : tuple of str
-        What speaks against what it rests on.
-    """
-
-    inputs: Mapping[str, InputFile] = field(default_factory=dict)
-    seed: int | None = None
-    config: str = ""
-    cautions: tuple[str, ...] = ()
-    version: str = __version__
-
-
 def write(path: Path, given: Any, origin: Origin) -> None:
     """Write a result, whose class names its ``FORMAT``; one that breaks its own description is refused."""
     require_sound(path, given)
     with sealed_output(path) as output, h5py.File(output, "w") as file:
         file.attrs["format"] = type(given).FORMAT
+        file.attrs["stage"] = origin.stage
         file.attrs["schema_version"] = SCHEMA_VERSION
         file.attrs["cpfls_version"] = origin.version
         file.attrs["cautions"] = "\n".join(origin.cautions)
@@ -157,7 +135,9 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
         wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
         if held != wanted:
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}")
-        origin, missing = _origin(file), list[str]()
+        if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
+            raise old_file(path, file)
+        origin, missing = origin_of(file), list[str]()
         given = _read(kind, file, missing)
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
@@ -168,23 +148,9 @@ def stage_of(path: Path) -> str:
     """Name the module of the stage whose result a file is; empty where it is none, as who reads it then says."""
     try:
         with opened_file(path) as file:
-            return stage_of_format(str(file.attrs.get("format")))
+            return stage_module(file.attrs)
     except InputError:
         return ""
-
-
-def _origin(file: h5py.File) -> Origin:
-    inputs = {
-        role: InputFile(*(str(own.attrs[key]) for key in ("name", "sha256", "format")))
-        for role, own in file.get(INPUTS, {}).items()
-    }
-    return Origin(
-        inputs=inputs,
-        seed=int(file.attrs["seed"]) if "seed" in file.attrs else None,
-        config=bytes(file[CONFIG][()]).decode() if CONFIG in file else "",
-        cautions=tuple(str(file.attrs["cautions"]).splitlines()),
-        version=str(file.attrs["cpfls_version"]),
-    )
 
 
 def _read(kind: Any, group: h5py.Group, missing: list[str]) -> Any:

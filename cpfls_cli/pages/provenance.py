@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
@@ -10,10 +11,9 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.selection import SelectionRecord
-from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import Block, Listing, Section, Table
 
 
@@ -52,7 +52,7 @@ def _inputs(source: Source, sources: Sources) -> list[list[str]]:
     ]
 
 
-_Lack = tuple[type[Record], str, str]
+_Lack = tuple[type, str, str]
 _LACKS: tuple[_Lack, ...] = (
     (TrajectoryRecord, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
     (
@@ -60,7 +60,7 @@ _LACKS: tuple[_Lack, ...] = (
         "Figure 4 and the quality of the flight",
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
-    (SelectionRecord, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
+    (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
     (IdentifiedRecord, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
     (
         PredictionRecord,
@@ -106,6 +106,7 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
             yield _GAP_LACKS[2]
 
 
-def _word(wanted: type[Record]) -> str:
-    kind = wanted.FORMAT.kind
-    return wanted.FORMAT.name.removeprefix("cpfls/") if kind in ("", "identified") else kind
+def _word(wanted: Any) -> str:
+    kind = getattr(wanted.FORMAT, "kind", "")
+    name = getattr(wanted.FORMAT, "name", wanted.FORMAT)
+    return str(name).removeprefix("cpfls/") if kind in ("", "identified") else str(kind)
