@@ -31,6 +31,7 @@ from cpfls_cli.flightlog.vocabulary import (
 )
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
+_MEASURED: Final = tuple(own for own in KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
 _WRITTEN: Final = {
     text: (unit, scale) for unit, own in SPELLINGS.items() for scale, written in own.items() for text in written.split()
 }
@@ -217,16 +218,14 @@ def is_of(system: str, known: str) -> bool:
 
 
 def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
-    for rank, known in enumerate(KNOWN):
+    for rank, known in enumerate(_MEASURED):
         of_other = system and not is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(CRAZYFLIE) else "")
-        suits = any(own.signal == known.signal and _suits(own, group) for own in MEANINGS)
-        if not of_other and angles and known.pattern in patterns and suits:
-            yield Named(
-                known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign
-            )
+        suits = [own.signal for own in MEANINGS if own.signal == known.signal and _suits(own, group)]
+        if not of_other and angles and known.columns[0] in patterns and suits:
+            yield Named(suits[0], group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign)
 
 
 def _suits(meaning: Meaning, group: ColumnGroup) -> bool:

@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN_SETPOINTS, PX4, KnownSetpoint
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN, PX4, Known
 from cpfls_cli.units import UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
@@ -120,23 +120,18 @@ def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterat
     # On its card a Crazyflie puts the name of an event before that of a variable.
     events = tuple(f"{topic}." for topic in log.topics) if system.startswith(CRAZYFLIE) else ("",)
     names = frozenset(log.names)
-    for row in KNOWN_SETPOINTS:
+    rows = ((name, row) for row in KNOWN for name in SETPOINTS if name == row.signal)
+    for name, row in rows:
         for event in () if system and not is_of(system, row.system) else events:
             columns = tuple(f"{event}{column}" for column in _channels(row, parameters))
             if names.issuperset(columns):
-                mapped = SignalMap(
-                    columns=columns,
-                    unit=row.unit,
-                    scale=row.scale,
-                    offset=row.offset,
-                    sign=row.sign,
-                    required=False,
-                )
+                numbers = {"scale": row.scale, "offset": row.offset}
+                mapped = SignalMap(columns=columns, unit=row.unit or "1", **numbers, sign=row.sign, required=False)
                 called = f"a log of {row.system} calls it so"
-                yield _Candidate(row.signal, _in_stated_unit(log, row.signal, mapped), called, True, True)
+                yield _Candidate(name, _in_stated_unit(log, name, mapped), called, True, True)
 
 
-def _channels(row: KnownSetpoint, parameters: Parameters) -> tuple[str, ...]:
+def _channels(row: Known, parameters: Parameters) -> tuple[str, ...]:
     """Give the columns of a kind of log; of ArduPilot's sticks those of the channels that its parameters name."""
     if row.system != ARDUPILOT or row.signal != "sticks":
         return row.columns

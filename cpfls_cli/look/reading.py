@@ -116,7 +116,7 @@ class _Reader:
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
-        thrust = rotors.samples or next(self.log.found("thrust"), None) or rotors.thrusts(ThrustCurve())
+        thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
         if thrust is not None and float(thrust.values.max()) < ALIVE:
@@ -227,7 +227,7 @@ class _Reader:
         found = self.signal("setpoint_body_rate")
         if found is not None:
             return found
-        found = next(self.log.found("setpoint"), None)
+        found = next(self.log.found("setpoint_body_rate", "setpoint"), None)
         if found is not None:
             return self._in_unit_of_rates(found, gyroscope) if found.source.startswith("RATE.") else found
         return self._setpoint_of_p_term(gyroscope)
@@ -256,7 +256,7 @@ class _Reader:
 
     def _battery(self) -> tuple[Samples | None, Samples | None]:
         """Give voltage and current; old logs have hundredths of both, and what is not measured is about 0."""
-        voltage = self.signal("voltage") or next(self.log.found("voltage"), None)
+        voltage = self.signal("voltage") or next(self.log.found("battery_voltage"), None)
         current = next(self.log.found("current"), None)
         level = np.nan if voltage is None else float(np.median(voltage.values))
         if level < _LEAST_V or (current is not None and not float(current.values.max()) > 0):
