@@ -19,35 +19,24 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 _FILTER_ORDER = 2
-_EDGE_S = 0.5
-"""At both ends, where the filter settles, s."""
-
+_EDGE_S = 0.5  # At both ends, where the filter settles, s.
+# Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there.
 SLOW_HZ = 3.0
-"""Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
-
+# Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise.
 _TILT_HZ = 1.0
-"""Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise."""
-
-_RISES = 0.4
-"""Correlation with the lift from which on a vertical axis follows it."""
-
-_AS_NAMED_IS_GOOD_ENOUGH = 0.02
-"""Share that other axes may explain more by noise alone."""
-
+_RISES = 0.4  # Correlation with the lift from which on a vertical axis follows it.
+_AS_NAMED_IS_GOOD_ENOUGH = 0.02  # Share that other axes may explain more by noise alone.
+# Share that other axes than named have to explain, and how many times less they have to leave.
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
-"""Share that other axes than named have to explain, and how many times less they have to leave."""
-
+# Share of the spread of the axis that moves most below which another hardly moves: its sign is that of noise.
 _STILL = 1e-3
-"""Share of the spread of the axis that moves most below which another hardly moves: its sign is that of noise."""
-
-_MOVES_RAD_S = 0.03
-"""Rate below which noise and drift of an attitude are as large as its motion."""
+_MOVES_RAD_S = 0.03  # Rate below which noise and drift of an attitude are as large as its motion.
 
 
 Order = tuple[int, ...]
 Sign = tuple[float, ...]
+# Order and signs of three axes that are what they are called.
 AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
-"""Order and signs of three axes that are what they are called."""
 
 
 def handed(order: Sequence[int], sign: Sequence[float]) -> float:

@@ -16,16 +16,13 @@ from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import largest
 
+# Below which torque and angular acceleration are compared: a controller answers slower, and noise is above.
 _ACCELERATION_HZ = 12.0
-"""Below which torque and angular acceleration are compared: a controller answers slower, and noise is above."""
-
+# A band above that of most gusts and of a controller's answer to them: there the rotors are the cause of motion.
 _FAST_HZ = (6.0, 20.0)
-"""A band above that of most gusts and of a controller's answer to them: there the rotors are the cause of motion."""
-
 _LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
+# Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough.
 _SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
-"""Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough."""
-
 _CORNERS: Final = {
     "front left": (1.0, 1.0),
     "front right": (1.0, -1.0),
@@ -33,21 +30,14 @@ _CORNERS: Final = {
     "rear left": (-1.0, 1.0),
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
-_ROUNDED = 1e-9
-"""Below which a place along an axis is 0."""
-
+_ROUNDED = 1e-9  # Below which a place along an axis is 0.
 _TURNS = ("roll", "pitch", "yaw")
-_LEAST_EXPLAINED = 0.05
-"""Share of the acceleration about one axis that chance does not explain."""
-
+_LEAST_EXPLAINED = 0.05  # Share of the acceleration about one axis that chance does not explain.
+# Sum of the shares of roll and pitch that rotors in their places explain, and how many times that of other places.
 _LEAST_OF_BOTH, _LEAST_TIMES = 0.2, 1.3
-"""Sum of the shares of roll and pitch that rotors in their places explain, and how many times that of other places."""
-
+# How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean.
 _LEAST_OF_MEAN = 0.2
-"""How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean."""
-
-_PREFER_X = 1.3
-"""Few vehicles are a plus: one has to explain that much more than an X."""
+_PREFER_X = 1.3  # Few vehicles are a plus: one has to explain that much more than an X.
 
 
 @dataclass(frozen=True)
@@ -210,8 +200,7 @@ class _RotorLayout(NamedTuple):
         return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in self.rotors]])
 
 
-_Explained = tuple[float, float, float]
-"""Shares of the angular acceleration about roll, pitch and yaw."""
+_Explained = tuple[float, float, float]  # Shares of the angular acceleration about roll, pitch and yaw.
 
 
 @cache
@@ -252,8 +241,8 @@ class MovedBy:
     clear: bool
 
 
+# Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus.
 _ON_AN_AXIS = 0.2
-"""Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus."""
 
 
 def place_of(direction: tuple[float, float]) -> str:

@@ -14,11 +14,8 @@ from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
-_POOR_R2 = 0.5
-"""Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted."""
-
-_SMALLEST_WINDOW = 50
-"""Samples for nine numbers, and for a delay."""
+_POOR_R2 = 0.5  # Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
+_SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 
 
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:

@@ -15,15 +15,11 @@ from cpfls_cli.flightlog.vocabulary import ANGLES, SENSED
 from cpfls_cli.units import UnitName, known_unit
 
 _DEGREES = 180 / np.pi
+# Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn.
 _LARGEST_ANGLE, _LARGEST_TILT = 6.6, 1.7
-"""Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn."""
-
-_NEAR: Final = 0.2
-"""Part of a turn, rad, that an angle moves between two samples where it jumps by a full turn."""
-
+_NEAR: Final = 0.2  # Part of a turn, rad, that an angle moves between two samples where it jumps by a full turn.
+# Body axes of logs whose other axes are these.
 BODY_OF: Final = {"FLU": "FLU", "ENU": "FLU", "FRD": "FRD", "NED": "FRD"}
-"""Body axes of logs whose other axes are these."""
-
 _SIGNALS_OF: Final[Mapping[str, tuple[SignalName, ...]]] = {
     "attitude": ("quaternion", "attitude"),
     "body_rate": ("body_rate",),

@@ -15,48 +15,28 @@ from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 _NOT_JUDGED = frozenset({"voltage"})
 # A rigid body hardly answers what is faster than half of this.
 _FAST_HZ = 100.0
-_FEWEST_UPDATES = 20
-"""Below which a regular step may be chance."""
-
+_FEWEST_UPDATES = 20  # Below which a regular step may be chance.
 _REGULAR_SHARE = 0.8
-_LARGEST_SHARE_AT_ONCE = 0.2
-"""Of updates that come from row to row: jitter, not a rate."""
-
+_LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
 # A knot between two rows bends the line at both of them.
 _ROWS_OF_KNOT = 2
-_STRAIGHT = 1e-3
-"""Bend of what is interpolated, by the rounding of a file, as a share of the largest."""
-
+_STRAIGHT = 1e-3  # Bend of what is interpolated, by the rounding of a file, as a share of the largest.
 # Measured: logs of five vehicles fall by 29 dB below their trend at most, those that were filtered forward and backward
 # by 38 to 85 dB.
 _CLIFF_DB = 30.0
-_STEEPEST_BEFORE_DB = 24.0
-"""Fall in an octave up to which a trend is that of motion, a filter of fourth order."""
-
+_STEEPEST_BEFORE_DB = 24.0  # Fall in an octave up to which a trend is that of motion, a filter of fourth order.
 # A line of vibration is above its trend; a filter leaves no band beyond it near any band before it.
 _CLEARANCE_DB = 25.0
 _LOWEST_HZ = 8.0
-_HIGHEST_SHARE = 0.48
-"""Of the rate: above, aliasing shapes the spectrum."""
-
+_HIGHEST_SHARE = 0.48  # Of the rate: above, aliasing shapes the spectrum.
 _BANDS_PER_OCTAVE = 8
-_FEWEST_BANDS = 5
-"""For the line of a trend."""
-
-_LEAST_OCTAVES_BEYOND = 0.3
-"""That have to be known for a fall to be a cliff."""
-
+_FEWEST_BANDS = 5  # For the line of a trend.
+_LEAST_OCTAVES_BEYOND = 0.3  # That have to be known for a fall to be a cliff.
 _LONGEST_SEGMENT = 2048
 _SEGMENTS = 4
-_FEWEST_IN_SEGMENT = 64
-"""Lines of a spectrum, below which bands hold none."""
-
-_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])
-"""The window by its waves."""
-
-_LINES_OF_WINDOW = 8
-"""Over which the Blackman-Harris window smears a line."""
-
+_FEWEST_IN_SEGMENT = 64  # Lines of a spectrum, below which bands hold none.
+_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])  # The window by its waves.
+_LINES_OF_WINDOW = 8  # Over which the Blackman-Harris window smears a line.
 _HALVED_DB = 6.0
 # The trend that the cut-off is read against, clear of the fall itself.
 _TREND_OCTAVES, _CLEAR_OCTAVES = 2.0, 0.5

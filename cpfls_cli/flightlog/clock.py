@@ -10,12 +10,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
 
-_LARGEST_SHARE_BEHIND = 0.05
-"""Of all rows, up to which packets merely come late."""
-
-SMALLEST_SHARE_KEPT = 0.1
-"""Of a log, below which a crop that keeps it is not worth a word."""
-
+_LARGEST_SHARE_BEHIND = 0.05  # Of all rows, up to which packets merely come late.
+SMALLEST_SHARE_KEPT = 0.1  # Of a log, below which a crop that keeps it is not worth a word.
 _SAME_RATE = 1e-3
 
 

@@ -21,9 +21,8 @@ _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
+# Likeness of names by difflib that is worth a hint, and that of names of so many letters.
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
-"""Likeness of names by difflib that is worth a hint, and that of names of so many letters."""
-
 # Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
 # what mixers get and no command of a rotor.
 _SAME_IN_PX4 = (

@@ -26,54 +26,30 @@ from cpfls_cli.flightlog.repair import SignalTable, fill
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
 from cpfls_cli.flightlog.stretches import live_rows
 
-_OF_HOVER = 0.6
-"""Share of the level at hover below which rotors idle."""
-
-_OF_LARGEST = 0.5
-"""Share of the largest level above which rotors carry the vehicle."""
-
-_SHORT_S = 1.0
-"""Shorter pauses are part of a flight, and shorter flights none."""
-
-_OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05
-"""Above the ground it flies: as a share of the highest, and in m."""
-
-_MARGIN_S = 0.5
-"""Left out after take-off and before landing, where the ground pushes."""
-
+_OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
+_OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
+_SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
+_OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
+_MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
+# Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
-"""Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
-
+# Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
+# range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-"""Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
-range of leans above which a vehicle moves."""
-
+# Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
+# of the height that is estimated for it.
 _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
-"""Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
-of the height that is estimated for it."""
-
+# Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
+# vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
-"""Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
-vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin."""
-
-_UNMOVED_M = 0.01
-"""Range of heights that no hover keeps to."""
-
+_UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
+# Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
+# below which it falls, on the mean over s.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
-"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in
-weights below which it falls, on the mean over s."""
-
-_LONGEST_CUT_S = 3.0
-"""Longer than that no throttle is cut in flight: a fall of 44 m."""
-
-_MOST_CLOCK_HZ = 50.0
-"""Rate that is enough to find a flight."""
-
-_FEWEST_ROWS = 10
-"""Of which it can be told."""
-
-SHORTEST_FLIGHT_S = 2.0
-"""Below which nothing is a flight."""
+_LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
+_MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
+_FEWEST_ROWS = 10  # Of which it can be told.
+SHORTEST_FLIGHT_S = 2.0  # Below which nothing is a flight.
 
 
 def too_short(span_s: float) -> str:

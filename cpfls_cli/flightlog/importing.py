@@ -45,14 +45,10 @@ from cpfls_cli.flightlog.stretches import (
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
-_LARGEST_REFINEMENT = 10
-"""Rows of the result for one of the log: more hold nothing new."""
-
+_LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
 _SHORTEST_PERIOD_S = 1e-6
-_FASTEST_HZ = 40e3
-"""Above the 32 kHz at which the fastest gyroscopes are read."""
-_FEWEST_SAMPLES = 10
-"""Of which a flight can be told."""
+_FASTEST_HZ = 40e3  # Above the 32 kHz at which the fastest gyroscopes are read.
+_FEWEST_SAMPLES = 10  # Of which a flight can be told.
 
 
 def import_log(

@@ -9,9 +9,8 @@ from math import cos, radians, sin
 from typing import Final
 
 Parameters = Mapping[str, float | str]
+# x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1.
 Place = tuple[float, float, int]
-"""x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1."""
-
 _LAYOUTS: Final = """
     # Angle of each motor clockwise from the front, degrees, or x forward and y left; + turns counter-clockwise
     quad plus                  90+ -90+ 0- 180-
@@ -74,7 +73,6 @@ def _layouts() -> dict[str, tuple[Place, ...]]:
 
 
 LAYOUTS: Final = _layouts()
-
 # FRAME_CLASS of ArduPilot, and the number of its motors; others are no frames of upright rotors alone.
 _CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa", 4: "octa quad", 5: "Y6", 12: "dodeca hexa", 14: "deca"}
 _OF_CLASS: Final = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 7: 3, 12: 12, 14: 10}
@@ -93,9 +91,8 @@ _TYPES: Final = {
     18: "X reversed",
     19: "Y4",
 }
+# Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone.
 _COUNTS_OF_FORMS: Final = (8, 6, 4)
-"""Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone."""
-
 # First and last SYS_AUTOSTART of PX4 that is a frame of one kind.
 _AIRFRAMES: Final = (
     (4000, 4899, "quad X"),
@@ -108,11 +105,8 @@ _AIRFRAMES: Final = (
     (12000, 12999, "octa quad X"),
     (24000, 24999, "dodeca hexa X"),
 )
-_UPWARD: Final = -0.5
-"""Part of a rotor's axis along z, downward, from which on it carries the vehicle."""
-
+_UPWARD: Final = -0.5  # Part of a rotor's axis along z, downward, from which on it carries the vehicle.
 _OF_MAV_TYPE: Final = {2: 4, 13: 6, 14: 8, 15: 3, 29: 12, 35: 10}
-
 USUAL: Final[Mapping[str, Mapping[int, str]]] = {
     "PX4": {4: "quad X", 6: "hexa X", 8: "octa X"},
     "ArduPilot": {4: "quad X", 6: "hexa X", 8: "octa X"},

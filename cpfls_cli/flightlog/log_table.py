@@ -34,22 +34,13 @@ _TIME_NAMES = [
     "t_s",
 ]
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_STEPS_S = (2e-4, 0.5)
-"""Steps between stamps of logs of flights, s: 5 kHz to 2 Hz."""
-
-_SEVERAL = 3.0
-"""Times as often that other columns have to come to be preferred."""
-
-_SLOWEST_HZ = 0.5
-"""Below which a signal tells nothing of a flight."""
-
-_FEWEST_SAMPLES = 20
-"""For medians and rates."""
-
+_STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
+_SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
+_SLOWEST_HZ = 0.5  # Below which a signal tells nothing of a flight.
+_FEWEST_SAMPLES = 20  # For medians and rates.
+# Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
-"""Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses."""
-_GRID_HZ = 100.0
-"""Rate at which signals are compared, whose motion is below a tenth of it."""
+_GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
 
 
 class LogTable:

@@ -10,12 +10,12 @@ from typing import Final
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.words import joined
 
-FAST_HZ = 100.0
-"""At which motors are to be logged, which respond within some 50 ms."""
+FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 50 ms.
+# Below which they are logged too slowly for what they drive to be told from what drives them: two samples in the 50 ms
+# within which they follow, and a half.
 SLOW_HZ = 25.0
-"""Below which they are logged too slowly for what they drive to be told from what drives them: two samples in the 50 ms
-within which they follow, and a half."""
 _DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
+# By the beginning of what a log names as its writer: from which version on what is to be set, the newest first.
 _SETTINGS: Final[Mapping[str, tuple[tuple[tuple[int, int], str], ...]]] = {
     "PX4": (((0, 0), "SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate), then restart"),),
     "Betaflight": (
@@ -27,15 +27,12 @@ _SETTINGS: Final[Mapping[str, tuple[tuple[tuple[int, int], str], ...]]] = {
     "ArduPlane": (((0, 0), "LOG_BITMASK with bit 0 (fast attitude)"),),
     "Crazyflie": (((0, 0), "period_in_ms = 10 of the LogConfig, or a frequency of 100 or more on the card"),),
 }
-"""By the beginning of what a log names as its writer: from which version on what is to be set, the newest first."""
-
 _COPTER = ("ArduCopter", "ArduPilot")
 _FAST_IMU, _WITH_FAST_IMU = 18, (3, 3)
 _WITH_DSHOT = (4, 0)
+# Of LOG_BITMASK of ArduCopter; the last is newer than others.
 _BITS: Final[Mapping[int, str]] = {0: "fast attitude", 10: "outputs", _FAST_IMU: "fast IMU, from 3.3 on"}
-"""Of LOG_BITMASK of ArduCopter; the last is newer than others."""
-_USUAL_BITS = 176126
-"""LOG_BITMASK of ArduCopter 4 by default."""
+_USUAL_BITS = 176126  # LOG_BITMASK of ArduCopter 4 by default.
 _NONE: Final[Parameters] = MappingProxyType({})
 
 

@@ -26,27 +26,16 @@ from cpfls_cli.units import STANDARD_GRAVITY
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+# Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.
 _FEWEST_COLUMNS = 12
-"""Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix."""
-
-_STEPS_S, _EVEN = (2e-4, 0.2), 0.05
-"""Steps of a clock in s, and the share of them by which they differ on the mean."""
-
-_UNIT_LENGTH = 0.02
-"""By which the length of a quaternion is off 1, in single precision or filtered."""
-
+_STEPS_S, _EVEN = (2e-4, 0.2), 0.05  # Steps of a clock in s, and the share of them by which they differ on the mean.
+_UNIT_LENGTH = 0.02  # By which the length of a quaternion is off 1, in single precision or filtered.
+# Share that a derivative has to explain, and the ratio of sizes, where no name speaks for it.
 _FOLLOWS, _NEAR = 0.8, 1.3
-"""Share that a derivative has to explain, and the ratio of sizes, where no name speaks for it."""
-
+# Level in rad/s, or more in another unit, of every rotor in flight, and the ratio of their levels.
 _SLOWEST_ROTOR, _ROTORS_ALIKE = 50.0, 1.3
-"""Level in rad/s, or more in another unit, of every rotor in flight, and the ratio of their levels."""
-
-_SIZE = 0.1
-"""Share by which an accelerometer may be off what carries the vehicle."""
-
-_RATE_HZ = 100.0
-"""Rate to which a fast matrix is thinned: every pair of runs is compared."""
-
+_SIZE = 0.1  # Share by which an accelerometer may be off what carries the vehicle.
+_RATE_HZ = 100.0  # Rate to which a fast matrix is thinned: every pair of runs is compared.
 OF_A_MATRIX: Final = "a matrix without names"
 
 

@@ -124,9 +124,8 @@ class Named:
     sign: tuple[float, ...] | None = None
 
 
+# What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
-"""What to do where names do not tell what columns hold."""
-
 _FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (
     ("wxyz", ("w", "x", "y", "z")),
     ("wxyz", ("W", "X", "Y", "Z")),

@@ -22,27 +22,19 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
 
 _SURENESS: Final = ("data", "named", "guess")
-_STEPS_BRIDGED = 2.5
-"""Steps of the slowest topic that a gap may have: one sample of it may be lost."""
-
+_STEPS_BRIDGED = 2.5  # Steps of the slowest topic that a gap may have: one sample of it may be lost.
 _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
+# Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long.
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
-"""Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long."""
-
+# Share of the range of commands by which its ends may differ: a stick is calibrated anew to a few us.
 _SAME_RANGE: Final = 0.01
-"""Share of the range of commands by which its ends may differ: a stick is calibrated anew to a few us."""
-
-_ROOM = 1.2
-"""By which a limit of the rotor speeds lies above the fastest one that is logged."""
-
+_ROOM = 1.2  # By which a limit of the rotor speeds lies above the fastest one that is logged.
+# Share by which an arm that is given may differ from the places that a log states: both are rounded.
 _SAME_ARM: Final = 0.05
-"""Share by which an arm that is given may differ from the places that a log states: both are rounded."""
-
 DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
+# Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
+# batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06.
 _ALIKE: Final = {True: 1.06, False: 1.12}
-"""Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
-batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
-
 _NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN")
 
 

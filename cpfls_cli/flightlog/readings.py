@@ -37,15 +37,10 @@ from cpfls_cli.flightlog.agreement import (
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-CLEAR: Final = 0.3
-"""Share of a signal that another has to explain to say something about it."""
-
+CLEAR: Final = 0.3  # Share of a signal that another has to explain to say something about it.
+# Shares by which a reading may explain less, or fly less upright, than the best and still be as good.
 _AS_GOOD_RATES, _AS_GOOD_LEAN, _AS_LEVEL = 0.02, 0.1, 0.2
-"""Shares by which a reading may explain less, or fly less upright, than the best and still be as good."""
-
-_ODD_ENOUGH = 2
-"""Price from which the columns of a quaternion are tried in every order and with every sign."""
-
+_ODD_ENOUGH = 2  # Price from which the columns of a quaternion are tried in every order and with every sign.
 Body = Literal["FLU", "FRD"]
 
 

@@ -43,24 +43,22 @@ SOURCES: Final = (
 )
 """All columns that rebuilding reads."""
 
+# What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean, share of
+# full. docs/import.md has the study.
 _LEAST_EXPLAINED, _MOST_LAG_S, _SCALES, _MOST_OFFSET = 0.9, 0.01, (0.9, 1.1), 0.01
-"""What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean,
-share of full. docs/import.md has the study."""
+# Root mean square of commands about an axis, share of full, below which the resolution of outputs hides them; lag up to
+# which the logged ones are on time; and how far apart stamps are that are of one step of the autopilot, s.
 _SMALLEST, _ON_TIME_S, _AT_ONCE_S = 2e-3, 5e-3, 1e-3
-"""Root mean square of commands about an axis, share of full, below which the resolution of outputs hides them; lag up
-to which the logged ones are on time; and how far apart stamps are that are of one step of the autopilot, s."""
+# Age that outputs may have that ArduPilot reads back from another processor, and the rate of what is mixed from which
+# on the moment of each of them can be found.
 _READ_BACK_S, _OFTEN_HZ = 0.08, 100.0
-"""Age that outputs may have that ArduPilot reads back from another processor, and the rate of what is mixed from which
-on the moment of each of them can be found."""
 _NOTHING: Final = "it lacks logged commands to compare with, what they are mixed from, or its frame"
-_FEWEST: Final = 30
-"""Logged samples in flight that are compared."""
-_FLIES: Final = 0.35
-"""Share of the usual mean command from which on the vehicle flies."""
+_FEWEST: Final = 30  # Logged samples in flight that are compared.
+_FLIES: Final = 0.35  # Share of the usual mean command from which on the vehicle flies.
 _LEAST_COMMAND: Final = 0.03
 _SHIFTS_S: Final = np.arange(-30, 31) * 2e-3
+# Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m.
 _DENSITY_AT_SEA, _GAS, _KELVIN, _LAPSE = 1.225, 287.26, 273.15, 0.0065
-"""Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m."""
 
 
 @result

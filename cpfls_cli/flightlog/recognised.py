@@ -18,8 +18,8 @@ from cpfls_cli.units import UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
+# Whether the data decided, a name or the kind of log says so, or neither does.
 Sure = Literal["data", "named", "guess"]
-"""Whether the data decided, a name or the kind of log says so, or neither does."""
 
 
 @dataclass(frozen=True)

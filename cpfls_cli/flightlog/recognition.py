@@ -40,15 +40,10 @@ from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.words import some
 
 _DEGREES = 180 / np.pi
+# Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it.
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
-"""Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it."""
-
-_FASTEST_RAD_S = 40.0
-"""Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s."""
-
-_LATE_S = (0.0, 0.03, 0.06, 0.09)
-"""By which motors and propellers follow a command, s."""
-
+_FASTEST_RAD_S = 40.0  # Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s.
+_LATE_S = (0.0, 0.03, 0.06, 0.09)  # By which motors and propellers follow a command, s.
 _ORDER: Final[tuple[SignalName, ...]] = (
     "quaternion",
     "attitude",
@@ -62,17 +57,12 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
-_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
-"""What shows flight, with the rotors."""
-
+_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # What shows flight, with the rotors.
+# Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
+# specific force of a lean of 30 degrees is 15 % above gravity.
 _STEADY: Final = 0.15
-"""Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
-specific force of a lean of 30 degrees is 15 % above gravity."""
-
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
-_SHOWN = 4
-"""Groups of columns that are named where others are taken for the same."""
-
+_SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
 

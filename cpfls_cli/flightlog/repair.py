@@ -16,9 +16,7 @@ from cpfls_cli.units import KNOWN_UNITS
 # Measured, not derived: over 15 flights no gyroscope, torque or attitude has a value beyond 7, and 99 % of the single
 # spikes of five standard deviations of their channel lie beyond 10.
 _SUSPECTED_DEVIATIONS = 10.0
-_DEVIATION_OF_MEDIAN = 1.4826
-"""Standard deviation of normal noise over the median of its departures."""
-
+_DEVIATION_OF_MEDIAN = 1.4826  # Standard deviation of normal noise over the median of its departures.
 # Far beyond what flies, by SI unit: what is larger is a broken value, or the unit is wrong.
 _LARGEST = {
     "rad": 1e6,
@@ -32,8 +30,7 @@ _LARGEST = {
     "1": 1e9,
     "s": 1e3,
 }
-_LARGEST_SHARE_BROKEN = 0.01
-"""Of values up to which some are broken, and not the unit wrong."""
+_LARGEST_SHARE_BROKEN = 0.01  # Of values up to which some are broken, and not the unit wrong.
 
 
 @dataclass(frozen=True)

@@ -21,44 +21,28 @@ from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined
 
-_FEWEST = 3
-"""Rotors of a multirotor."""
-
+_FEWEST = 3  # Rotors of a multirotor.
+# Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones.
 FASTER = 2.0
-"""Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones."""
-
 _USUAL_POLE_PAIRS = 7
-_RPM_FROM = 4000.0
-"""Faster than rotors turn in rad/s; the smallest reach 3000."""
-
-_FEWEST_SAMPLES = 20
-"""For medians and rates."""
-
+_RPM_FROM = 4000.0  # Faster than rotors turn in rad/s; the smallest reach 3000.
+_FEWEST_SAMPLES = 20  # For medians and rates.
 _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
+# Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
-"""Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware."""
-
-_SAME = 0.02
-"""Part of the largest one's spread below which an output is not connected to a motor."""
+_SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 
 
+# Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
-"""Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller."""
-
+# Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
+# to stand for it to be known from which on, s, and the share away from it that no motor has then.
 _AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
-"""Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
-to stand for it to be known from which on, s, and the share away from it that no motor has then."""
-
+# Correlation with the others below which an output does not rise with them, and how many times as far as the others it
+# swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another.
 _RISES, _SWINGS, _SWING_S = 0.3, 2.5, 0.25
-"""Correlation with the others below which an output does not rise with them, and how many times as far as the others it
-swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another."""
-
-_FEWEST_BESIDE = 4
-"""Rotors of those whose columns hold more."""
-
-_PX4_MOTORS = range(101, 113)
-"""Values of *_FUNCn of PX4 that are its motors."""
-
+_FEWEST_BESIDE = 4  # Rotors of those whose columns hold more.
+_PX4_MOTORS = range(101, 113)  # Values of *_FUNCn of PX4 that are its motors.
 _RANGES = (
     ("MOT_PWM_MIN", "MOT_PWM_MAX"),
     ("Q_M_PWM_MIN", "Q_M_PWM_MAX"),
@@ -120,8 +104,7 @@ class RotorColumns:
     warnings: tuple[str, ...] = ()
 
 
-Found = tuple[Named, Array, Array]
-"""A candidate, its stamps in s and its values, shape (sample, rotor)."""
+Found = tuple[Named, Array, Array]  # A candidate, its stamps in s and its values, shape (sample, rotor).
 
 
 def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, system: str) -> RotorColumns:

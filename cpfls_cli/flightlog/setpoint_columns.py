@@ -20,42 +20,25 @@ from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNO
 from cpfls_cli.units import UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
-_FEWEST_COMPARED = 100
-"""Of the one clock, a second of flight."""
-
+_FEWEST_COMPARED = 100  # Of the one clock, a second of flight.
+# Correlations from which on what is measured follows what is asked for, and runs against it.
 _FOLLOWS, _OPPOSES = 0.6, -0.8
-"""Correlations from which on what is measured follows what is asked for, and runs against it."""
-
-_MOVES = 0.25
-"""As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift."""
-
-_LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""By which a vehicle follows, s."""
-
-_MOTION_HZ = 5.0
-"""Below which a vehicle follows anything; above there is the noise of sensors."""
-
+_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift.
+_LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)  # By which a vehicle follows, s.
+_MOTION_HZ = 5.0  # Below which a vehicle follows anything; above there is the noise of sensors.
 _HELD_S = 0.1
+# As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor.
 _TIMES, _TIMES_BY_WORDS = 3.0, 1.6
-"""As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor."""
-
-_LARGEST_ANGLE = 4 * np.pi
-"""In rad; larger ones are degrees."""
-
-_BOUND = 0.15
-"""Of a turn that an error spreads at most; one that is drawn at random does over 0.29."""
-
-_FULL = 1.05
-"""Share of full deflection, or of the largest thrust, up to which one is believed."""
-
+_LARGEST_ANGLE = 4 * np.pi  # In rad; larger ones are degrees.
+_BOUND = 0.15  # Of a turn that an error spreads at most; one that is drawn at random does over 0.29.
+_FULL = 1.05  # Share of full deflection, or of the largest thrust, up to which one is believed.
+# What setpoints may be in where no name says it.
 _UNITS: Final[dict[SignalName, tuple[UnitName, ...]]] = {
     "setpoint_position": ("m", "mm"),
     "setpoint_velocity": ("m/s", "mm/s"),
     "setpoint_attitude": ("rad", "deg"),
     "setpoint_body_rate": ("rad/s", "deg/s"),
 }
-"""What setpoints may be in where no name says it."""
-
 _REFERENCE: Final = "a reference may be a second measurement instead of a setpoint"
 _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 

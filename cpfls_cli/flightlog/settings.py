@@ -67,15 +67,12 @@ SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
     }
 )
 """Signals that say what was asked of the autopilot and of its loops, and the name of each among the setpoints."""
-ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
-"""Signals with a column for each rotor."""
+ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")  # Signals with a column for each rotor.
+# Signals that keep their value until the next one.
 COMMANDS: Final = ("torque", "body_torque", "thrust", "rotor_command")
-"""Signals that keep their value until the next one."""
-
 _COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1})
 _COLUMNS_OF_VECTOR, _COLUMNS_OF_QUATERNION = 3, 4
-_COLUMNS_OF_STICKS = (3, 4)
-"""Roll, pitch, yaw, and the throttle where it counts in the same way."""
+_COLUMNS_OF_STICKS = (3, 4)  # Roll, pitch, yaw, and the throttle where it counts in the same way.
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,26 +4,18 @@ from collections.abc import Mapping
 from typing import Final
 
 _GEOMETRY: Final = ("CA_ROTOR", "CA_AIRFRAME", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "MAV_TYPE")
-_NO_GEOMETRY: Final = ("_CT", "_SLEW")
-"""Ends of names of what is tuned in flight."""
-_OLD_FRAME, _FRAME = "FRAME", "FRAME_TYPE"
-"""Of ArduCopter before 3.5, with the same numbers."""
-
+_NO_GEOMETRY: Final = ("_CT", "_SLEW")  # Ends of names of what is tuned in flight.
+_OLD_FRAME, _FRAME = "FRAME", "FRAME_TYPE"  # Of ArduCopter before 3.5, with the same numbers.
+# What besides belongs to a vehicle, as Betaflight, ArduPilot and PX4 call it.
 _OTHERS: Final = ("Craft name", "motor_poles", "SERVO_BLH_POLES", "MOT_POLE_COUNT")
-"""What besides belongs to a vehicle, as Betaflight, ArduPilot and PX4 call it."""
-
-WRITTEN_BY: Final = "written by"
-"""Name of the fact that says which autopilot wrote a log."""
-
+WRITTEN_BY: Final = "written by"  # Name of the fact that says which autopilot wrote a log.
 _VERSION: Final = "version"
 _BOARD: Final = ("Board information", "BRD_TYPE")
+# Outputs that stop and full throttle stand for.
 _RANGES: Final = ("motorOutput", "MOT_PWM_MIN", "MOT_PWM_MAX", "THR_MIN", "PWM_MIN", "PWM_MAX", "RC3_MIN", "RC3_MAX")
-"""Outputs that stop and full throttle stand for."""
-_OF_INPUT: Final = ("RC3_MIN", "RC3_MAX")
-"""Of the outputs too in ArduCopter, where MOT_PWM_MAX is 0 or not there."""
-
+_OF_INPUT: Final = ("RC3_MIN", "RC3_MAX")  # Of the outputs too in ArduCopter, where MOT_PWM_MAX is 0 or not there.
+# Share by which an end of a range differs that moves no load by more than flights of one vehicle differ.
 _SAME_RANGE: Final = 0.002
-"""Share by which an end of a range differs that moves no load by more than flights of one vehicle differ."""
 
 
 def stated_vehicle(system: str, parameters: Mapping[str, float | str]) -> dict[str, str]:

@@ -15,9 +15,7 @@ from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
 from cpfls_cli.words import joined
 
-_SHORTEST_REST_S = 0.5
-"""Shorter ones are those of a throttle that is cut in flight."""
-
+_SHORTEST_REST_S = 0.5  # Shorter ones are those of a throttle that is cut in flight.
 # A speed that is measured, or a command that was filtered, may undershoot zero a little.
 _UNDERSHOOT = 0.01
 _MOST_LISTED = 3
@@ -30,25 +28,16 @@ _LOWEST_LIMIT = {"body_rate": 1.0, "attitude_rate": 1.0, "acceleration": 15.0, "
 _MEASURED = frozenset(
     {"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration", "rotor_speed"}
 )
-_SHORTEST_PAUSE_S = 0.5
-"""Shorter ones are bridged like gaps."""
-
+_SHORTEST_PAUSE_S = 0.5  # Shorter ones are bridged like gaps.
 _FEWEST_IN_PAUSE = 20
-_USUAL_STEPS = 10
-"""Times the usual step between updates, and so many rows, from which on a source was silent."""
-
+_USUAL_STEPS = 10  # Times the usual step between updates, and so many rows, from which on a source was silent.
+# Signals that are never straight lines while they are measured.
 _WITNESSES = {"body_rate", "acceleration", "rotor_speed", "rotor_command"}
-"""Signals that are never straight lines while they are measured."""
-
-_STRAIGHT = 1e-3
-"""Bend of a straight line by the rounding of a file, as a share of the largest."""
-
+_STRAIGHT = 1e-3  # Bend of a straight line by the rounding of a file, as a share of the largest.
 _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
-_FULL_TURN = 7.0
-"""Somewhat more than a full turn, rad."""
-
+_FULL_TURN = 7.0  # Somewhat more than a full turn, rad.
 _ANGLE_QUANTILE = 0.99
 
 

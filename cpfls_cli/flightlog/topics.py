@@ -16,21 +16,15 @@ from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, Si
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
-STAMP = "timestamp"
-"""The field of a topic that holds its time stamps."""
-REBUILT = "rebuilt"
-"""The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`)."""
+STAMP = "timestamp"  # The field of a topic that holds its time stamps.
+REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`).
 _ANGLES_THAT_JUMP = (0, 2)
+# Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3
-"""Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
-
+# Share of the steps that none of the others is so many times as long as, unless it is a pause.
 _MOST_STEPS, _PAUSE_STEPS = 0.9, 2.5
-"""Share of the steps that none of the others is so many times as long as, unless it is a pause."""
-
 _ON_TIME = 0.01
-_THINNED = 1.5
-"""Times as fast that a topic has to be for its thinning to matter."""
-
+_THINNED = 1.5  # Times as fast that a topic has to be for its thinning to matter.
 # Stamps are rounded, so a pause of exactly the allowed length must pass.
 _ROUNDING = 1 + 1e-9
 

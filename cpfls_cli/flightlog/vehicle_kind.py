@@ -12,7 +12,6 @@ from cpfls_cli.flightlog.topics import STAMP, Topics, previous_rows
 
 AIRPLANE, GROUND, BOAT, SUBMARINE = "an airplane", "a ground vehicle", "a boat", "a submarine"
 HELICOPTER, BLIMP, BALLOON, VTOL = "a helicopter", "a blimp", "a balloon", "a VTOL"
-
 _FIRMWARE: Final = {
     "ArduPlane": AIRPLANE,
     "ArduRover": f"{GROUND} or {BOAT}",
@@ -32,9 +31,7 @@ _FRAME_CLASSES: Final = {
     11: "a helicopter with two rotors",
     13: "a helicopter with four rotors",
 }
-VTOL_TYPES: Final = range(20, 26)
-"""MAV_TYPE of vehicles that hover on three rotors or more."""
-
+VTOL_TYPES: Final = range(20, 26)  # MAV_TYPE of vehicles that hover on three rotors or more.
 _MAV_TYPES: Final = {
     1: AIRPLANE,
     3: "a coaxial helicopter",
@@ -72,12 +69,9 @@ _AUTOSTART: Final = (
     *((16000, 16999, HELICOPTER), (17000, 17999, "an autogyro"), (18000, 18999, BALLOON)),
     *((50000, 59999, GROUND), (60000, 60999, SUBMARINE)),
 )
-_PLATFORMS: Final = {1: AIRPLANE, 2: HELICOPTER, 4: GROUND, 5: BOAT}
-"""Platform types of INAV by number."""
-
+_PLATFORMS: Final = {1: AIRPLANE, 2: HELICOPTER, 4: GROUND, 5: BOAT}  # Platform types of INAV by number.
+# Mixers of Betaflight and its kin by number; 3 to 6 motors alone have any other.
 _MIXERS: Final = {8: AIRPLANE, 14: AIRPLANE, 15: HELICOPTER, 16: HELICOPTER, 24: AIRPLANE}
-"""Mixers of Betaflight and its kin by number; 3 to 6 motors alone have any other."""
-
 _SURFACES: Final = {
     4: "aileron",
     16: "aileron",
@@ -97,16 +91,11 @@ _FUNCTIONS: Final = {
     **{number: (word, GROUND) for number, word in _STEERING.items()},
     **{number: (word, HELICOPTER) for number, word in _ROTOR_HEADS.items()},
 }
-MOTORS: Final = (*range(33, 41), *range(82, 86))
-"""SERVOn_FUNCTION of ArduPilot that are its motors 1 to 12."""
-
+MOTORS: Final = (*range(33, 41), *range(82, 86))  # SERVOn_FUNCTION of ArduPilot that are its motors 1 to 12.
 _FEWEST_MOTORS, _FEWEST_SURFACES, _OUTPUTS = 3, 2, 32
+# Flight modes of ArduPlane in which its rotors carry it: QSTABILIZE to QACRO, and landing on them.
 _HOVER_MODES: Final = (*range(17, 24), 25)
-"""Flight modes of ArduPlane in which its rotors carry it: QSTABILIZE to QACRO, and landing on them."""
-
-_FORWARD_VTOL_STATES: Final = (1, 2, 4)
-"""Of PX4's vtol_vehicle_status: transitions, and flight on the wing."""
-
+_FORWARD_VTOL_STATES: Final = (1, 2, 4)  # Of PX4's vtol_vehicle_status: transitions, and flight on the wing.
 _STATES: Final = (
     # Topic and field, and the states that are forward flight, or that are not.
     ("vtol_vehicle_status", "vehicle_vtol_state", _FORWARD_VTOL_STATES, True),

@@ -40,9 +40,8 @@ SPELLINGS: Final[Mapping[UnitName, Mapping[float, str]]] = {
     "us": {1.0: "us usec"},
 }
 IN_FULL: Final = {"radians?": "rad", "degrees?": "deg", "met(er|re)s?": "m", "sec(onds?)?": "s", "volts?": "v"}
+# Spellings that state a unit wherever they stand as a word of a name.
 A_WORD: Final = _each("rad rads deg degs dps rpm mm g radps degps mps rads-1")
-"""Spellings that state a unit wherever they stand as a word of a name."""
-
 IN_RADIANS: Final[Mapping[str, tuple[SignalName, ...]]] = {
     # An angular frequency by its letter.
     "w": ("body_rate",),
@@ -231,8 +230,8 @@ def _known(row: str) -> Known:
 
 
 KNOWN: Final = tuple(_known(row) for row in _KNOWN.splitlines() if row.strip() and "#" not in row)
+# Words of a name that say: what was asked for.
 WISHED: Final = _each("des desired sp setpoint setpoints ref reference target goal ctrltarget")
-"""Words of a name that say: what was asked for."""
 
 
 class Meaning(NamedTuple):
@@ -258,9 +257,8 @@ class Meaning(NamedTuple):
     never: str = ""
 
 
+# Words of a name that mean together what neither does, as a pattern, and the one word that means it.
 ONE_WORD: Final = {r"\bang vel(ocity)?\b": "angvel"}
-"""Words of a name that mean together what neither does, as a pattern, and the one word that means it."""
-
 RATE_WORDS: Final = "gyro gyr gyroscope gyros omega om w rate rates angular angvel pqr"
 MEANINGS: Final = (
     Meaning(
@@ -301,14 +299,11 @@ ALLOWED: Final = {
     "thrust": frozenset({"thrust"}),
     **dict.fromkeys(ROTORS, _each("cmd command status r ref des d")),
 }
-
 _DEGREES = 180 / pi
+# Size that speaks for a unit, the unit, and the factor that makes it of what is logged.
 Row = tuple[float, UnitName, float]
-"""Size that speaks for a unit, the unit, and the factor that makes it of what is logged."""
-
+# Sizes of a gyroscope beside the attitude's derivative.
 RATES: Final[tuple[Row, ...]] = ((1.0, "rad/s", 1.0), (_DEGREES, "deg/s", 1.0), (1000.0, "rad/s", 1e-3))
-"""Sizes of a gyroscope beside the attitude's derivative."""
-
 ANGLES: Final[tuple[Row, ...]] = (
     (1.0, "rad", 1.0),
     (1000.0, "rad", 1.0),

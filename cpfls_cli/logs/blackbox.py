@@ -19,9 +19,8 @@ from cpfls_cli.logs.records import bytes_of, date
 
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
-
+# Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths.
 _MOST_CELLS, _HUNDREDTHS = 15, 100
-"""Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths."""
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:

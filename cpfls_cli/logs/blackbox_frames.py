@@ -13,12 +13,10 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.compiling import compiled, part
 
 Bytes = np.ndarray
-KINDS = "IPGHS"
-"""Kinds of frames with fields: main, those between, GPS, home, slow."""
+KINDS = "IPGHS"  # Kinds of frames with fields: main, those between, GPS, home, slow.
 MAIN = 0
 SLOW = KINDS.index("S")
-ROLLOVER = 1 << 32
-"""Stamps have 32 bits, microseconds."""
+ROLLOVER = 1 << 32  # Stamps have 32 bits, microseconds.
 _SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE = 0, 1, 3, 6, 7, 8, 9, 10
 ENCODINGS = (_SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE)
 _PREVIOUS, _STRAIGHT, _AVERAGE, _MINIMUM, _FIRST_MOTOR, _MIDDLE, _BATTERY, _MOTOR_MINIMUM = 1, 2, 3, 4, 5, 8, 9, 11

@@ -136,9 +136,8 @@ class LogFormat:
         return line.startswith(self.magic) if self.magic else _is_header(line)
 
 
+# A count of names, and the first of them with the letter of its type.
 _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
-"""A count of names, and the first of them with the letter of its type."""
-
 _PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
 _ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
 _OURS_TOO = {"shared": True}

@@ -24,20 +24,16 @@ from cpfls_cli.words import some
 _MOST_COLUMNS = 64
 _PROBE = """
 import sys, h5py
-
 states = 0
-
 def count(name, own):
     global states
     # Of one byte each or of eight, they are read as numbers of eight.
     states += max(own.nbytes, 8 * (own.size or 0)) if isinstance(own, h5py.Dataset) else 0
-
 def read(name, own):
     if isinstance(own, h5py.Dataset) and own.dtype.kind in "iufb" and own.ndim and own.size:
         rows = max(1, (1 << 20) * len(own) // own.size)
         for start in range(0, len(own), rows):
             own[start : start + rows]
-
 with h5py.File(sys.argv[1], "r") as file:
     name = file.attrs.get("format")
     print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
@@ -47,8 +43,8 @@ with h5py.File(sys.argv[1], "r") as file:
         sys.exit(3)
     file.visititems(read)
 """
+# Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much.
 _COMPRESSED, _INFLATED = 15, 3
-"""Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much."""
 _TIME_UNITS = ("s", "ms", "us", "ns")
 
 

@@ -17,9 +17,7 @@ from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.words import some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-
-_LONGEST = 200
-"""Characters of a message of the library, which may list all columns."""
+_LONGEST = 200  # Characters of a message of the library, which may list all columns.
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
