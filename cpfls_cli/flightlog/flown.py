@@ -7,7 +7,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.crash import (
     ALIVE,
     LIVELY_RAD_S,
@@ -22,7 +21,7 @@ from cpfls_cli.flightlog.crash import (
     upright_of,
 )
 from cpfls_cli.flightlog.names import BY_HAND
-from cpfls_cli.flightlog.repair import SignalTable, fill
+from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
 from cpfls_cli.flightlog.stretches import live_rows
 
@@ -136,8 +135,8 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
     """Find what flies by the signals that a config maps, on the clock of the log."""
     rows, _ = increasing_rows(table.time)
     table = table.rows(rows)
-    live = live_rows(table, 0.0)
-    table = table.rows(live.rows)
+    live, ended = live_rows(table, 0.0)
+    table = table.rows(live)
     if len(table.time) < _FEWEST_ROWS:
         return FlownPart(None, ())
     step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
@@ -163,7 +162,7 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
             force=known.get("acceleration") if senses else None,
         )
     )
-    return flown.within(live.ended, (float(clock[0]), float(clock[-1])))
+    return flown.within(ended, (float(clock[0]), float(clock[-1])))
 
 
 def find_flown(signs: Signs) -> FlownPart:

@@ -11,10 +11,10 @@ from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, too_short
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
+from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
 from cpfls_cli.units import KNOWN_UNITS, UnitName

@@ -30,11 +30,7 @@ _TOLERANCE, _TEN = 1.4, 10.0
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 # Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2.
-_OVER_GROUND: Sequence[Row] = (
-    (1.0, "m/s^2", 1.0),
-    (1 / STANDARD_GRAVITY, "g", 1.0),
-    (1000.0, "m/s^2", 1e-3),
-)
+_OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
 # Ratios to gravity: of what is gravity in some unit, since a vehicle pushes; the same of columns that are known to hold
 # it, also where the sensor reads wrong; and of what is no more than that.
 NEAR_GRAVITY, _BY_NAME, _WEIGHT = 1.3, 2.0, 1.15
@@ -85,10 +81,7 @@ def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | N
     best = largest(driven, lambda named: driven[named])
     if best is first:
         return False
-    seen.candidates = {
-        **seen.candidates,
-        "body_rate": (best, *(own for own in (first, *others) if own is not best)),
-    }
+    seen.candidates = {**seen.candidates, "body_rate": (best, *(own for own in (first, *others) if own is not best))}
     seen.left_out.append(
         f"{', '.join(first.group.columns)}: also a body rate, but the derivative of the attitude, of which the rotors"
         f" explain {100 * driven[first]:.0f} % where they explain {100 * driven[best]:.0f} % of"
@@ -221,11 +214,7 @@ def tell_places(seen: Seen, reading: Reading | None) -> None:
 
 
 def _tell_place(
-    seen: Seen,
-    named: Named,
-    units: tuple[UnitName, UnitName],
-    tilt: Reading | None,
-    relative: AxisFit | None,
+    seen: Seen, named: Named, units: tuple[UnitName, UnitName], tilt: Reading | None, relative: AxisFit | None
 ) -> None:
     stated, place = named.unit, seen.guesses.get("position")
     unit: UnitName = stated or units[0]

@@ -10,10 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
-from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.stated_vehicle import plain, stated_vehicle, vehicles_apart
 from cpfls_cli.flightlog.topics import Topics, column_names

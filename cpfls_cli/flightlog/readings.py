@@ -234,12 +234,7 @@ def quaternion_readings(values: Array, named: bool, time: Array, grid: Array) ->
             rotation = rotations_of(values[:, order], "xyzw" if scalar_last else "wxyz", inverse)
             back: Sign = (-1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, -1.0, -1.0, -1.0)
             yield Attitude(
-                on_clock(rotation, time, grid),
-                order,
-                back if inverse else plain,
-                price + inverse,
-                inverse,
-                scalar_last,
+                on_clock(rotation, time, grid), order, back if inverse else plain, price + inverse, inverse, scalar_last
             )
 
 

@@ -278,9 +278,7 @@ def _of_ardupilot(log: LogTable, columns: SignalMap, parameters: Parameters) -> 
             gain, battery = 1 / np.interp(time, at, np.where(lift > 0, lift, 1.0)), held[:, None]
     gain = gain / _air_density(log, time)
     limits = Limits(
-        by="ardupilot",
-        yaw_headroom=1e-3 * of("YAW_HEADROOM", 200.0),
-        throttle_mean=0.5 * of("THST_HOVER", 0.35),
+        by="ardupilot", yaw_headroom=1e-3 * of("YAW_HEADROOM", 200.0), throttle_mean=0.5 * of("THST_HOVER", 0.35)
     )
     curve = ThrustCurve(of("THST_EXPO", 0.65), of("SPIN_MIN", 0.15), of("SPIN_MAX", 0.95))
     return _Mixed(

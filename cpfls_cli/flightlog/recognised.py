@@ -173,6 +173,12 @@ class Seen:
         """Of the one clock."""
         return 1 / float(self.log.grid[1] - self.log.grid[0])
 
+    @property
+    def quaternion_order(self) -> Literal["wxyz", "xyzw"]:
+        """Order of the columns of quaternions."""
+        choice = self.choices.get("quaternion_order")
+        return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
+
     def first(self, name: SignalName) -> Named | None:
         """Give the best candidate for a signal."""
         return next(iter(self.candidates.get(name, ())), None)

@@ -146,12 +146,12 @@ def _live_part(
         for name, found in candidates.items()
     }
     clock = log.clock("")
-    live = live_rows(SignalTable(clock, {str(name): values for name, values in leading.items()}), float(clock[0]))
-    if not live.ended:
+    live, ended = live_rows(SignalTable(clock, {str(name): own for name, own in leading.items()}), float(clock[0]))
+    if not ended:
         return log, candidates, ""
-    part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)
+    part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
-    return part, holding_values(part, [named for found in candidates.values() for named in found]), live.ended
+    return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
 
 
 def _refuse_unfit(log: LogTable, named: Sequence[Named]) -> None:

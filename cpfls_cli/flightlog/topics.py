@@ -9,9 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
-from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
+from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, unwrap_angles
 from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 

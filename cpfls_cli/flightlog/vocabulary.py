@@ -295,10 +295,7 @@ NOT_MEASURED: Final = _each(
 """Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement."""
 
 SECOND_HAND: Final = _each("raw groundtruth mocap poses estimator filtered filt unfilt backup")
-ALLOWED: Final = {
-    "thrust": frozenset({"thrust"}),
-    **dict.fromkeys(ROTORS, _each("cmd command status r ref des d")),
-}
+ALLOWED: Final = {"thrust": frozenset({"thrust"}), **dict.fromkeys(ROTORS, _each("cmd command status r ref des d"))}
 _DEGREES = 180 / pi
 # Size that speaks for a unit, the unit, and the factor that makes it of what is logged.
 Row = tuple[float, UnitName, float]
