@@ -46,33 +46,16 @@ def handed(order: Sequence[int], sign: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """How the axes of a measured vector lie to those of a reference.
+    """How the axes of a measured vector lie to those of a reference."""
 
-    Attributes
-    ----------
-    order : tuple of int
-        Which measured column is x, y and z of the reference.
-    sign : tuple of float
-        Of those columns, in that order.
-    gain : float
-        Measured over reference.
-    explained : float
-        Share of the measured vector's square that the reference explains.
-    runner_up : float
-        The same of the next best axes.
-    as_named : float
-        The same of the axes in their order, with a plus.
-    along : tuple of float
-        Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
-        two does not move.
-    """
-
-    order: tuple[int, int, int]
-    sign: tuple[float, float, float]
-    gain: float
-    explained: float
-    runner_up: float
-    as_named: float
+    order: tuple[int, int, int]  # Which measured column is x, y and z of the reference.
+    sign: tuple[float, float, float]  # Of those columns, in that order.
+    gain: float  # Measured over reference.
+    explained: float  # Share of the measured vector's square that the reference explains.
+    runner_up: float  # The same of the next best axes.
+    as_named: float  # The same of the axes in their order, with a plus.
+    # Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
+    # two does not move.
     along: tuple[float, float, float]
 
     @property
@@ -193,22 +176,14 @@ def turning_of(rotation: Rotation, rate_hz: float) -> Array | None:
 
 @dataclass(frozen=True)
 class LeanFit:
-    """How the acceleration over ground follows the lean of a body.
+    """How the acceleration over ground follows the lean of a body."""
 
-    Attributes
-    ----------
-    shares : mapping from (order, sign) to float
-        Share of the acceleration that the lean explains, if these columns of the position with these signs are the
-        first two axes of the attitude's world, and the thrust points along the body's third axis.
-    rises : float
-        1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
-    gain : float
-        Acceleration over what the lean makes of gravity, 1 where the units agree.
-    """
-
+    # By (order, sign); Share of the acceleration that the lean explains, if these columns of the position with these
+    # signs are the first two axes of the attitude's world, and the thrust points along the body's third axis.
     shares: Mapping[tuple[tuple[int, int], tuple[float, float]], float]
+    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
     rises: float
-    gain: float
+    gain: float  # Acceleration over what the lean makes of gravity, 1 where the units agree.
 
     @property
     def explained(self) -> float:
@@ -217,16 +192,10 @@ class LeanFit:
 
 
 class Ground(NamedTuple):
-    """What is slow of an acceleration over ground, in any unit.
+    """What is slow of an acceleration over ground, in any unit."""
 
-    Attributes
-    ----------
-    horizontal : array, shape (time, 2)
-    vertical : array, shape (time,)
-    """
-
-    horizontal: Array
-    vertical: Array
+    horizontal: Array  # Shape (time, 2)
+    vertical: Array  # Shape (time,)
 
     @classmethod
     def of(cls, acceleration: Array, rate_hz: float) -> Ground:

@@ -42,51 +42,26 @@ _PREFER_X = 1.3  # Few vehicles are a plus: one has to explain that much more th
 
 @dataclass(frozen=True)
 class RotorPlace:
-    """Where a rotor is and how it turns.
+    """Where a rotor is and how it turns."""
 
-    Attributes
-    ----------
-    name : str
-        Such as ``front left``; empty where it is told by its numbers alone.
-    direction : tuple of float
-        x forward and y left, of length 1 where only the direction is known.
-    height_m : float
-        Of the hub above the point that the parameters count from.
-    spin : int
-        1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
-    """
-
-    name: str
-    direction: tuple[float, float]
-    spin: int
-    height_m: float = 0.0
+    name: str  # Such as ``front left``; empty where it is told by its numbers alone.
+    direction: tuple[float, float]  # x forward and y left, of length 1 where only the direction is known.
+    spin: int  # 1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
+    height_m: float = 0.0  # Of the hub above the point that the parameters count from.
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """The rotors of a vehicle, in the order of the log.
-
-    Attributes
-    ----------
-    in_metres : bool
-        Whether the places are lengths; False where they are directions.
-    reason : str
-        Where that is known from.
-    sure : {"stated", "data", "usual", "guess"}
-        Whether parameters state it, the motion shows it clearly, it is what a kind of log has unless changed, or the
-        motion only suggests it.
-    moment_ratio_m : float or None
-        Drag factor over thrust factor that the parameters state.
-    scaled : bool
-        Whether its places are those of an arm that was given.
-    """
+    """The rotors of a vehicle, in the order of the log."""
 
     rotors: tuple[RotorPlace, ...]
-    in_metres: bool
-    reason: str
+    in_metres: bool  # Whether the places are lengths; False where they are directions.
+    reason: str  # Where that is known from.
+    # Whether parameters state it, the motion shows it clearly, it is what a kind of log has unless changed, or the
+    # motion only suggests it.
     sure: str
-    moment_ratio_m: float | None = None
-    scaled: bool = False
+    moment_ratio_m: float | None = None  # Drag factor over thrust factor that the parameters state.
+    scaled: bool = False  # Whether its places are those of an arm that was given.
 
     @property
     def is_guess(self) -> bool:
@@ -122,11 +97,6 @@ def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:
     ----------
     rotors : int
         That the log's columns show; 0 where they show none.
-
-    Raises
-    ------
-    InputError
-        If the rotors that are stated cannot turn the vehicle about all of its axes.
     """
     found = _of_px4(parameters) or _of_frame(parameters, rotors)
     if found is not None:
@@ -223,22 +193,13 @@ def _layouts() -> tuple[tuple[_RotorLayout, Array], ...]:
 
 @dataclass(frozen=True)
 class MovedBy:
-    """Four rotors told by the motion, and how clearly.
-
-    Attributes
-    ----------
-    explained : tuple of float
-        Share of the angular acceleration about roll, pitch and yaw that they explain.
-    by_axes : bool
-        Whether every axis says it.
-    clear : bool
-        Whether every rotor by itself says it too.
-    """
+    """Four rotors told by the motion, and how clearly."""
 
     airframe: Airframe
+    # Share of the angular acceleration about roll, pitch and yaw that they explain.
     explained: tuple[float, float, float]
-    by_axes: bool
-    clear: bool
+    by_axes: bool  # Whether every axis says it.
+    clear: bool  # Whether every rotor by itself says it too.
 
 
 # Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus.

@@ -45,19 +45,11 @@ _SMALLEST_POWER = 1e-300
 
 @dataclass(frozen=True)
 class SlowSignal:
-    """A signal that is updated slower than the clock of its log.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Of its updates.
-    between : {"repeated", "interpolated"}
-        What the rows between two updates hold.
-    """
+    """A signal that is updated slower than the clock of its log."""
 
     name: str
-    rate_hz: float
-    between: Literal["repeated", "interpolated"]
+    rate_hz: float  # Of its updates.
+    between: Literal["repeated", "interpolated"]  # What the rows between two updates hold.
 
 
 def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = None) -> tuple[SlowSignal, ...]:

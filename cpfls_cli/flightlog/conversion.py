@@ -50,11 +50,6 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
     """Leave out the optional signals whose columns the log does not hold.
 
     A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
-
-    Raises
-    ------
-    InputError
-        If the remaining signals describe neither the rotation nor the rotors, or another key needs an absent one.
     """
     absent = [
         name
@@ -89,12 +84,6 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         Time stamps from 0.
     signals : dict from signal name to array, shape (sample, column), SI
         Frames and order as in the log.
-
-    Raises
-    ------
-    InputError
-        If columns are missing, empty or of unequal length; the message names all of them, the config key of each
-        and the nearest columns of the log.
     """
     _require_present(columns, settings)
     stamps = np.asarray(columns[str(settings.time_column)], dtype=float)

@@ -44,29 +44,15 @@ _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
-    """What a log holds on whether the vehicle flies, on a uniform clock.
+    """What a log holds on whether the vehicle flies, on a uniform clock."""
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-        As it is said.
-    rotors : array, shape (time, rotor), or None
-        Commands or speeds as shares, 0 where they stand.
-    height : array, shape (time,), m, or None
-        Upward.
-    body_rate : array, shape (time, 3), rad/s, or None
-    upright : array, shape (time,), or None
-        Cosine of the lean; of either sign, as frames of logs have it.
-    force : array, shape (time, 3), body frame, or None
-        Of an accelerometer, in m/s^2 or in g.
-    """
-
-    time: Array
-    rotors: Array | None = None
-    height: Array | None = None
-    body_rate: Array | None = None
+    time: Array  # Shape (time,), s; as it is said.
+    rotors: Array | None = None  # Shape (time, rotor), or None; commands or speeds as shares, 0 where they stand.
+    height: Array | None = None  # Shape (time,), m, or None; upward.
+    body_rate: Array | None = None  # Shape (time, 3), rad/s; or None
+    # Shape (time,), or None; cosine of the lean; of either sign, as frames of logs have it.
     upright: Array | None = None
-    force: Array | None = None
+    force: Array | None = None  # Shape (time, 3), body frame, or None; of an accelerometer, in m/s^2 or in g.
 
     @property
     def period(self) -> float:
@@ -111,17 +97,12 @@ class Signs:
 
 
 class EarlyEnd(NamedTuple):
-    """What ended a flight before its time, and its first sample.
-
-    Attributes
-    ----------
-    moments : tuple of (str, float)
-        What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``, ``impact``, ``rests with its
-        rotors on``, ``rotors stop in the air``.
-    """
+    """What ended a flight before its time, and its first sample."""
 
     first: int
     what: str
+    # What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``,
+    # ``impact``, ``rests with its rotors on``, ``rotors stop in the air``.
     moments: tuple[tuple[str, float], ...] = ()
 
 

@@ -58,30 +58,16 @@ def too_short(span_s: float) -> str:
 
 @dataclass(frozen=True)
 class FlownPart:
-    """What of a log is a flight.
+    """What of a log is a flight."""
 
-    Attributes
-    ----------
-    span_s : tuple of float or None
-        Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
-    reasons : tuple of str
-        What was cut, where, and how that was told; what else flies and is left out.
-    flies : bool
-        False where nothing in it flies.
-    stretches_s : tuple of tuple of float
-        Begin and end of each stretch that flies, in order.
-    ended, used : str
-        How flight ended before its time, and what is used; empty where nothing ended it.
-    moments : tuple of (str, float)
-        What ended flights before their time, of all stretches, as `EarlyEnd` has it.
-    """
-
+    # Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
     span_s: tuple[float, float] | None
-    reasons: tuple[str, ...]
-    flies: bool = True
-    stretches_s: tuple[tuple[float, float], ...] = ()
-    ended: str = ""
+    reasons: tuple[str, ...]  # What was cut, where, and how that was told; what else flies and is left out.
+    flies: bool = True  # False where nothing in it flies.
+    stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
+    ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
     used: str = ""
+    # What ended flights before their time, of all stretches, as `EarlyEnd` has it.
     moments: tuple[tuple[str, float], ...] = ()
 
     def within(self, ended: str, looked_at: tuple[float, float]) -> Self:
@@ -109,13 +95,7 @@ def rotor_shares(speeds: Array, *, shares: bool) -> Array:
 
 
 def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
-    """Find the longest stretch of a log that is flown, by the signals that a config maps, and say what that cuts.
-
-    Raises
-    ------
-    SettingError
-        If nothing in it flies.
-    """
+    """Find the longest stretch of a log that is flown, by the signals that a config maps, and say what that cuts."""
     flown = _flown_of(table, settings)
     if not flown.flies:
         raise SettingError("crop_s", f"flown: {flown.reasons[0]}")

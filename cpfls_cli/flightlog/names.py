@@ -40,21 +40,11 @@ Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 @dataclass(frozen=True)
 class ColumnGroup:
-    """Columns whose names differ in an axis or a number alone.
+    """Columns whose names differ in an axis or a number alone."""
 
-    Attributes
-    ----------
-    pattern : str
-        The name with ``*`` in place of the axis or the number.
-    kind : {"xyz", "wxyz", "angles", "numbers", "one"}
-        What tells the columns apart.
-    columns : tuple of str
-        In the order of axes or numbers, of a quaternion w, x, y, z.
-    """
-
-    pattern: str
-    kind: Kind
-    columns: tuple[str, ...]
+    pattern: str  # The name with ``*`` in place of the axis or the number.
+    kind: Kind  # What tells the columns apart.
+    columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
 
     @cached_property
     def ending(self) -> str:
@@ -96,32 +86,16 @@ def _symbols(text: str) -> str:
 
 @dataclass(frozen=True)
 class Named:
-    """Columns that may be a signal, by their name.
-
-    Attributes
-    ----------
-    rank : float
-        Smaller ones come first.
-    unit : UnitName or None
-        That the name or the kind of log states.
-    scale : float
-        Factor on the logged numbers, which makes them this unit.
-    frame : {"FLU", "FRD", "ENU", "NED"} or None
-        Axes that the kind of log is known for.
-    sign : tuple of float or None
-        Of each column in that frame; None for +1 everywhere.
-    known : str
-        The kind of log whose documentation says so; empty where only words of the name do.
-    """
+    """Columns that may be a signal, by their name."""
 
     signal: SignalName
     group: ColumnGroup
-    rank: float
-    unit: UnitName | None = None
-    scale: float = 1.0
-    frame: str | None = None
-    known: str = ""
-    sign: tuple[float, ...] | None = None
+    rank: float  # Smaller ones come first.
+    unit: UnitName | None = None  # That the name or the kind of log states.
+    scale: float = 1.0  # Factor on the logged numbers, which makes them this unit.
+    frame: str | None = None  # Axes that the kind of log is known for.
+    known: str = ""  # The kind of log whose documentation says so; empty where only words of the name do.
+    sign: tuple[float, ...] | None = None  # Of each column in that frame; None for +1 everywhere.
 
 
 # What to do where names do not tell what columns hold.

@@ -40,28 +40,14 @@ _NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVE
 
 @dataclass(frozen=True)
 class KnownLog:
-    """A log and what it is taken for.
+    """A log and what it is taken for."""
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    parameters : mapping
-        That it states.
-    system : str
-        What wrote it; empty where that is not known.
-    columns : frozenset of str
-        Names of all of its columns.
-    of_file : tuple of str
-        Faults of the file, and what its reader left out.
-    """
-
-    name: str
+    name: str  # For messages.
     recognition: Recognition
-    parameters: Parameters
-    system: str
-    columns: frozenset[str]
-    of_file: tuple[str, ...] = ()
+    parameters: Parameters  # That it states.
+    system: str  # What wrote it; empty where that is not known.
+    columns: frozenset[str]  # Names of all of its columns.
+    of_file: tuple[str, ...] = ()  # Faults of the file, and what its reader left out.
 
 
 def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
@@ -79,50 +65,23 @@ def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: P
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """What a config is to say of logs and their vehicle.
+    """What a config is to say of logs and their vehicle."""
 
-    Attributes
-    ----------
-    logs : tuple of KnownLog
-        The first one leads.
-    time_column, time_unit : str or None, str
-        The clock of all of them; None for that of each log's fastest topic.
-    signals, choices : tuple
-        That hold for all of them.
-    crop_s : tuple of float, "flown" or None
-        Of one log; of several each takes what flies in it. None where none is to be cut.
-    crops : mapping from str to tuple of float or None
-        Of each log.
-    rate_hz : float or None
-        One rate for all logs, Hz; None where they have one.
-    gap_s : float
-        Longest step that has to be bridged, s.
-    airframe : Airframe or None
-        None where neither parameters nor motion tell the rotors.
-    rotors : int
-        Number of rotors; 0 where no columns are theirs.
-    speed_max : float
-        Round number above the largest rotor speed, rad/s.
-    facts : tuple of str
-        That the logs state beside.
-    equal : tuple of str
-        Names of the logs whose rotors carry what those of the first one do.
-    """
-
-    logs: tuple[KnownLog, ...]
-    time_column: str | None
+    logs: tuple[KnownLog, ...]  # The first one leads.
+    time_column: str | None  # The clock of all of them; None for that of each log's fastest topic.
     time_unit: str
-    signals: tuple[Guess, ...]
+    signals: tuple[Guess, ...]  # That hold for all of them.
     choices: tuple[KeyChoice, ...]
+    # Of one log; of several each takes what flies in it. None where none is to be cut.
     crop_s: tuple[float, float] | Literal["flown"] | None
-    crops: Mapping[str, tuple[float, float] | None]
-    rate_hz: float | None
-    gap_s: float
-    airframe: Airframe | None
-    rotors: int
-    speed_max: float
-    facts: tuple[str, ...]
-    equal: tuple[str, ...]
+    crops: Mapping[str, tuple[float, float] | None]  # Of each log.
+    rate_hz: float | None  # One rate for all logs, Hz; None where they have one.
+    gap_s: float  # Longest step that has to be bridged, s.
+    airframe: Airframe | None  # None where neither parameters nor motion tell the rotors.
+    rotors: int  # Number of rotors; 0 where no columns are theirs.
+    speed_max: float  # Round number above the largest rotor speed, rad/s.
+    facts: tuple[str, ...]  # That the logs state beside.
+    equal: tuple[str, ...]  # Names of the logs whose rotors carry what those of the first one do.
     warnings: tuple[str, ...]
 
     @property

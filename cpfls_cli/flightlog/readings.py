@@ -46,20 +46,13 @@ Body = Literal["FLU", "FRD"]
 
 @dataclass(frozen=True)
 class Attitude:
-    """A way to read the columns of an attitude.
-
-    Attributes
-    ----------
-    order, sign : tuple
-        Which columns are w, x, y, z (x, y, z, w where `scalar_last`), or roll, pitch and yaw, and their signs.
-    price : int
-        What of it is otherwise than named: 1 for a usual convention, else 1 for each column.
-    """
+    """A way to read the columns of an attitude."""
 
     rotation: Rotation
+    # Which columns are w, x, y, z (x, y, z, w where `scalar_last`), or roll, pitch and yaw, and their signs.
     order: Order
     sign: Sign
-    price: int
+    price: int  # What of it is otherwise than named: 1 for a usual convention, else 1 for each column.
     inverse: bool = False
     scalar_last: bool = False
 
@@ -76,28 +69,15 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Witnesses:
-    """What an attitude is held against.
-
-    Attributes
-    ----------
-    gyroscope : array, shape (time, 3), or None
-        In any unit and any axes.
-    moving : array, shape (time, 3), or None
-        Acceleration over ground, in any unit and axes; the third is vertical.
-    lift : array, shape (time,), or None
-        What grows with the thrust.
-    sensed : float
-        Sign of what an accelerometer reads along its third axis; 0 without one.
-    known : {"FLU", "FRD"} or None
-        Body axes that the kind of log is known for.
-    """
+    """What an attitude is held against."""
 
     rate_hz: float
-    gyroscope: Array | None
+    gyroscope: Array | None  # Shape (time, 3), or None; in any unit and any axes.
+    # Shape (time, 3), or None; acceleration over ground, in any unit and axes; the third is vertical.
     moving: Array | None
-    lift: Array | None
-    sensed: float
-    known: str | None
+    lift: Array | None  # Shape (time,), or None; what grows with the thrust.
+    sensed: float  # Sign of what an accelerometer reads along its third axis; 0 without one.
+    known: str | None  # Body axes that the kind of log is known for.
 
     @cached_property
     def turning(self) -> Array | None:
@@ -112,33 +92,17 @@ class Witnesses:
 
 @dataclass(frozen=True)
 class Reading:
-    """An attitude, what its third axis points to, and the axes with which all other signals agree with it.
-
-    Attributes
-    ----------
-    rates : AxisFit or None
-        None where the vehicle hardly turns, or has no gyroscope.
-    lean : LeanFit or None
-        None where the lean explains too little of the motion over ground.
-    place_order, place_sign : tuple
-        Of the position's columns.
-    place_share : float
-        Share of the acceleration over ground that the lean explains with them.
-    price : int
-        What of all signals is read otherwise than named.
-    columns : int
-        How many columns that takes.
-    """
+    """An attitude, what its third axis points to, and the axes with which all other signals agree with it."""
 
     attitude: Attitude
     body: Body
-    rates: AxisFit | None
-    lean: LeanFit | None
-    place_order: Order
+    rates: AxisFit | None  # None where the vehicle hardly turns, or has no gyroscope.
+    lean: LeanFit | None  # None where the lean explains too little of the motion over ground.
+    place_order: Order  # Of the position's columns.
     place_sign: Sign
-    place_share: float
-    price: int
-    columns: int
+    place_share: float  # Share of the acceleration over ground that the lean explains with them.
+    price: int  # What of all signals is read otherwise than named.
+    columns: int  # How many columns that takes.
 
     @property
     def maps(self) -> dict[str, tuple[Order, Sign]]:
@@ -164,19 +128,11 @@ class Reading:
 
 @dataclass(frozen=True)
 class TakenReading:
-    """The reading that is taken, and others that the data do not part from it.
-
-    Attributes
-    ----------
-    tied : tuple of Reading
-        With other maps, at less than twice the price: too near to be ruled out.
-    others : tuple of Reading
-        All that were tried, the best one of each attitude.
-    """
+    """The reading that is taken, and others that the data do not part from it."""
 
     best: Reading
-    tied: tuple[Reading, ...]
-    others: tuple[Reading, ...]
+    tied: tuple[Reading, ...]  # With other maps, at less than twice the price: too near to be ruled out.
+    others: tuple[Reading, ...]  # All that were tried, the best one of each attitude.
 
 
 def axes_price(order: Sequence[int], sign: Sequence[float]) -> int:

@@ -151,13 +151,7 @@ def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebui
 def with_topic(
     topics: Topics, parameters: Parameters, system: str, settings: ImportSettings
 ) -> tuple[Topics, tuple[str, ...]]:
-    """Add the columns that a config asks for and that no log holds, and say how good they are.
-
-    Raises
-    ------
-    InputError
-        If they cannot be rebuilt, and no logged ones stand in for them.
-    """
+    """Add the columns that a config asks for and that no log holds, and say how good they are."""
     rebuilt = rebuilt_rotors(topics, parameters, system)
     command = settings.signals.get("rotor_command")
     others = command is not None and any(choice.columns[0].partition(".")[0] in topics for choice in command.otherwise)

@@ -24,18 +24,10 @@ Sure = Literal["data", "named", "guess"]
 
 @dataclass(frozen=True)
 class Rival:
-    """Another guess that the data cannot part from the one that is taken.
+    """Another guess that the data cannot part from the one that is taken."""
 
-    Attributes
-    ----------
-    text : str
-        As it would stand in the config, such as ``unit: deg``.
-    reason : str
-        Why it is not ruled out.
-    """
-
-    text: str
-    reason: str
+    text: str  # As it would stand in the config, such as ``unit: deg``.
+    reason: str  # Why it is not ruled out.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,78 +58,41 @@ class KeyChoice:
 
 
 class Load(NamedTuple):
-    """What the rotors carry in flight.
+    """What the rotors carry in flight."""
 
-    Attributes
-    ----------
-    size : float
-        Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
-        propellers it is as the mass.
-    sensed : bool
-        Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
-    steady : bool
-        Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
-    voltage : float
-        Of the battery in flight, V; NaN where the log does not hold it.
-    """
-
+    # Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
+    # propellers it is as the mass.
     size: float
+    # Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
     sensed: bool
-    steady: bool
-    voltage: float = float("nan")
+    steady: bool  # Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
+    voltage: float = float("nan")  # Of the battery in flight, V; NaN where the log does not hold it.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recognition:
-    """What a log is taken for.
+    """What a log is taken for."""
 
-    Attributes
-    ----------
-    time_column, time_unit : str
-        As the section `import` takes them.
-    choices : tuple of Choice
-        Frames, the order of a quaternion, what a command is.
-    left_out : tuple of str
-        Sentences on columns that look like a signal and are not mapped.
-    unused : tuple of str
-        All columns that are mapped to nothing, stamps left out.
-    winged : bool
-        Whether it is of a VTOL and flies on the wing for a part, which is cut.
-    counted_from_s : float
-        Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
-    rebuilt : Rebuilt or None
-        Commands of the rotors that take the place of logged ones.
-    rate_hz : float
-        Of the clock.
-    slowest_s, slowest_but_voltage_s : float
-        Longest median step of a topic that is mapped, s; and without that of the voltage.
-    kind : str
-        Kind of log that is known for such columns of rotors; empty where none is.
-    moved : MovedBy or None
-        The rotors as the motion tells them.
-    speeds : array, shape (time, rotor), or None
-        Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
-    load : Load or None
-        None where no columns are those of rotors.
-    """
-
-    time_column: str
+    time_column: str  # As the section `import` takes them.
     time_unit: str
     signals: tuple[Guess, ...]
-    choices: tuple[KeyChoice, ...]
-    left_out: tuple[str, ...]
+    choices: tuple[KeyChoice, ...]  # Frames, the order of a quaternion, what a command is.
+    left_out: tuple[str, ...]  # Sentences on columns that look like a signal and are not mapped.
     flown: FlownPart
-    rate_hz: float
-    slowest_s: float
+    rate_hz: float  # Of the clock.
+    slowest_s: float  # Longest median step of a topic that is mapped, s; and without that of the voltage.
     slowest_but_voltage_s: float
-    kind: str
-    moved: MovedBy | None
+    kind: str  # Kind of log that is known for such columns of rotors; empty where none is.
+    moved: MovedBy | None  # The rotors as the motion tells them.
+    # Shape (time, rotor), or None; rotor speeds in flight in rad/s, or commands as shares of the largest speed.
     speeds: Array | None = field(repr=False)
-    load: Load | None = None
+    load: Load | None = None  # None where no columns are those of rotors.
     warnings: tuple[str, ...] = ()
-    unused: tuple[str, ...] = ()
-    winged: bool = False
+    unused: tuple[str, ...] = ()  # All columns that are mapped to nothing, stamps left out.
+    winged: bool = False  # Whether it is of a VTOL and flies on the wing for a part, which is cut.
+    # Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
     counted_from_s: float = 0.0
+    # Commands of the rotors that take the place of logged ones.
     rebuilt: "Rebuilt | None" = field(default=None, repr=False)
 
     def signal(self, name: SignalName) -> Guess | None:

@@ -66,20 +66,12 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class RotorGuess:
-    """A signal of the rotors.
-
-    Attributes
-    ----------
-    kind : str
-        Kind of log that is known for such columns; empty where none is.
-    left_out : tuple of str
-        Sentences on outputs beside them that move and drive no motor.
-    """
+    """A signal of the rotors."""
 
     guess: Guess
     rate_hz: float
-    kind: str
-    left_out: tuple[str, ...] = ()
+    kind: str  # Kind of log that is known for such columns; empty where none is.
+    left_out: tuple[str, ...] = ()  # Sentences on outputs beside them that move and drive no motor.
 
     @property
     def columns(self) -> SignalMap:
@@ -89,17 +81,11 @@ class RotorGuess:
 
 @dataclass(frozen=True, kw_only=True)
 class RotorColumns:
-    """All that a log says of its rotors.
-
-    Attributes
-    ----------
-    command_is : Choice or None
-        What a command of unit 1 is a share of; None without one.
-    """
+    """All that a log says of its rotors."""
 
     speed: RotorGuess | None
     command: RotorGuess | None
-    command_is: KeyChoice | None
+    command_is: KeyChoice | None  # What a command of unit 1 is a share of; None without one.
     left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -252,25 +238,14 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
 
 
 class _Connected(NamedTuple):
-    """The outputs that drive motors, in the order of the motors.
-
-    Attributes
-    ----------
-    stated : bool
-        Whether parameters name them.
-    others : dict from column to str
-        What moves and is no motor, and why.
-    span : tuple of float and str, or None
-        Range of the outputs that their own parameters state, and the names of these.
-    doubtful : tuple of str
-        Outputs of `others` that may be motors all the same.
-    """
+    """The outputs that drive motors, in the order of the motors."""
 
     outputs: list[int]
-    stated: bool
-    others: dict[str, str]
+    stated: bool  # Whether parameters name them.
+    others: dict[str, str]  # By column; what moves and is no motor, and why.
+    # Range of the outputs that their own parameters state, and the names of these.
     span: tuple[float, float, str] | None = None
-    doubtful: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
 def _connected(found: Found, parameters: Parameters) -> _Connected:

@@ -45,24 +45,15 @@ _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Columns that may be a setpoint, as they would be mapped, and why they may be, in words.
-
-    Attributes
-    ----------
-    known : bool
-        Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
-    states_unit : bool
-        Whether the unit is known.
-    doubts : tuple of str
-        Why they may be something else, however well they are followed.
-    """
+    """Columns that may be a setpoint, as they would be mapped, and why they may be, in words."""
 
     signal: SignalName
     columns: SignalMap
     called: str
+    # Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
     known: bool
-    states_unit: bool
-    doubts: tuple[str, ...] = ()
+    states_unit: bool  # Whether the unit is known.
+    doubts: tuple[str, ...] = ()  # Why they may be something else, however well they are followed.
 
     @property
     def what(self) -> str:
@@ -271,21 +262,11 @@ def _as_angles(seen: Seen, own: _Candidate, asked: Array, measured: Array) -> Ar
 
 
 class _Following(NamedTuple):
-    """How what is measured follows what was asked for, axis by axis.
+    """How what is measured follows what was asked for, axis by axis."""
 
-    Attributes
-    ----------
-    along : array, shape (3,)
-        Correlation; 0 where one of the two does not move.
-    moves : array of bool, shape (3,)
-        Whether the setpoint does.
-    gain : float
-        Measured over asked for, of the axes that are followed; of others that oppose, its size.
-    """
-
-    along: Array = np.zeros(3)
-    moves: BoolArray = np.zeros(3, dtype=bool)
-    gain: float = 1.0
+    along: Array = np.zeros(3)  # Shape (3,); correlation; 0 where one of the two does not move.
+    moves: BoolArray = np.zeros(3, dtype=bool)  # Shape (3,); whether the setpoint does.
+    gain: float = 1.0  # Measured over asked for, of the axes that are followed; of others that oppose, its size.
 
     @property
     def followed(self) -> BoolArray:

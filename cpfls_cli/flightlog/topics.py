@@ -63,11 +63,6 @@ def on_one_clock(
     settings : ImportSettings
         With the columns that the log has, of those that stand in for each other, and the name of the clock.
     warnings : tuple of str
-
-    Raises
-    ------
-    InputError
-        If `time_column` names no stamps, or a topic is always slower than `gap_s`.
     """
     if "" in topics:
         return _flat(topics[""], units, settings)

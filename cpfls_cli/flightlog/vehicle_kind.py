@@ -108,17 +108,11 @@ _STATES: Final = (
 
 
 class VehicleKind(NamedTuple):
-    """What flies, and how a log says so.
-
-    Attributes
-    ----------
-    hovers : bool
-        Whether rotors carry it for a part of its flight.
-    """
+    """What flies, and how a log says so."""
 
     what: str
     reason: str
-    hovers: bool = False
+    hovers: bool = False  # Whether rotors carry it for a part of its flight.
 
 
 def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
@@ -134,12 +128,7 @@ def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> Vehicl
 
 
 def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
-    """Refuse a log of something that no rotors carry; a VTOL is given back, which hovers as a multirotor.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a log of something that no rotors carry; a VTOL is given back, which hovers as a multirotor."""
     found = other_vehicle(topics, parameters, system)
     if found is not None and not found.hovers:
         raise InputError(

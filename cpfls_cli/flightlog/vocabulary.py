@@ -56,30 +56,16 @@ KIN: Final = {ARDUPILOT: ("Ardu",), BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlig
 
 
 class Known(NamedTuple):
-    """Columns in which a kind of log holds a signal.
-
-    Attributes
-    ----------
-    signal : str
-        One that `import.signals` takes, or one that `look` alone asks for.
-    columns : tuple of str
-        Each of them, or one pattern with ``*`` for the axes or numbers of a group.
-    unit : UnitName or None
-        Of ``scale * column + offset``; None where numbers or the log tell it.
-    frame : {"FLU", "FRD", "ENU", "NED"} or None
-        None where it has none, and for a setpoint, which is in the axes of what is measured.
-    sign : tuple of float or None
-        Of each column in that frame; None for +1 everywhere.
-    """
+    """Columns in which a kind of log holds a signal."""
 
     system: str
-    signal: str
-    columns: tuple[str, ...]
-    unit: UnitName | None
-    frame: str | None
+    signal: str  # One that `import.signals` takes, or one that `look` alone asks for.
+    columns: tuple[str, ...]  # Each of them, or one pattern with ``*`` for the axes or numbers of a group.
+    unit: UnitName | None  # Of ``scale * column + offset``; None where numbers or the log tell it.
+    frame: str | None  # None where it has none, and for a setpoint, which is in the axes of what is measured.
     scale: float
     offset: float
-    sign: tuple[float, ...] | None
+    sign: tuple[float, ...] | None  # Of each column in that frame; None for +1 everywhere.
 
 
 _KNOWN: Final = """
@@ -235,26 +221,14 @@ WISHED: Final = _each("des desired sp setpoint setpoints ref reference target go
 
 
 class Meaning(NamedTuple):
-    """What words of a name mean a signal.
-
-    Attributes
-    ----------
-    words : str
-        One of them has to stand in the name.
-    kinds, number : str, int
-        How its columns are told apart, and how many there are; of rotors at least.
-    last : int
-        Only so many words at the end of the name count; 0: all of them.
-    never : str
-        Words that rule it out, beside those of `NOT_MEASURED`.
-    """
+    """What words of a name mean a signal."""
 
     signal: SignalName
-    words: str
-    kinds: str
+    words: str  # One of them has to stand in the name.
+    kinds: str  # How its columns are told apart, and how many there are; of rotors at least.
     number: int
-    last: int = 0
-    never: str = ""
+    last: int = 0  # Only so many words at the end of the name count; 0: all of them.
+    never: str = ""  # Words that rule it out, beside those of `NOT_MEASURED`.
 
 
 # Words of a name that mean together what neither does, as a pattern, and the one word that means it.
@@ -320,26 +294,17 @@ SENSED: Final[tuple[Row, ...]] = (
 
 
 class Range(NamedTuple):
-    """Numbers of a command that is no speed by its name, and what they are taken for: a share of the largest.
+    """Numbers of a command that is no speed by its name, and what they are taken for: a share of the largest."""
 
-    Attributes
-    ----------
-    low, high_from, high : float
-        No number is below the first or above the last; the largest lies above the second.
-    tells : {"always", "of commands", "never"}
-        Whether the range alone tells it: of commands it does where the name is that of one.
-    rivals : tuple of tuple of str
-        Other readings of such numbers, beside speeds, and where they hold.
-    """
-
-    low: float
+    low: float  # No number is below the first or above the last; the largest lies above the second.
     high_from: float
     high: float
     scale: float
     offset: float
     words: str
+    # Whether the range alone tells it: of commands it does where the name is that of one.
     tells: Literal["always", "of commands", "never"]
-    rivals: tuple[tuple[str, str], ...] = ()
+    rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, beside speeds, and where they hold.
 
 
 _OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "if the range is 1075 to 1950, as in older PX4")

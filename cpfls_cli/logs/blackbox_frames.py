@@ -35,17 +35,10 @@ _FIXED_EVENTS = ((10, 5), (11, 4), (12, 8))
 
 
 class Fields(NamedTuple):
-    """How the fields of each kind of frame are written.
+    """How the fields of each kind of frame are written."""
 
-    Attributes
-    ----------
-    counts : array of int, shape (kind,)
-        Kinds in the order of `KINDS`.
-    encoding, predictor, is_signed : array of int, shape (kind, field)
-    """
-
-    counts: IntArray
-    encoding: IntArray
+    counts: IntArray  # Shape (kind,); kinds in the order of `KINDS`.
+    encoding: IntArray  # Shape (kind, field)
     predictor: IntArray
     is_signed: IntArray
 

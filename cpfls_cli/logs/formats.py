@@ -34,95 +34,57 @@ MOST_LISTED = 20
 
 @dataclass(frozen=True)
 class LogContents:
-    """What a log holds.
+    """What a log holds."""
 
-    Attributes
-    ----------
-    topics : dict from topic to dict from field to array, shape (sample,)
-        The fields that were wanted; others may be there by name only, as empty arrays, so that a message can suggest
-        them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log. A flat log, whose
-        columns share one clock, is one topic with an empty name.
-    units : dict from column to str
-        Units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one are in s.
-    parameters : dict from str to float or str
-        What the log knows of the vehicle: parameters of the autopilot, lines of a header.
-    system : str
-        What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
-    warnings : tuple of str
-        Faults of the file as a whole.
-    flown_at : float
-        When it begins, s since 1970 began (UTC); NaN where the log does not tell.
-    begins : dict from column to float
-        Stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there; an empty
-        name is that of all stamps.
-    messages : tuple of (float, str, str)
-        Messages of the autopilot to its pilot: when, s, how bad, empty where that is not said, and the text.
-    """
-
+    # Shape (sample,); the fields that were wanted; others may be there by name only, as empty arrays, so that a
+    # message can suggest them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log.
+    # A flat log, whose columns share one clock, is one topic with an empty name.
     topics: dict[str, dict[str, "Array"]]
+    # By column; units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one
+    # are in s.
     units: dict[str, str] = field(default_factory=dict)
+    # What the log knows of the vehicle: parameters of the autopilot, lines of a header.
     parameters: dict[str, float | str] = field(default_factory=dict)
-    system: str = ""
-    warnings: tuple[str, ...] = ()
-    flown_at: float = nan
+    system: str = ""  # What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
+    warnings: tuple[str, ...] = ()  # Faults of the file as a whole.
+    flown_at: float = nan  # When it begins, s since 1970 began (UTC); NaN where the log does not tell.
+    # By column; stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there;
+    # an empty name is that of all stamps.
     begins: dict[str, float] = field(default_factory=dict)
+    # Messages of the autopilot to its pilot: when, s, how bad, empty where that is not
+    # said, and the text.
     messages: tuple[tuple[float, str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class LogColumns:
-    """Columns of a log that a config maps, all on one clock.
+    """Columns of a log that a config maps, all on one clock."""
 
-    Attributes
-    ----------
-    columns : dict from str to array, shape (sample,)
-        The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
-    settings : ImportSettings
-        The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
-    begins : float
-        Stamp on the log's own clock at 0 of the column that is the clock, s.
-    parameters, system
-        As in `LogContents`.
-    stamped_hz : dict from str to float
-        How often a second signals were logged that have stamps of their own.
-    """
-
+    # Shape (sample,); the mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
     columns: dict[str, "Array"]
+    # The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
     settings: "ImportSettings"
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
-    begins: float = 0.0
-    parameters: dict[str, float | str] = field(default_factory=dict)
+    begins: float = 0.0  # Stamp on the log's own clock at 0 of the column that is the clock, s.
+    parameters: dict[str, float | str] = field(default_factory=dict)  # As in `LogContents`.
     system: str = ""
+    # How often a second signals were logged that have stamps of their own.
     stamped_hz: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogFormat:
-    """One format of flight logs.
+    """One format of flight logs."""
 
-    Attributes
-    ----------
-    suffix : str
-        End of a file's name, in lower case; empty where such files have none.
-    content : str
-        What a file that begins in this way holds, in messages.
-    magic : bytes
-        First bytes of every such file; none for text, which begins with a line of column names.
-    shared : bool
-        Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
-    reader : str
-        Module with ``contents(path, wanted)``, which returns `LogContents`.
-    packages, extra : tuple of str, str
-        Modules of the optional package that the reader needs, and the extra of this program that installs it.
-    """
-
-    suffix: str
+    suffix: str  # End of a file's name, in lower case; empty where such files have none.
     name: str
-    content: str
-    magic: bytes = b""
+    content: str  # What a file that begins in this way holds, in messages.
+    magic: bytes = b""  # First bytes of every such file; none for text, which begins with a line of column names.
+    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
     shared: bool = False
-    reader: str
+    reader: str  # Module with ``contents(path, wanted)``, which returns `LogContents`.
+    # Modules of the optional package that the reader needs, and the extra of this program that installs it.
     packages: tuple[str, ...] = ()
     extra: str = ""
 
