@@ -54,6 +54,12 @@ _LAYOUTS: Final = """
 """
 
 
+def numbered(text: str) -> dict[int, str]:
+    """Read a table of numbers and what they stand for, ``1: X; 2: V``."""
+    pairs = (each.split(":") for each in text.split(";"))
+    return {int(number): words.strip() for number, words in pairs}
+
+
 def _place(text: str) -> Place:
     spin = 1 if text[-1] == "+" else -1
     if "," in text:
@@ -74,23 +80,12 @@ def _layouts() -> dict[str, tuple[Place, ...]]:
 
 LAYOUTS: Final = _layouts()
 # FRAME_CLASS of ArduPilot, and the number of its motors; others are no frames of upright rotors alone.
-_CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa", 4: "octa quad", 5: "Y6", 12: "dodeca hexa", 14: "deca"}
+_CLASSES: Final = numbered("1: quad; 2: hexa; 3: octa; 4: octa quad; 5: Y6; 12: dodeca hexa; 14: deca")
 _OF_CLASS: Final = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 7: 3, 12: 12, 14: 10}
-_TYPES: Final = {
-    0: "plus",
-    1: "X",
-    2: "V",
-    3: "H",
-    6: "plus, reversed",
-    10: "B",
-    11: "F",
-    12: "X of Betaflight",
-    13: "X of DJI",
-    14: "X clockwise",
-    15: "I",
-    18: "X reversed",
-    19: "Y4",
-}
+_TYPES: Final = numbered(
+    "0: plus; 1: X; 2: V; 3: H; 6: plus, reversed; 10: B; 11: F; 12: X of Betaflight; 13: X of DJI; 14: X clockwise;"
+    " 15: I; 18: X reversed; 19: Y4"
+)
 # Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone.
 _COUNTS_OF_FORMS: Final = (8, 6, 4)
 # First and last SYS_AUTOSTART of PX4 that is a frame of one kind.

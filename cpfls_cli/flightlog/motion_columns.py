@@ -17,8 +17,8 @@ from cpfls_cli.flightlog.agreement import (
     slow,
 )
 from cpfls_cli.flightlog.airframe import explained_by_rotors
+from cpfls_cli.flightlog.attitude_columns import CLEAR, Reading
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.readings import CLEAR, Reading
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.rounding import largest

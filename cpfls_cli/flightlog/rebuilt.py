@@ -22,8 +22,8 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
-from cpfls_cli.flightlog.log_table import LogTable, holding_values
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
+from cpfls_cli.flightlog.recognised import LogTable, holding_values
 from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, RotorGuess, find_rotors, too_slow
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz

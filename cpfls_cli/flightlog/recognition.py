@@ -10,12 +10,11 @@ from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
-from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
+from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
     position_by_velocity,
@@ -23,18 +22,27 @@ from cpfls_cli.flightlog.motion_columns import (
     tell_body_rate,
     tell_places,
 )
-from cpfls_cli.flightlog.nameless import nameless_signals
-from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
-from cpfls_cli.flightlog.readings import Reading
+from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
-from cpfls_cli.flightlog.recognised import Guess, Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.recognised import (
+    Guess,
+    Load,
+    LogTable,
+    Recognition,
+    Rival,
+    Seen,
+    called,
+    holding_values,
+    make_grid,
+    refuse_dead_rotors,
+)
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
+from cpfls_cli.flightlog.stated_vehicle import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vehicle_kind import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.words import some

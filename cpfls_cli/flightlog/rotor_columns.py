@@ -10,13 +10,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
-from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, MOTORS, SLOW_HZ, VTOL_TYPES, log_faster
 from cpfls_cli.flightlog.topics import logged_hz
-from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined

@@ -10,9 +10,8 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.flightlog.agreement import slow
 from cpfls_cli.flightlog.conversion import as_mapped, attitude_from_quaternion
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import column_groups, is_of, wished_signals
-from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
+from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked

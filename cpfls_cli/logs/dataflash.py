@@ -12,8 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.foreign import SDLOG2
-from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, LogContents
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, table
 
 _HEAD = b"\xa3\x95"

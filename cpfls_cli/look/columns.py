@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import is_of
+from cpfls_cli.flightlog.recognised import LogTable
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.flightlog.vocabulary import KNOWN

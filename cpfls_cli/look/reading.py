@@ -23,14 +23,13 @@ from cpfls_cli.flightlog.conversion import (
 )
 from cpfls_cli.flightlog.crash import ALIVE
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
 from cpfls_cli.flightlog.recognised import Guess, Recognition
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, forward_flight, log_faster
 from cpfls_cli.flightlog.topics import Topics, column_names
-from cpfls_cli.flightlog.vehicle_kind import forward_flight
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
