@@ -75,18 +75,10 @@ _SIGNED_AXES: Final = tuple(
 
 
 def fit_axes(reference: Array, measured: Array) -> AxisFit:
-    """Find the order and the signs of axes with which one vector follows another.
+    """Find the order and the signs of axes with which one vector follows another, both shape (time, 3), filtered alike.
 
-    Parameters
-    ----------
-    reference, measured : array, shape (time, 3)
-        Filtered alike.
-
-    Returns
-    -------
-    AxisFit
-        As named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
-        with one or two axes, a turn and a mirrored column look alike.
+    They are as named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
+    with one or two axes, a turn and a mirrored column look alike.
     """
     reference = reference - reference.mean(axis=0)
     measured = measured - measured.mean(axis=0)
@@ -99,7 +91,7 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
         (order, sign): sum(sign[axis] * cross[order[axis], axis] for axis in range(3)) for order, sign in _SIGNED_AXES
     }
     explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
-    named = ((0, 1, 2), (1.0, 1.0, 1.0))
+    named = AS_NAMED
     # An axis that does not move fits as well with either sign.
     best = largest(explained, lambda axes: explained[axes])
     runner_up = max(value for axes, value in explained.items() if axes != best)
@@ -157,13 +149,7 @@ def on_clock(rotation: Rotation, time: Array, clock: Array) -> Rotation:
 
 
 def body_rate_from(rotation: Rotation, rate_hz: float) -> Array:
-    """Derive body rates from rotations on a uniform clock.
-
-    Returns
-    -------
-    array, shape (time, 3), rad/s
-        In the body frame of the rotations; the last one stands twice.
-    """
+    """Derive body rates, shape (time, 3), rad/s, from rotations of the body on a uniform clock; the last is repeated."""
     steps = (rotation[:-1].inv() * rotation[1:]).as_rotvec() * rate_hz
     return np.vstack([steps, steps[-1:]])
 
@@ -228,17 +214,13 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
             together = first * cross[order[0], 0] + second * cross[order[1], 1]
             share = max(float(together), 0.0) ** 2 / (power * total) if told else 0.0
             shares[(order, (first, second))] = share
-    rises = 0.0 if lift is None else _rises(moving.vertical, lift * np.abs(axis[:, 2]), rate_hz)
+    rises = 0.0
+    if lift is not None:
+        other = slow((lift * np.abs(axis[:, 2]))[:, None], rate_hz)[:, 0]
+        if moving.vertical.std() != 0 and other.std() != 0:
+            together = float(np.corrcoef(moving.vertical, other)[0, 1])
+            rises = float(np.sign(together)) if abs(together) > _RISES else 0.0
     return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))
-
-
-def _rises(vertical: Array, lift: Array, rate_hz: float) -> float:
-    """Tell whether a slow vertical acceleration grows (1) or falls (-1) with the lift; 0 if neither."""
-    other = slow(lift[:, None], rate_hz)[:, 0]
-    if vertical.std() == 0 or other.std() == 0:
-        return 0.0
-    together = float(np.corrcoef(vertical, other)[0, 1])
-    return float(np.sign(together)) if abs(together) > _RISES else 0.0
 
 
 def second_derivative(values: Array, rate_hz: float) -> Array:

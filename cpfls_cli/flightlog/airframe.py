@@ -93,12 +93,16 @@ class Airframe:
 def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:
     """Read the rotors that the parameters of an autopilot state; None where they state none.
 
+    Rotors that cannot turn the vehicle about all of its axes are refused.
+
     Parameters
     ----------
     rotors : int
         That the log's columns show; 0 where they show none.
     """
-    found = _of_px4(parameters) or _of_frame(parameters, rotors)
+    found, frame = _of_px4(parameters), stated_frame(parameters, rotors)
+    if found is None and frame is not None:
+        found = _laid_out(*frame, "usual" if is_open(frame[0], parameters) else "stated")
     if found is not None:
         _require_control(found)
     return found
@@ -122,14 +126,6 @@ def _name(x: float, y: float) -> str:
     along = "front" if x > _ROUNDED else "rear" if x < -_ROUNDED else ""
     across = "left" if y > _ROUNDED else "right" if y < -_ROUNDED else ""
     return f"{along} {across}".strip()
-
-
-def _of_frame(parameters: Parameters, rotors: int) -> Airframe | None:
-    found = stated_frame(parameters, rotors)
-    if found is None:
-        return None
-    frame, reason = found
-    return _laid_out(frame, reason, "usual" if is_open(frame, parameters) else "stated")
 
 
 def _laid_out(frame: str, reason: str, sure: str) -> Airframe:
@@ -248,7 +244,9 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     band = ""
     if not by_axes and rate_hz / 5 > 2 * _FAST_HZ[0]:
         fast = [_shares(*each)[0] for each in _driven(body_rate, speed, rate_hz, is_command, *_FAST_HZ)]
-        quick = _chosen(_best_of(fast), ("X",))
+        # Of each layout what it explains about each axis with the lag that suits this axis best.
+        best = ((same[0][0], np.max([own for _, own in same], axis=0).tolist()) for same in zip(*fast, strict=True))
+        quick = _chosen([(layout, (x, y, z)) for layout, (x, y, z) in best], ("X",))
         if quick[2]:
             (layout, explained, by_axes), band = quick, f" above {_FAST_HZ[0]:g} Hz"
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
@@ -257,14 +255,6 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     form = "an X" if layout.form == "X" else "a plus"
     reason = f"the motion: as {form} in this order, the rotors explain {words} acceleration{band}"
     return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, by_axes, clear)
-
-
-def _best_of(tried: list[list[tuple[_RotorLayout, _Explained]]]) -> list[tuple[_RotorLayout, _Explained]]:
-    """Give of each layout what it explains about each axis with the lag that suits this axis best."""
-    return [
-        (same[0][0], (max(own[0] for _, own in same), max(own[1] for _, own in same), max(own[2] for _, own in same)))
-        for same in zip(*tried, strict=True)
-    ]
 
 
 def _chosen(
@@ -280,7 +270,7 @@ def _chosen(
 
 
 def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> float:
-    """Give the share of the angular acceleration that rotors explain, wherever they are.
+    """Give the share of the angular acceleration that rotors explain, wherever they are, the mean of the three axes.
 
     Parameters
     ----------
@@ -288,11 +278,6 @@ def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_comma
         In any unit and axes.
     speed, is_command
         See `airframe_from_motion`.
-
-    Returns
-    -------
-    float
-        The mean of the three axes.
     """
     if not speed.any():
         return 0.0

@@ -25,25 +25,28 @@ from cpfls_cli.flightlog.agreement import (
     LeanFit,
     Order,
     Sign,
+    first_derivative,
     fit_axes,
     fit_lean,
     handed,
     on_clock,
     rotations_of,
+    second_derivative,
     slow,
     turning_of,
 )
-from cpfls_cli.flightlog.motion_columns import GOOD, NEAR_GRAVITY, nearest, over_ground
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
-from cpfls_cli.flightlog.vocabulary import ANGLES, SENSED
+from cpfls_cli.flightlog.vocabulary import ANGLES, SENSED, Row
 from cpfls_cli.units import UnitName, known_unit
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 CLEAR: Final = 0.3  # Share of a signal that another has to explain to say something about it.
+GOOD = 0.6  # Share of a signal that another has to explain to overrule a name.
+NEAR_GRAVITY = 1.3  # Ratio to gravity of what is gravity in some unit, since a vehicle pushes.
 # Shares by which a reading may explain less, or fly less upright, than the best and still be as good.
 _AS_GOOD_RATES, _AS_GOOD_LEAN, _AS_LEVEL = 0.02, 0.1, 0.2
 _ODD_ENOUGH = 2  # Price from which the columns of a quaternion are tried in every order and with every sign.
@@ -288,6 +291,19 @@ _SIGNALS_OF: Final[Mapping[str, tuple[SignalName, ...]]] = {
     "position": ("position", "velocity"),
 }
 _DECIDES = "a flight with one known lean, turn or climb, or the documentation of the log, decides"
+
+
+def nearest(size: float, rows: Sequence[Row]) -> Row:
+    """Give the row of the nearest size."""
+    return min(rows, key=lambda row: abs(np.log(size / row[0])))
+
+
+def over_ground(seen: Seen) -> Array | None:
+    """Derive the acceleration over ground from the position, or else from the velocity."""
+    position, velocity = seen.first("position"), seen.first("velocity")
+    if position is not None:
+        return second_derivative(seen.grid(position), seen.rate_hz)
+    return None if velocity is None else first_derivative(seen.grid(velocity), seen.rate_hz)
 
 
 def read_attitude(seen: Seen) -> TakenReading | None:

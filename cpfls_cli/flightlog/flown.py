@@ -192,8 +192,9 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
             None,
             f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
         )
-    quiet = _quiet(rate, period)
-    return ~quiet, "it does not turn at all"
+    spread = np.sqrt(averaged(rate**2, period, _SHORT_S))
+    quiet = spread < max(_STILL_RAD_S, 0.05 * float(np.quantile(spread, 0.9)))
+    return np.asarray(~quiet, dtype=bool), "it does not turn at all"
 
 
 def _carried(signs: Signs, largest: float) -> BoolArray:
@@ -245,11 +246,6 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         if len(high):
             off[high[0] : high[-1] + 1] = True
     return smoothed(off, period, _SHORT_S)
-
-
-def _quiet(rate: Array, period: float) -> BoolArray:
-    level = np.sqrt(averaged(rate**2, period, _SHORT_S))
-    return np.asarray(level < max(_STILL_RAD_S, 0.05 * float(np.quantile(level, 0.9))), dtype=bool)
 
 
 def _still(signs: Signs, active: BoolArray) -> bool:
@@ -326,10 +322,14 @@ def _dead_rates(signs: Signs) -> bool:
 def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
     ends = [ended_early(signs, rests, part) for part in stretches]
-    cut = [
-        _clear_of_ground(time, first, after if end is None else end.first, early=end is not None)
-        for (first, after), end in zip(stretches, ends, strict=True)
-    ]
+    cut = []
+    for (first, after), early_end in zip(stretches, ends, strict=True):
+        # What is close to the ground at either end is left out, but where the log begins or ends in flight.
+        stop = after if early_end is None else early_end.first
+        begin, end = float(time[first]), float(time[stop - 1])
+        margin = min(_MARGIN_S, (end - begin) / 10)
+        free = stop == len(time) or early_end is not None
+        cut.append((begin + (margin if first > 0 else 0.0), end - (0.0 if free else margin)))
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
     if cut[chosen][1] - cut[chosen][0] < SHORTEST_FLIGHT_S:
         return FlownPart(None, (f"flies for {too_short(cut[chosen][1] - cut[chosen][0])}",), flies=False)
@@ -356,14 +356,6 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     span = None if whole else (round(begin, 2), round(end, 2))
     moments = tuple(moment for _, each in early if each is not None for moment in each.moments)
     return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
-
-
-def _clear_of_ground(time: Array, first: int, after: int, *, early: bool) -> tuple[float, float]:
-    """Leave out what is close to the ground at either end of a stretch that does not begin or end with the log."""
-    begin, end = float(time[first]), float(time[after - 1])
-    margin = min(_MARGIN_S, (end - begin) / 10)
-    begin += margin if first > 0 else 0.0
-    return begin, end - (0.0 if after == len(time) or early else margin)
 
 
 def _how(signs: Signs, part: slice, told: str) -> str:

@@ -17,23 +17,21 @@ from cpfls_cli.flightlog.agreement import (
     slow,
 )
 from cpfls_cli.flightlog.airframe import explained_by_rotors
-from cpfls_cli.flightlog.attitude_columns import CLEAR, Reading
+from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, Reading, nearest
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
-GOOD = 0.6  # Share of a signal that another has to explain to overrule a name.
 # Wind and clocks change a size by less than the first, and never from one unit of length to the next.
 _TOLERANCE, _TEN = 1.4, 10.0
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 # Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2.
 _OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
-# Ratios to gravity: of what is gravity in some unit, since a vehicle pushes; the same of columns that are known to hold
-# it, also where the sensor reads wrong; and of what is no more than that.
-NEAR_GRAVITY, _BY_NAME, _WEIGHT = 1.3, 2.0, 1.15
+# Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
+_BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
 # a gyroscope beside motion capture it is 0.1 to 0.4.
 _FAST_HZ, _DERIVED = 10.0, 0.8
@@ -41,19 +39,6 @@ _FAST_HZ, _DERIVED = 10.0, 0.8
 _CLOSER = 0.4
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
-
-
-def nearest(size: float, rows: Sequence[Row]) -> Row:
-    """Give the row of the nearest size."""
-    return min(rows, key=lambda row: abs(np.log(size / row[0])))
-
-
-def over_ground(seen: Seen) -> Array | None:
-    """Derive the acceleration over ground from the position, or else from the velocity."""
-    position, velocity = seen.first("position"), seen.first("velocity")
-    if position is not None:
-        return second_derivative(seen.grid(position), seen.rate_hz)
-    return None if velocity is None else first_derivative(seen.grid(velocity), seen.rate_hz)
 
 
 # The gyroscope.

@@ -51,13 +51,7 @@ class KnownLog:
 
 
 def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
-    """Recognise a log, as its reader gives it.
-
-    Raises
-    ------
-    InputError
-        See `recognise`.
-    """
+    """Recognise a log, as its reader gives it."""
     recognition = recognise(topics, units, parameters, system)
     derived = () if recognition.rebuilt is None else recognition.rebuilt.columns
     return KnownLog(name, recognition, parameters, system, frozenset((*column_names(topics), *derived)))
@@ -110,24 +104,14 @@ class Proposal:
 def propose(
     logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None, *, scale_to_arm: bool = False
 ) -> Proposal:
-    """Make one proposal of what each of several logs is taken for.
+    """Make one proposal of what each of several logs is taken for; logs of two vehicles are refused.
 
     Parameters
     ----------
-    logs : sequence of KnownLog
-        One at least.
-    mass_kg : float or None
-        None: not known.
-    arm_m : float or None
-        From the middle of the vehicle to a rotor, m; None: not known.
+    mass_kg, arm_m : float or None
+        Of the vehicle, and from its middle to a rotor, m, where they are known.
     scale_to_arm : bool
         Whether places that a log states are scaled to that arm.
-
-    Raises
-    ------
-    InputError
-        If the logs are of two vehicles, or no mapping suits them all; or if the rotors that are stated cannot turn a
-        vehicle, or have another arm than the one that is given.
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
@@ -143,9 +127,16 @@ def propose(
     airframe, doubts = airframe_of(logs)
     if airframe is not None and arm_m is not None:
         if airframe.in_metres and not scale_to_arm:
-            _require_same_arm(logs[0].name, airframe, arm_m)
+            # Who asks knows which of the two is right.
+            if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
+                raise InputError(
+                    f"{logs[0].name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m"
+                    " from the middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
+                )
         else:
             airframe = airframe.with_arm(arm_m)
+    stated = logs[0].parameters
+    noted = (f"{key} = {plain(stated[key])}" for key in _NOTED if key in stated)
     rates = [one.recognition.rate_hz for one in logs]
     apart = _of_other_load(logs)
     crops = {one.name: one.recognition.flown.span_s for one in logs}
@@ -164,19 +155,10 @@ def propose(
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
         speed_max=_speed_max(logs, signals),
-        facts=_facts(logs[0]),
+        facts=(*([f"written by {logs[0].system}"] if logs[0].system else []), *noted),
         equal=tuple(one.name for one in logs if all(one is not other for other in apart)),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
     )
-
-
-def _require_same_arm(name: str, airframe: Airframe, arm_m: float) -> None:
-    """Refuse an arm beside other places that a log states: who asks knows which of the two is right."""
-    if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
-        raise InputError(
-            f"{name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m from the"
-            " middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
-        )
 
 
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
@@ -455,8 +437,3 @@ def _rounded_up(value: float) -> float:
     """Round up to two digits."""
     unit = 10.0 ** (floor(log10(value)) - 1)
     return float(f"{ceil(value / unit - 1e-9) * unit:.6g}")
-
-
-def _facts(one: KnownLog) -> tuple[str, ...]:
-    noted = (f"{key} = {plain(one.parameters[key])}" for key in _NOTED if key in one.parameters)
-    return (*([f"written by {one.system}"] if one.system else []), *noted)

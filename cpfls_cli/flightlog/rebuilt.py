@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.allocation import Allocation, Limits, Spread, factor_mix, px4_mix
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -366,7 +366,10 @@ def _compared(mixed: _Mixed, commands: Array, slow: Array, logged: Array) -> _Co
     """
     time, late_s, axes = mixed.time, mixed.late_s, np.asarray(np.linalg.pinv(mixed.allocation.mix), dtype=float)[1:]
     reach = max(float(_SHIFTS_S[-1]), late_s)
-    flies = _flying(logged) & (slow >= time[0] + reach) & (slow <= time[-1] - reach)
+    mean = logged.mean(axis=1)
+    driven = mean[mean > _LEAST_COMMAND]
+    least = _FLIES * float(np.median(driven)) if len(driven) else np.inf
+    flies = (mean > least) & (slow >= time[0] + reach) & (slow <= time[-1] - reach)
     at, own = slow[flies], logged[flies]
     if len(at) < _FEWEST:
         return _Compared(len(at))
@@ -412,12 +415,6 @@ def _explained(axes: Array, own: Array, error: Array, lag_s: float) -> _Compared
 
 def _between(values: Array) -> Array:
     return np.asarray(values - values.mean(axis=1, keepdims=True))
-
-
-def _flying(logged: Array) -> BoolArray:
-    mean = logged.mean(axis=1)
-    driven = mean[mean > _LEAST_COMMAND]
-    return np.asarray(mean > _FLIES * float(np.median(driven))) if len(driven) else np.zeros(len(mean), dtype=bool)
 
 
 def _lowest(lost: list[float]) -> float:

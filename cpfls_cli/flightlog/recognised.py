@@ -147,7 +147,12 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
         if stated or fitting:
             unit = (stated or fitting)[0]
-            return name, unit, _doubt_of_time(name, unit, fitting, step)
+            doubt = None
+            if fitting and unit not in fitting:
+                doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
+            elif step == 1:
+                doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
+            return name, unit, doubt
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", None
@@ -155,13 +160,6 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"
     )
-
-
-def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) -> str | None:
-    """Say what speaks against the unit of stamps; None where nothing does."""
-    if fitting and unit not in fitting:
-        return f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
-    return f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?" if step == 1 else None
 
 
 def _time_rank(name: str) -> int:

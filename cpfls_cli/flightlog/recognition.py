@@ -25,7 +25,6 @@ from cpfls_cli.flightlog.motion_columns import (
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import (
-    Guess,
     Load,
     LogTable,
     Recognition,
@@ -100,7 +99,11 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     if not candidates and log.flat:
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
-        _refuse_unfit(log, named)
+        clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+        if clocks:
+            log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+            names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+            raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
         if system and not log.flat:
             raise InputError(f"holds only {some([*topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight")
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
@@ -108,7 +111,12 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     refuse_dead_rotors(log, named, candidates)
     log, candidates, ended = _live_part(log, candidates)
     make_grid(log, candidates)
-    rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
+    columns = {str(name): [(own, own.group.columns) for own in candidates.get(name, ())] for name in ROTORS}
+    found = {
+        name: [(own, log.values(each)[0], log.without_spikes(each)) for own, each in held]
+        for name, held in columns.items()
+    }
+    rotors = find_rotors(found, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = _shares(log, rotors)
@@ -138,8 +146,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     tell_setpoints(seen, parameters, system)
     _list_unused(seen)
     driving = rotors.speed or rotors.command
-    found = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
-    return replace(found, winged=winged, rebuilt=rebuilt)
+    taken = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+    return replace(taken, winged=winged, rebuilt=rebuilt)
 
 
 def _live_part(
@@ -160,20 +168,6 @@ def _live_part(
     part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
     return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
-
-
-def _refuse_unfit(log: LogTable, named: Sequence[Named]) -> None:
-    """Refuse a log that has columns of a flight by name, none of which holds one."""
-    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
-    if clocks:
-        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
-        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
-        raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
-
-
-def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
-    groups = [(named, named.group.columns) for named in candidates]
-    return [(named, log.values(columns)[0], log.without_spikes(columns)) for named, columns in groups]
 
 
 def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
@@ -411,6 +405,8 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         # import.crop_s counts from the first stamp of the clock.
         off = float(log.grid[0]) - float(begin)
         flown = replace(flown, span_s=(max(0.0, round(flown.span_s[0] + off, 2)), round(flown.span_s[1] + off, 2)))
+    used = {time_column, *(column for guess in (*signals, *asked) for column in guess.columns.columns)}
+    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
     return Recognition(
         time_column=time_column,
         time_unit=unit,
@@ -426,13 +422,6 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         speeds=speeds,
         load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
         warnings=tuple(seen.warnings),
-        unused=_unused(log, (*signals, *asked), time_column),
+        unused=tuple(name for name in log.names if name not in used | stamps),
         counted_from_s=float(log.grid[0]) - log.origin,
     )
-
-
-def _unused(log: LogTable, guesses: Sequence[Guess], time_column: str) -> tuple[str, ...]:
-    """List the columns that are mapped to nothing."""
-    used = {time_column, *(column for guess in guesses for column in guess.columns.columns)}
-    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
-    return tuple(name for name in log.names if name not in used | stamps)

@@ -403,7 +403,8 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     called = f"called {named.group.pattern}, up to {high:.4g}"
     stated = chosen.span or _stated_range(named, parameters)
     # Pulses are stated of outputs that send numbers in another way too, such as DShot.
-    if stated is not None and _holds(stated[0], stated[1], values):
+    driven = values[values > 0]
+    if stated is not None and len(driven) and stated[0] <= float(np.median(driven)) <= stated[1]:
         begin, end, where = stated
         reason = f"{called}: {begin:g} to {end:g} by {where}"
         sure: Sure = "guess" if where == _USUAL_PULSES else "named"
@@ -427,12 +428,6 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
             reason = f"{called}: {own.words}"
             return _Unit("1", own.scale, own.offset, reason, "data" if told else "guess", tuple(others))
     return None
-
-
-def _holds(low: float, high: float, values: Array) -> bool:
-    """Tell whether a range is that of most of the commands that are not 0."""
-    own = values[values > 0]
-    return bool(len(own) and low <= float(np.median(own)) <= high)
 
 
 def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, str] | None:
