@@ -149,7 +149,7 @@ def on_clock(rotation: Rotation, time: Array, clock: Array) -> Rotation:
 
 
 def body_rate_from(rotation: Rotation, rate_hz: float) -> Array:
-    """Derive body rates, shape (time, 3), rad/s, from rotations of the body on a uniform clock; the last is repeated."""
+    """Derive body rates, shape (time, 3), rad/s, from rotations of the body on a uniform clock, the last repeated."""
     steps = (rotation[:-1].inv() * rotation[1:]).as_rotvec() * rate_hz
     return np.vstack([steps, steps[-1:]])
 
