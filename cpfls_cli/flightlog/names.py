@@ -231,23 +231,26 @@ def _by_words(group: ColumnGroup) -> Iterator[Named]:
     words = group.words
     rank = _BY_WORDS + len(words) + 10 * sum(word in SECOND_HAND for word in words)
     rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
-    for meaning in MEANINGS:
+    squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
+    for meaning, stated in _possible(group, words, NOT_MEASURED):
         signal = meaning.signal
-        squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
-        if (squared and signal in ROTORS) or not _suits(meaning, group):
-            continue
-        stated = stated_unit(group, signal)
-        if _in_other_unit(group, stated) or (NOT_MEASURED - ALLOWED.get(signal, frozenset())) & {*words}:
-            continue
-        if _means(meaning, group, words):
+        if not (squared and signal in ROTORS) and _means(meaning, group, words):
             fast = any(signal in IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
             yield Named(signal, group, rank, *(stated or (usual, 1.0)))
 
 
-def _in_other_unit(group: ColumnGroup, stated: tuple[UnitName, float] | None) -> bool:
-    """Tell whether a name ends in a unit, and in none that is stated of a signal."""
-    return bool(group.ending) and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
+def _possible(
+    group: ColumnGroup, words: tuple[str, ...], never: frozenset[str]
+) -> Iterator[tuple[Meaning, tuple[UnitName, float] | None]]:
+    """List the meanings that suit a group and its unit, and the unit; those that words rule out are left out."""
+    for meaning in MEANINGS:
+        stated, ending = stated_unit(group, meaning.signal), group.ending
+        # A name that ends in a unit, and in none of the signal, is of something else.
+        other = bool(ending) and stated is None and (len(ending.strip("_ ")) > 1 or ending == "_m")
+        ruled_out = (never - ALLOWED.get(meaning.signal, frozenset())) & {*words}
+        if _suits(meaning, group) and not other and not ruled_out:
+            yield meaning, stated
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -267,16 +270,11 @@ def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
 
 def _wished(group: ColumnGroup) -> Iterator[Named]:
     words = tuple(word for word in group.words if word not in WISHED)
-    if len(words) == len(group.words):
-        return
     before, _, after = group.pattern.partition("*")
     pqr = group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
-    for meaning in MEANINGS:
-        signal, stated = meaning.signal, stated_unit(group, meaning.signal)
-        ruled_out = (NOT_MEASURED - WISHED - ALLOWED.get(signal, frozenset())) & {*words}
-        if signal not in _SETPOINT_OF or ruled_out or not _suits(meaning, group) or _in_other_unit(group, stated):
-            continue
-        if signal == "body_rate" if pqr else _means(meaning, group, words):
+    for meaning, stated in _possible(group, words, NOT_MEASURED - WISHED) if len(words) < len(group.words) else ():
+        signal = meaning.signal
+        if signal in _SETPOINT_OF and (signal == "body_rate" if pqr else _means(meaning, group, words)):
             usual: UnitName | None = "1" if signal == "quaternion" else None
             yield Named(_SETPOINT_OF[signal], group, _BY_WORDS + len(words), *(stated or (usual, 1.0)))
 

@@ -92,15 +92,7 @@ Found = tuple[Named, Array, Array]  # A candidate, its stamps in s and its value
 
 
 def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, system: str) -> RotorColumns:
-    """Choose the columns of rotor speeds and of rotor commands.
-
-    Parameters
-    ----------
-    found : mapping
-        Candidates for ``rotor_speed`` and ``rotor_command``, the best first.
-    parameters : mapping
-        Of the autopilot, or of a header.
-    """
+    """Choose the columns of rotor speeds and of rotor commands, from candidates for both, the best first."""
     # Electric speeds, whose pole pairs have to be known, come behind mechanical ones.
     speeds = sorted(found["rotor_speed"], key=lambda entry: _is_electric(entry[0]))
     speed, command = (
@@ -137,13 +129,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
 
 
 def find_mixed(log: LogTable) -> RotorColumns | None:
-    """Take what goes into the mixer of a Crazyflie for the commands of its motors; None where a log lacks it.
-
-    Parameters
-    ----------
-    log : LogTable
-        Without columns of rotors.
-    """
+    """Take what goes into the mixer of a Crazyflie for the commands of its motors; None where a log lacks it."""
     ending = _MIXED[0]
     begin = next((name.removesuffix(ending) for name in log.names if name.endswith(ending)), None)
     columns = tuple(f"{begin}{name}" for name in _MIXED)
@@ -443,12 +429,9 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
         # Where both are 0, and before they were, motors have the range of the throttle's stick.
         stick = whole(parameters, "RCMAP_THROTTLE") or 3
         low, high = (float(parameters.get(f"RC{stick}_{end}", 0) or 0) for end in ("MIN", "MAX"))
+        where = f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set"
         if 500 < low < high:
-            return (
-                low,
-                high,
-                f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set",
-            )
+            return low, high, where
         return 1000.0, 2000.0, _USUAL_PULSES
     return None
 
@@ -464,15 +447,15 @@ def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> KeyCho
             older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
             return choose("thrust", "motor.m* of a Crazyflie are thrusts, before it compensates for the battery", older)
         return choose("speed", "pwm.* of a Crazyflie is what the motors get")
-    factor = parameters.get("THR_MDL_FAC")
-    if factor is not None:
-        value = float(factor)
+    if parameters.get("THR_MDL_FAC") is not None:
+        value = float(parameters["THR_MDL_FAC"])
+        said = f"THR_MDL_FAC is {value:g}"
         if value >= 0.9:
-            return choose("thrust", f"THR_MDL_FAC is {value:g}: the autopilot treats commands as shares of thrust")
+            return choose("thrust", f"{said}: the autopilot treats commands as shares of thrust")
         if value <= 0.1:
-            return choose("speed", f"THR_MDL_FAC is {value:g}: the autopilot passes commands on as they are")
-        rival = Rival("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two")
-        return choose("speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", rival, sure="guess")
+            return choose("speed", f"{said}: the autopilot passes commands on as they are")
+        rival = Rival("rotor_command_is: thrust", f"{said}, which lies between the two")
+        return choose("speed", f"{said}, between speed (0) and thrust (1)", rival, sure="guess")
     if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
         return choose("speed", "RCOU is what the motors get, after the autopilot's own thrust curve")
     rival = Rival("rotor_command_is: thrust", "the log does not say which")

@@ -111,7 +111,6 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         for each, unit in stated.get(topic.partition("[")[0], {}).items()
         if each in fields and unit != _INSTANCE
     }
-    flown_at = _flown_at(topics.get("GPS", {}))
     parameters: dict[str, float | str] = {}
     for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
@@ -121,7 +120,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
     said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
     lost_bytes = broken if lost else ()
-    return LogContents(topics, units, parameters, _system(tables), lost_bytes, flown_at, begins, tuple(said))
+    return LogContents(
+        topics, units, parameters, _system(tables), lost_bytes, _flown_at(topics.get("GPS", {})), begins, tuple(said)
+    )
 
 
 def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:
