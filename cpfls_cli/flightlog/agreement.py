@@ -194,12 +194,7 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
     in the world, which is the body's third axis where that points up and its opposite where it points down. What moves
-    along one axis alone, such as an airplane in a plane, explains nothing.
-
-    Parameters
-    ----------
-    lift : array, shape (time,), or None
-        What grows with the thrust.
+    along one axis alone, such as an airplane in a plane, explains nothing. The lift, if known, grows with the thrust.
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])

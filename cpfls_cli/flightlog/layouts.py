@@ -124,10 +124,7 @@ def whole(parameters: Parameters, *names: str) -> int | None:
 def stated_frame(parameters: Parameters, rotors: int) -> tuple[str, str] | None:
     """Give the frame that parameters state by its number, and the words for them; None where they state none.
 
-    Parameters
-    ----------
-    rotors : int
-        That the log's columns show; 0 where they show none.
+    The log's columns show so many rotors; 0 where they show none.
     """
     kind = whole(parameters, "FRAME_CLASS", "Q_FRAME_CLASS")
     form = whole(parameters, "FRAME_TYPE", "Q_FRAME_TYPE")

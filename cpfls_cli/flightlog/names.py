@@ -183,13 +183,7 @@ _AXES_OF_A_BODY = 3
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
-    """List what groups of columns may be by their names, what a kind of log is known for first.
-
-    Parameters
-    ----------
-    system : str
-        Kind of log, as its reader names it; empty where any may be meant.
-    """
+    """List what groups of columns may be by their names, what a kind of log is known for first; without a system any."""
     known = [named for group in groups for named in _known_to_systems(group, system)]
     kinds = {own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE)}
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
@@ -350,15 +344,11 @@ def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
 
 
 def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
-    """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names.
+    """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names, on a clock, s.
 
     An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity tells the
     accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
     are rotors. Without an attitude nothing is found.
-
-    Parameters
-    ----------
-    time : array, shape (sample,), s
     """
     names = _of_matrix(columns)
     every = max(1, round(1 / (_RATE_HZ * float(np.median(np.diff(time)))))) if len(time) > 2 else 1

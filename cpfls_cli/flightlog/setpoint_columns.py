@@ -70,13 +70,7 @@ class _Candidate:
 
 
 def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
-    """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Of the autopilot: the channels of its sticks.
-    """
+    """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs."""
     candidates = list(_of_known_logs(seen.log, parameters, system))
     if not any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that is asked for is in the list.
@@ -281,12 +275,7 @@ class _Following(NamedTuple):
 def _follow(measured: Array, asked: Array, rate_hz: float, factors: tuple[float, ...]) -> _Following:
     """Correlate what is measured with what was asked for some time before, as late as it follows best.
 
-    Parameters
-    ----------
-    measured, asked : array, shape (time, 3)
-        The latter NaN where nothing is.
-    factors : tuple of float
-        One of which makes the latter as large as the former.
+    Both are of shape (time, 3), the latter NaN where nothing is; one of the factors makes it as large as the former.
     """
     smooth = slow(measured, rate_hz, _MOTION_HZ)
     edge = (len(asked) - len(smooth)) // 2

@@ -89,19 +89,16 @@ class VehicleKind(NamedTuple):
 
     what: str
     reason: str
-    hovers: bool = False  # Whether rotors carry it for a part of its flight.
+
+    @property
+    def hovers(self) -> bool:
+        """Whether rotors carry it for a part of its flight."""
+        return self.what == VTOL
 
 
 def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
-    """Tell what a log says it flies; None for a multirotor, and where it does not say.
-
-    Parameters
-    ----------
-    topics : mapping
-        Of them the states of the vehicle and the names of columns are looked at.
-    """
-    found = next(_evidence(topics, parameters, system), None)
-    return None if found is None else found._replace(hovers=found.what == VTOL)
+    """Tell what states, parameters and columns say that a log flies; None for a multirotor, and where they do not say."""
+    return next(_evidence(topics, parameters, system), None)
 
 
 def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
@@ -180,13 +177,7 @@ def _by_header(topics: Topics, parameters: Parameters) -> Iterator[VehicleKind]:
 
 
 def forward_flight(topics: Topics, grid: Array) -> BoolArray | None:
-    """Mark when a VTOL is not carried by rotors alone; None where the log does not say.
-
-    Parameters
-    ----------
-    grid : array, shape (time,), s
-        On the clock of the topics.
-    """
+    """Mark when, on a grid in s, a VTOL is not carried by rotors alone; None where the log does not say."""
     for topic, field, states, inside in _STATES:
         values, time = (np.asarray(topics.get(topic, {}).get(name, ()), dtype=float) for name in (field, STAMP))
         if len(values) and len(values) == len(time):
@@ -282,31 +273,24 @@ _NONE: Final[Parameters] = MappingProxyType({})
 
 
 def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters = _NONE) -> str:
-    """Ask for faster logs, and say what to set in the autopilots that wrote them, where the logs name them.
+    """Ask for what is logged too slowly faster, and say what to set in the autopilots that wrote the logs.
 
     Parameters
     ----------
-    what : str
-        What is logged too slowly.
-    least_hz : float, Hz
     *systems : str
         What the logs name as their writers, with versions.
-    parameters : mapping
-        Of the autopilot.
     """
     asked = f"log {what} at {least_hz:g} Hz or more"
-    known = dict.fromkeys(cure for system in systems for cure in _cures(system))
+    known = dict.fromkeys(
+        f"{begin}: {next(cure for since, cure in cures if version is None or version >= since)}"
+        for system, version in ((own, _version(own)) for own in systems)
+        for begin, cures in _SETTINGS.items()
+        if system.startswith(begin)
+    )
     said = [f"{asked} ({joined(known)})"] if known else []
     ours = (system for system in systems if system.startswith(_COPTER))
     said += dict.fromkeys(_of_copter(system, parameters) for system in ours)
     return "; ".join(said) or asked
-
-
-def _cures(system: str) -> Iterator[str]:
-    version = _version(system)
-    for begin, cures in _SETTINGS.items():
-        if system.startswith(begin):
-            yield f"{begin}: {next(cure for since, cure in cures if version is None or version >= since)}"
 
 
 def _version(system: str) -> tuple[int, int] | None:
