@@ -316,7 +316,7 @@ def read_attitude(seen: Seen) -> TakenReading | None:
         if float(np.median(np.abs(np.linalg.norm(values, axis=1) - 1))) < 0.05:
             grid, named_by_axes = seen.log.grid[seen.part], named.group.kind == "wxyz"
             verdict = read_quaternion(values, named_by_axes, time, grid, _witnesses(seen))
-            _tell_quaternion(seen, named, verdict)
+            _take_quaternion(seen, named, verdict)
             return verdict
     return None if euler is None else _read_euler(seen, euler)
 
@@ -381,7 +381,7 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     if not told and best.lean is None and sure == "data":
         # A range tells the unit, and nothing here the axes.
         sure = "named"
-    seen.tell(named, unit, reason, sure, order=best.attitude.order, sign=best.attitude.sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, order=best.attitude.order, sign=best.attitude.sign, rivals=rivals)
     return verdict
 
 
@@ -402,7 +402,7 @@ def _angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple
     return "rad", f"{called(named)}; leans {tilt:.2g} at most", "data" if not rivals else "guess", rivals
 
 
-def _tell_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
+def _take_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
     best, own = verdict.best, verdict.best.attitude
     order = "xyzw" if own.scalar_last else "wxyz"
     told = best.explained > CLEAR
@@ -412,7 +412,7 @@ def _tell_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
     if own.order != (0, 1, 2, 3):
         held = ", ".join(named.group.columns[index] for index in own.order)
         reason += f"; judged by their values, {held} are w, x, y, z"
-    seen.tell(named, "1", reason, "data" if told else "named", order=own.order, sign=own.sign)
+    seen.take(named, "1", reason, "data" if told else "named", order=own.order, sign=own.sign)
     others = [other for other in verdict.others if other.attitude.scalar_last != own.scalar_last]
     if named.group.kind == "wxyz":
         seen.choose("quaternion_order", order, "the columns are named by w, x, y, z", "named")

@@ -81,7 +81,7 @@ def _fast_share(derived: Array, measured: Array, rate_hz: float) -> float:
     return fit_axes(*fast).explained
 
 
-def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
+def take_body_rate(seen: Seen, reading: Reading | None) -> None:
     """Take the gyroscope as the derivative of the attitude has it, or else by its name and its spread."""
     named = seen.first("body_rate")
     if named is None:
@@ -100,7 +100,7 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
                 " explains: is the unit of the stamps right?"
             )
-        seen.tell(
+        seen.take(
             named,
             unit,
             _rates_in_words(named, fit, unit, scale),
@@ -127,7 +127,7 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
         )
     sure: Sure = "guess" if rivals or fit is not None else "named"
     reason = f"{called(named)}, {size_in_words}{turned}; {against}"
-    seen.tell(named, unit, reason, sure, sign=named.sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, sign=named.sign, rivals=rivals)
 
 
 def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
@@ -173,7 +173,7 @@ def position_by_velocity(seen: Seen) -> None:
         )
 
 
-def tell_places(seen: Seen, reading: Reading | None) -> None:
+def take_places(seen: Seen, reading: Reading | None) -> None:
     """Take position and velocity in the axes in which the lean explains the motion, and the one derives the other."""
     position, velocity = seen.first("position"), seen.first("velocity")
     relative = None
@@ -193,12 +193,12 @@ def tell_places(seen: Seen, reading: Reading | None) -> None:
                 velocity = None
     tilt = None if reading is None or reading.lean is None else reading
     if position is not None:
-        _tell_place(seen, position, ("m", "mm"), tilt, None)
+        _take_place(seen, position, ("m", "mm"), tilt, None)
     if velocity is not None:
-        _tell_place(seen, velocity, ("m/s", "mm/s"), tilt, relative)
+        _take_place(seen, velocity, ("m/s", "mm/s"), tilt, relative)
 
 
-def _tell_place(
+def _take_place(
     seen: Seen, named: Named, units: tuple[UnitName, UnitName], tilt: Reading | None, relative: AxisFit | None
 ) -> None:
     stated, place = named.unit, seen.guesses.get("position")
@@ -239,7 +239,7 @@ def _tell_place(
         order, sign = _behind(relative, order, sign) if free else AS_NAMED
     if (order, sign) != AS_NAMED:
         reason += "; rotated into the axes of the attitude, as the tilt requires"
-    seen.tell(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
 
 
@@ -254,7 +254,7 @@ def _behind(relative: AxisFit, order: Order, sign: Sign) -> tuple[Order, Sign]:
 # The accelerometer.
 
 
-def tell_acceleration(seen: Seen, reading: Reading | None) -> None:
+def take_acceleration(seen: Seen, reading: Reading | None) -> None:
     """Take the first candidate that holds gravity, or follows the motion over ground."""
     any(_take_acceleration(seen, named, reading) for named in seen.candidates.get("acceleration", ()))
 
@@ -283,7 +283,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         # By chance the middle of what moves in a far smaller unit is as large as gravity.
         sensed = sensed if size < _TEN else None
     if sensed is not None:
-        _tell_sensed(seen, named, vertical, carried, sensed, reading)
+        _take_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
             other = at_hover[0][1]
             seen.doubt(
@@ -305,7 +305,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
         f" {'thousandths of ' if scale != 1.0 else ''}{unit}, and it does not include gravity"
     )
-    seen.tell(named, unit, reason, "data", scale=scale)
+    seen.take(named, unit, reason, "data", scale=scale)
     words = "the acceleration does not include gravity and follows the motion"
     seen.choose("acceleration_frame", "world", words, "data")
     return True
@@ -339,7 +339,7 @@ def _carried(seen: Seen, reading: Reading | None) -> float:
     return float(np.median(size)) / STANDARD_GRAVITY
 
 
-def _tell_sensed(
+def _take_sensed(
     seen: Seen, named: Named, vertical: float, carried: float, sensed: Row, reading: Reading | None
 ) -> None:
     _, unit, scale = sensed
@@ -351,14 +351,14 @@ def _tell_sensed(
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     if body is None or body == up:
-        seen.tell(named, unit, reason, "data", scale=scale)
+        seen.take(named, unit, reason, "data", scale=scale)
     else:
         reason += f", and points the wrong way for {body}, so gravity is logged, not the force that carries it"
         others = (
             Rival("sign: [1, -1, -1]", "if its y and z are opposite to those of all others"),
             Rival("sign: [1, 1, -1]", "if only its z is; a push, or a lean on the ground, along x and y decides"),
         )
-        seen.tell(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
+        seen.take(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
     words = f"gravity stays in z (median {vertical:.3g}) in flight"
     seen.choose("acceleration_frame", "body-specific-force", words, "data")
     if body is None:

@@ -357,7 +357,7 @@ class Seen:
         values = self.log.on_grid(columns.columns, spikes=guess.signal not in ROTORS)[self.part]
         return known_unit(columns.unit).factor * as_mapped(values, columns)
 
-    def tell(
+    def take(
         self,
         named: Named,
         unit: UnitName,

@@ -18,9 +18,9 @@ from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
     position_by_velocity,
-    tell_acceleration,
-    tell_body_rate,
-    tell_places,
+    take_acceleration,
+    take_body_rate,
+    take_places,
 )
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
@@ -37,7 +37,7 @@ from cpfls_cli.flightlog.recognised import (
 )
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
-from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
+from cpfls_cli.flightlog.setpoint_columns import take_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.stated_vehicle import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.flightlog.stretches import live_rows
@@ -133,17 +133,17 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
-    tell_places(seen, reading)
-    tell_body_rate(seen, reading)
-    tell_acceleration(seen, reading)
-    _tell_frames(seen, reading)
+    take_places(seen, reading)
+    take_body_rate(seen, reading)
+    take_acceleration(seen, reading)
+    _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    _tell_voltage(seen)
-    speeds, moved = _tell_rotors(seen, rotors)
-    _tell_wrench(seen)
+    _take_voltage(seen)
+    speeds, moved = _take_rotors(seen, rotors)
+    _take_wrench(seen)
     _doubt_columns(seen)
-    tell_setpoints(seen, parameters, system)
+    take_setpoints(seen, parameters, system)
     _list_unused(seen)
     driving = rotors.speed or rotors.command
     taken = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
@@ -239,7 +239,7 @@ def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
 # Frames.
 
 
-def _tell_frames(seen: Seen, reading: Reading | None) -> None:
+def _take_frames(seen: Seen, reading: Reading | None) -> None:
     """Choose the frames: from the lean, from the accelerometer, from the kind of log, or as usual."""
     leading = [found[0] for found in seen.candidates.values() if found]
     bodies = {BODY_OF.get(str(named.frame)) for named in leading} - {None}
@@ -268,7 +268,7 @@ def _tell_frames(seen: Seen, reading: Reading | None) -> None:
 # What drives it.
 
 
-def _tell_wrench(seen: Seen) -> None:
+def _take_wrench(seen: Seen) -> None:
     """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
     torque, thrust, rate = seen.first("body_torque"), seen.first("thrust"), seen.guesses.get("body_rate")
     if torque is None:
@@ -287,10 +287,10 @@ def _tell_wrench(seen: Seen) -> None:
         f" {share[1]:.2f} about pitch); a commanded torque is only what a controller asked for"
     )
     scale = () if torque.unit else (Rival("unit: N mm", "the scale follows from the inertia, which no log states"),)
-    seen.tell(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
+    seen.take(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
     if thrust is not None:
         level = f"{float(np.median(seen.grid(thrust))):.3g}"
-        seen.tell(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
+        seen.take(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
 
 
 def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> list[float]:
@@ -302,17 +302,17 @@ def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> li
     return [0.0 if still[axis] else float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
 
 
-def _tell_voltage(seen: Seen) -> None:
+def _take_voltage(seen: Seen) -> None:
     voltage = seen.first("voltage")
     if voltage is None:
         return
     level = float(np.median(seen.grid(voltage)))
     scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
     reason = f"{called(voltage)}; {level * scale:.3g} V in flight"
-    seen.tell(voltage, "V", reason, "named", scale=scale, required=False)
+    seen.take(voltage, "V", reason, "named", scale=scale, required=False)
 
 
-def _tell_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
+def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
     seen.left_out += rotors.left_out
     seen.warnings += rotors.warnings
     speeds = None

@@ -69,7 +69,7 @@ class _Candidate:
         return Guess(signal=self.signal, columns=columns, reason=reason, sure=sure, rivals=rivals)
 
 
-def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
+def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
     """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs."""
     candidates = list(_of_known_logs(seen.log, parameters, system))
     if not any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):

@@ -97,7 +97,7 @@ class VehicleKind(NamedTuple):
 
 
 def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
-    """Tell what states, parameters and columns say that a log flies; None for a multirotor, and where they do not say."""
+    """Name what a log flies by its states, parameters and columns; None for a multirotor, and where they do not say."""
     return next(_evidence(topics, parameters, system), None)
 
 

@@ -72,16 +72,16 @@ def on_one_clock(
             )
         converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
         chosen = present_choices(columns, settings)
-        return {**columns, **converted}, chosen, _tell_of_choices(settings, chosen)
+        return {**columns, **converted}, chosen, _say_choices(settings, chosen)
     mapped = [(column, *topic_and_field(column)) for column in settings.mapped_columns]
     chosen = present_choices({column for column, topic, field in mapped if field in topics.get(topic, {})}, settings)
     chosen = _with_clock(topics, chosen)
     resampled, warnings = _resampled(topics, chosen)
     resampled[str(chosen.time_column)] /= known_unit(settings.time_unit).factor
-    return resampled, chosen, (*_tell_of_choices(settings, chosen), *warnings)
+    return resampled, chosen, (*_say_choices(settings, chosen), *warnings)
 
 
-def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
+def _say_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
     """Say which signals are not of the columns that are named first."""
     first = {name: signal.columns[0] for name, signal in settings.signals.items()}
     return tuple(
