@@ -22,12 +22,12 @@ from benchmarks.shared.measure import pin_threads, table
 pin_threads()
 
 import numpy as np
+from cpfls_cli.artifacts.selection import SelectionRecord
 from pymoo.indicators.hv import HV
 
 from benchmarks.shared.quality_plot import draw
 from benchmarks.shared.searches import Search, searches, spent
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution.ranking import pareto_front

@@ -18,9 +18,9 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Any, cast
 from urllib.parse import quote
@@ -34,7 +34,7 @@ from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Table, Text, Tone
+from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
@@ -140,7 +140,7 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 
 
 @cache
-def _environment(folder: Path) -> Environment:
+def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -151,13 +151,27 @@ def _environment(folder: Path) -> Environment:
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote)
+    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **dict(added))
+    functions = {name: each for name, each in added if callable(each)}
+    made.filters.update(functions)
+    made.tests.update(functions)
     return made
 
 
-def words(template: str, given: Any, *, folder: Path = TEMPLATES, **more: Any) -> str:
-    """Word a result by its template, in which it is ``r``."""
-    return _environment(folder).get_template(f"{template}.md.j2").render(r=given, **more)
+def words(
+    template: str, given: Any, *, folder: Path = TEMPLATES, added: Mapping[str, Any] | None = None, **more: Any
+) -> str:
+    """Word a result by its template, in which it is ``r``.
+
+    Parameters
+    ----------
+    added : mapping of str to object, or None
+        What the template knows beside what all do; functions also as filters and tests.
+    **more : object
+        What it knows of this result.
+    """
+    environment = _environment(folder, tuple((added or {}).items()))
+    return environment.get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass
@@ -237,9 +251,17 @@ def _name_cells(table: Sequence[Token]) -> None:
         cell.tag = "th" if cell.type in {"td_open", "td_close"} and column == (cell.type == "td_close") else cell.tag
 
 
-def blocks(text: str) -> list[Block]:
-    """Give what a terminal shows of a page; figures are left out, and headings of nothing."""
-    made = list(_blocks(tree(text)))
+def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str = "") -> list[Block]:
+    """Give a page as blocks, without headings of nothing and figures that are not given, as on a terminal.
+
+    Parameters
+    ----------
+    pictures : mapping of str to Picture, or None
+        Figures that are shown.
+    prefix : str
+        Before their names and those of tables on the page.
+    """
+    made = list(_blocks(tree(text), pictures or {}, prefix, count(1)))
     empty = (Heading, Folded, type(None))
     return [
         block
@@ -248,15 +270,24 @@ def blocks(text: str) -> list[Block]:
     ]
 
 
-def _blocks(nodes: Iterable[Node]) -> Iterator[Block]:
+def _blocks(
+    nodes: Iterable[Node], pictures: Mapping[str, Picture], prefix: str, numbers: Iterator[int]
+) -> Iterator[Block]:
     for node in nodes:
         if node.kind == "heading":
             yield Heading(_plain_line(node.text))
         elif node.kind == "fold":
-            yield Folded(_plain_line(node.text), list(_blocks(node.inner)))
+            inner = list(_blocks(node.inner, pictures, prefix, numbers))
+            yield Folded(_plain_line(node.text), inner, "open" in node.marks)
+        elif node.kind == "figure" and node.name in pictures:
+            caption = _plain_line(node.text)
+            yield Plot(f"{prefix}{node.name}", caption, pictures[node.name], caption)
         elif node.kind == "words":
             for each in SyntaxTreeNode(_markdown().parse(node.text)).children:
-                yield from _blocks_of(each)
+                for block in _blocks_of(each):
+                    if prefix and isinstance(block, Table):
+                        block = replace(block, name=f"{prefix}table-{next(numbers)}")
+                    yield block
 
 
 def _plain_line(text: str) -> str:

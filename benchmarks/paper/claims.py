@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from cpfls_cli.artifacts.selection import SelectionRecord
 
 from benchmarks.paper.printed import (
     PRINTED_CONTRIBUTION,
@@ -22,7 +23,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.rebuilt import inertia_functions
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.source import Source, Sources

@@ -6,16 +6,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 from cpfls_cli.artifacts.spec import DatasetSpec, Format, Record
 
 _RECORDS = {
     ("cpfls/trajectory", ""): "trajectory.TrajectoryRecord",
     ("cpfls/flight", ""): "flight.FlightRecord",
-    ("cpfls/selection", ""): "selection.SelectionRecord",
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
@@ -50,9 +51,9 @@ def record_of_format(name: str, kind: str = "") -> type[Record] | None:
     return found
 
 
-def stage_of_format(name: str) -> str:
-    """Name the module of the stage whose results have this format, which is no record's; empty where there is none."""
-    module = name.removeprefix("cpfls/").replace("-", "_")
+def stage_module(attributes: Mapping[str, Any]) -> str:
+    """Name the module of the stage that made a file, by its root attributes; empty where it holds no result."""
+    module = str(attributes.get("stage", "")).replace("-", "_")
     found = re.fullmatch(r"[a-z]\w*", module) and (Path(__file__).parents[1] / "stages" / f"{module}.py").is_file()
     return module if found else ""
 

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
 
 CONFIG = "config"

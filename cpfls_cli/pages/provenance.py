@@ -6,6 +6,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
@@ -17,7 +18,6 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
 from cpfls_cli.artifacts.response import ResponseRecord
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
@@ -26,6 +26,7 @@ from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
 
 _REPEAT = (
@@ -87,10 +88,10 @@ class _Command:
     options: tuple[str, ...] = ()
 
 
-_COMMANDS: dict[type[Record], _Command] = {
+_COMMANDS: dict[type, _Command] = {
+    Selection: _Command("reduce", ("flight",)),
     TrajectoryRecord: _Command("trajectory", (), ("waypoints",)),
     FlightRecord: _Command("simulate", ("trajectory",), ("model",)),
-    SelectionRecord: _Command("reduce", ("flight",)),
     IdentifiedRecord: _Command("identify", ("flight",), ("selection", "validate", "choose-on")),
     SweepRecord: _Command("sweep", ("flight",), ("validate", "choose-on")),
     PredictionRecord: _Command("predict", ("model", "flight")),
@@ -205,7 +206,7 @@ def _of_role(inputs: Mapping[str, InputFile], role: str) -> list[str]:
     return sorted((name for name, number in numbers.items() if number.isdigit()), key=lambda name: int(numbers[name]))
 
 
-_Lack = tuple[type[Record], str, str]
+_Lack = tuple[type, str, str]
 _LACKS: tuple[_Lack, ...] = (
     (TrajectoryRecord, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
     (
@@ -213,7 +214,7 @@ _LACKS: tuple[_Lack, ...] = (
         "Figure 4 and the quality of the flight",
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
-    (SelectionRecord, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
+    (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
     (IdentifiedRecord, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
     (
         PredictionRecord,
@@ -259,6 +260,7 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
             yield _GAP_LACKS[2]
 
 
-def _word(wanted: type[Record]) -> str:
-    kind = wanted.FORMAT.kind
-    return wanted.FORMAT.name.removeprefix("cpfls/") if kind in ("", "identified") else kind
+def _word(wanted: Any) -> str:
+    kind = getattr(wanted.FORMAT, "kind", "")
+    name = getattr(wanted.FORMAT, "name", wanted.FORMAT)
+    return str(name).removeprefix("cpfls/") if kind in ("", "identified") else str(kind)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
 from scipy import stats
 
 from benchmarks.paper.claims import (
@@ -31,7 +32,6 @@ from benchmarks.paper.search_claims import (
     TYPICAL_ERRORS_CLAIM,
     paired_ratio,
 )
-from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
 from cpfls_cli.config.study import ReportSettings
