@@ -183,7 +183,7 @@ _AXES_OF_A_BODY = 3
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
-    """List what groups of columns may be by name, what a kind of log is known for first; without a system any of them."""
+    """List what groups of columns may be by name, what a kind of log is known for first; without a system any."""
     known = [named for group in groups for named in _known_to_systems(group, system)]
     kinds = {own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE)}
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
