@@ -225,11 +225,7 @@ def test_what_is_chosen_is_no_rival_of_itself():
 
 
 @pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        ([0, 1, 1], "gyro_y and gyro_z have the same values"),
-        ([0, 1, 3], "gyro_z never changes"),
-    ],
+    ("columns", "said"), [([0, 1, 1], "gyro_y and gyro_z have the same values"), ([0, 1, 3], "gyro_z never changes")]
 )
 def test_a_column_that_is_another_one_or_nothing_makes_a_guess(columns, said):
     rate = np.column_stack([OWN.rate, np.zeros(len(OWN.time))])[:, columns]
