@@ -20,6 +20,7 @@ from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, Reading, nearest
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
+from cpfls_cli.flightlog.rotor_columns import RotorGuess
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
@@ -44,7 +45,7 @@ _ALONG, _AGAINST = 0.3, -0.6
 # The gyroscope.
 
 
-def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | None) -> bool:
+def gyroscope_first(seen: Seen, reading: Reading, rotors: RotorGuess | None, are_commands: bool) -> bool:
     """Put a gyroscope before a rate that is the attitude's own derivative, where the rotors explain more of it.
 
     Both are one motion where that is slow. Above, a derivative holds what noise and filter of the attitude make of it,
@@ -58,11 +59,12 @@ def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | N
     if _fast_share(derived, seen.grid(first), seen.rate_hz) < _DERIVED:
         return False
     turning = slow(derived, seen.rate_hz)
-    driven = {first: explained_by_rotors(seen.grid(first), rotors[0], seen.rate_hz, rotors[1])}
+    speeds = seen.mapped(rotors.guess)
+    driven = {first: explained_by_rotors(seen.grid(first), speeds, seen.rate_hz, are_commands)}
     for named in others:
         own = fit_axes(turning, slow(seen.grid(named), seen.rate_hz))
         if own.explained > GOOD and _fast_share(derived, seen.grid(named), seen.rate_hz) < _DERIVED:
-            driven[named] = explained_by_rotors(seen.grid(named), rotors[0], seen.rate_hz, rotors[1])
+            driven[named] = explained_by_rotors(seen.grid(named), speeds, seen.rate_hz, are_commands)
     best = largest(driven, lambda named: driven[named])
     if best is first:
         return False

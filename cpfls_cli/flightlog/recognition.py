@@ -130,7 +130,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
-    if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
+    if verdict is not None and gyroscope_first(
+        seen, verdict.best, rotors.speed or rotors.command, rotors.speed is None
+    ):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
     take_places(seen, reading)
@@ -177,12 +179,6 @@ def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
     return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
-
-
-def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None:
-    """Give the speeds of the rotors in flight, shape (time, rotor), and whether they are commands."""
-    found = rotors.speed or rotors.command
-    return None if found is None else (seen.mapped(found.guess), rotors.speed is None)
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:

@@ -1,5 +1,6 @@
 """Settings of the section `import`: how the columns of a log map to signals, and how these become a flight."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -33,28 +34,15 @@ SignalName = Literal[
     "setpoint_thrust",
     "sticks",
 ]
+_UNITS: Final = """
+    attitude: rad           quaternion: 1             body_rate: rad/s            attitude_rate: rad/s
+    position: m             velocity: m/s             acceleration: m/s^2         voltage: V or 1
+    torque: N m             body_torque: N m          thrust: N                   setpoint_thrust: N or 1
+    rotor_speed: rad/s      rotor_command: 1 or s or rad/s                        sticks: 1
+    setpoint_position: m    setpoint_velocity: m/s    setpoint_body_rate: rad/s   setpoint_attitude: rad or 1
+"""
 UNITS_OF_SIGNAL: Final = MappingProxyType(
-    {
-        "attitude": ("rad",),
-        "quaternion": ("1",),
-        "body_rate": ("rad/s",),
-        "attitude_rate": ("rad/s",),
-        "position": ("m",),
-        "velocity": ("m/s",),
-        "acceleration": ("m/s^2",),
-        "torque": ("N m",),
-        "body_torque": ("N m",),
-        "thrust": ("N",),
-        "rotor_speed": ("rad/s",),
-        "rotor_command": ("1", "s", "rad/s"),
-        "voltage": ("V", "1"),
-        "setpoint_position": ("m",),
-        "setpoint_velocity": ("m/s",),
-        "setpoint_attitude": ("rad", "1"),
-        "setpoint_body_rate": ("rad/s",),
-        "setpoint_thrust": ("N", "1"),
-        "sticks": ("1",),
-    }
+    {name: tuple(units.strip().split(" or ")) for name, units in re.findall(r"(\w+): (.+?)(?=  |\n)", _UNITS)}
 )
 SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
     {
