@@ -63,7 +63,9 @@ def case(request):
         arguments=(
             table,
             padded_breakpoints(partitions),
-            kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, dense, mapped_inputs(table, attitude)),
+            kernels.Chunk(
+                kernels.motion_lines(motion.rate, motion.acceleration, dense), mapped_inputs(table, attitude)
+            ),
             SCALE,
         ),
         label=np.sort(rng.integers(0, LABELS, SAMPLES)),
@@ -134,7 +136,7 @@ def test_neighbours_that_fire_other_rules_are_told_apart():
     kernels.add_gram(
         table,
         padded_breakpoints(partitions),
-        kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, np.zeros((26, 3, 1)), inputs),
+        kernels.Chunk(kernels.motion_lines(motion.rate, motion.acceleration, np.zeros((26, 3, 1))), inputs),
         np.ones(3),
         np.zeros(26, dtype=np.int64),
         gram,
