@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.inputs import InputRange, map_input
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.kernels import ONE, STEP, Program, Table
