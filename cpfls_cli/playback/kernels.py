@@ -766,9 +766,19 @@ def _run_all(
 
 def _new_work(used: Terms, count: int, horizon: int) -> _Work:
     columns = _Columns(np.zeros((3, count)), np.zeros((6, count)), np.zeros((6, 6)), np.zeros(3), np.zeros(3))
-    tangents = (np.zeros((12, count)) for _ in range(3))
-    states, rows = (_new_state() for _ in range(3)), np.zeros((12 * horizon + _ROWS, count))
-    return _Work(*states, _new_space(used, count > 0), *tangents, columns, np.zeros((6, count)), rows)
+    tangent, half, moved = np.zeros((3, 12, count))
+    return _Work(
+        state=_new_state(),
+        middle=_new_state(),
+        before=_new_state(),
+        at=_new_space(used, count > 0),
+        tangent=tangent,
+        half=half,
+        moved=moved,
+        columns=columns,
+        change=np.zeros((6, count)),
+        rows=np.zeros((12 * horizon + _ROWS, count)),
+    )
 
 
 def errors_of_runs(

@@ -24,9 +24,9 @@ def _part_sum(function: Function) -> Function:
     return part(function, fastmath={"reassoc", "contract"})
 
 
-# Lines of every structure: ones; zeros; the step of the output of a block at a breakpoint, as value, slope by roll, slope by
-# pitch, and value where the other input fires by its slope; its change with the breakpoint, of degree and of slope; and
-# three to work in.
+# Lines of every structure: ones; zeros; the step of the output of a block at a breakpoint, as value, slope by roll,
+# slope by pitch, and value where the other input fires by its slope; the change of degree and of slope with the
+# breakpoint; and three to work in.
 ONE, ZERO, STEP, BY_DEGREE, BY_SLOPE, _WORK, FIRST_LINE = 0, 1, 2, 6, 7, 8, 11
 # Columns of `Program.partitions`.
 _ANTECEDENT, _FUNCTIONS, _RULES, _FIRST_INNER, _DEGREES = range(5)

@@ -45,7 +45,9 @@ class _Writer:
             self.lines = max(self.lines, self.free)
         *first, last = kept or [(kernels.ZERO, kernels.ZERO)]
         if len(first) > 1:
-            first = [(self.add(*first), ONE)]
+            both = self.add(*first)
+            assert both is not None, "of two products that are kept"
+            first = [(both, ONE)]
         (a, b), (c, d) = first[0] if first else (kernels.ZERO, kernels.ZERO), last
         self.sums.append((to, factor, a, b, c, d))
         return to
@@ -135,15 +137,15 @@ class _Layout:
         if inputs:
             factor = kernels.HALF_LESS if row == column else kernels.LESS
             energy = add((self.rate + row, self.rate + column), factor=factor)
-        carried = []
+        carried: list[_Three] = []
         for axis in range(3):
             other = column if axis == row else row
             moves = self.rate + other if axis in (row, column) else None
-            by_angle = [
+            by_roll, by_pitch = (
                 add((moves, self.rate + angle), (energy if axis == angle else None, ONE)) if angle in inputs else None
                 for angle in (ROLL, PITCH)
-            ]
-            carried.append((None if moves is None else moves + 3, *by_angle))
+            )
+            carried.append((None if moves is None else moves + 3, by_roll, by_pitch))
         return carried
 
     def _write_columns(self, block: Block, carried: list[_Three], columns: list[tuple[int, ...]]) -> None:
