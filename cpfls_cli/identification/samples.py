@@ -13,7 +13,7 @@ from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.regressor import kernels
-from cpfls_cli.regressor.kernels import Chunk, Table, motion_lines
+from cpfls_cli.regressor.kernels import Chunk, Runs, Table, motion_lines
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
@@ -145,8 +145,8 @@ class Samples:
         P, dense = self.table.parameters, self._dense_products
         gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
         breakpoints = padded_breakpoints(partitions)
-        for chunk, label in self._chunks():
-            kernels.add_gram(self.table, breakpoints, chunk, self.scale, label, gram, moment)
+        for chunk, runs, label in self._runs(breakpoints):
+            kernels.add_gram(self.table, breakpoints, chunk, runs, self.scale, label, gram, moment)
         gram = gram + gram.swapaxes(1, 2)
         gram[:, np.arange(P), np.arange(P)] *= 0.5
         rigid = moment[:, :, 1:]
@@ -170,9 +170,9 @@ class Samples:
         """
         square, largest = np.zeros((self.labels, 1)), np.zeros((self.labels, 1))
         breakpoints, weights = padded_breakpoints(partitions), self._weights(rigid_body)
-        for chunk, label in self._chunks():
+        for chunk, runs, label in self._runs(breakpoints):
             kernels.add_errors(
-                self.table, breakpoints, chunk, self.scale, label, coefficients[None], weights, square, largest
+                self.table, breakpoints, chunk, runs, self.scale, label, coefficients[None], weights, square, largest
             )
         return square[:, 0], largest[:, 0]
 
@@ -199,9 +199,9 @@ class Samples:
         square, columns = np.zeros((len(models), len(models))), 1 + rigid
         back, dense_back = np.zeros((self.table.parameters, 1)), np.zeros((columns, 1))
         breakpoints, coefficients = padded_breakpoints(partitions), np.ascontiguousarray(models[:, rigid:])
-        for chunk, _ in self._chunks():
+        for chunk, runs, _ in self._runs(breakpoints):
             kernels.add_combined(
-                self.table, breakpoints, chunk, self.scale, coefficients, weights, square, back, dense_back
+                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, square, back, dense_back
             )
         return _mirrored(square)[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
 
@@ -218,8 +218,10 @@ class Samples:
         cross, square = np.zeros((self.table.parameters, B + 1)), np.zeros((B + 1, B + 1))
         dense = np.zeros((len(weights), B + 1))
         breakpoints = padded_breakpoints(partitions)
-        for chunk, _ in self._chunks():
-            kernels.add_moved(self.table, breakpoints, chunk, self.scale, coefficients, weights, cross, dense, square)
+        for chunk, runs, _ in self._runs(breakpoints):
+            kernels.add_moved(
+                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, cross, dense, square
+            )
         square = _mirrored(square)
         return MovedProducts(
             np.vstack([dense[1:, :B], cross[:, :B]]), square[:B, :B], square[:B, B], float(square[B, B])
@@ -251,6 +253,21 @@ class Samples:
             stop = start + chunk.motion.shape[1]
             yield chunk, self.label[start:stop]
             start = stop
+
+    def _runs(self, breakpoints: Array) -> Iterator[tuple[Chunk, Runs, IntArray]]:
+        """Chunks with their samples in the order of what they fire, kept until other partitions are asked for."""
+        kept = self._ordered.get(breakpoints.tobytes(), [])
+        for number, (chunk, label) in enumerate(self._chunks()):
+            if number == len(kept):
+                kept.append(kernels.runs_of(self.table, breakpoints, chunk.inputs))
+            yield chunk, kept[number], label
+        self._ordered.clear()
+        if len(self.ready.source) <= _KEPT:
+            self._ordered[breakpoints.tobytes()] = kept
+
+    @cached_property
+    def _ordered(self) -> dict[bytes, list[Runs]]:
+        return {}
 
     def _weights(self, rigid_body: Array) -> Array:
         return np.concatenate([[1.0], -rigid_body])[None] if self.ready.rigid else np.ones((1, 1))

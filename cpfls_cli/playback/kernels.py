@@ -397,9 +397,8 @@ def _write_rotation_error(measured: Array, predicted: Array, turn: Array, out: A
     """Write the rotation vector from a measured to a predicted rotation, body frame of the measured one."""
     for i in range(3):
         for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += measured[k, i] * predicted[k, j]
+            turned = measured[0, i] * predicted[0, j] + measured[1, i] * predicted[1, j]
+            turn[i, j] = turned + measured[2, i] * predicted[2, j]
     x, y, z = 0.5 * (turn[2, 1] - turn[1, 2]), 0.5 * (turn[0, 2] - turn[2, 0]), 0.5 * (turn[1, 0] - turn[0, 1])
     sine, cosine = np.sqrt(x * x + y * y + z * z), 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
     scale = np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0
@@ -718,7 +717,8 @@ def _run_all(
         for step in range(len(loss.weight)):
             sample, error = starts[n] + step, sums.errors[n if sums.writes else 0, step if sums.writes else 0]
             if sums.diverged[n] < 0:
-                _copy(state, work.before)
+                if sums.writes:
+                    _copy(state, work.before)
                 here, of_here, turn, right, ahead, elapsed = state, tangent, at.half, at.half_right, half, 0.5 * h
                 # Written once for both halves of a step: what is written twice takes twice as long to compile.
                 for in_middle in (False, True):
@@ -746,7 +746,8 @@ def _run_all(
                 tangent, moved = moved, tangent
                 if _lost(state):
                     sums.diverged[n] = step
-                    _copy(work.before, state)
+                    if sums.writes:
+                        _copy(work.before, state)
             if sums.writes:
                 _write_errors(motion, sample + 1, state, at.moved, error)
             elif sums.diverged[n] >= 0:

@@ -84,6 +84,8 @@ class Table(NamedTuple):
         0 for the seesaw.
     ranges : array, shape (2, 2)
         Minimum and maximum of the roll and pitch inputs.
+    antecedents : tuple of int
+        Lines of the inputs of the partitions.
     """
 
     program: Program
@@ -93,6 +95,7 @@ class Table(NamedTuple):
     data_range: bool
     harmonic_order: int
     ranges: Array
+    antecedents: tuple[int, ...]
 
 
 class Chunk(NamedTuple):
@@ -118,14 +121,14 @@ class Runs(NamedTuple):
     ----------
     sample : array of int, shape (samples,)
     stop : array of int, shape (runs,)
-        Where those end that fire the same rules under the same label.
-    label : array of int, shape (samples,)
-        Of the samples as they are.
+        Where those end that fire the same rules.
+    longest : int
+        Samples of a run.
     """
 
     sample: IntArray
     stop: IntArray
-    label: IntArray
+    longest: int
 
 
 class _Space(NamedTuple):
@@ -138,6 +141,7 @@ class _Space(NamedTuple):
     weights: Array
     products: Array
     beside: int
+    crossed: int
 
 
 _BATCH = 128
@@ -202,18 +206,23 @@ def _sum_up(sums: IntArray, first: int, stop: int, factors: Array, rows: int, at
         to, factor = sums[index, 0], factors[sums[index, 1]]
         a, b, c, d = sums[index, 2], sums[index, 3], sums[index, 4], sums[index, 5]
         to = to if to >= 0 else rows - 1 - to
-        for n in range(at.shape[1]):
-            at[to, n] = factor * (at[a, n] * at[b, n] + at[c, n] * at[d, n])
+        if a == ZERO:
+            for n in range(at.shape[1]):
+                at[to, n] = factor * (at[c, n] * at[d, n])
+        else:
+            for n in range(at.shape[1]):
+                at[to, n] = factor * (at[a, n] * at[b, n] + at[c, n] * at[d, n])
 
 
 @_part_sum
-def _multiply(wide: Array, out: Array) -> None:
-    """Set ``out = left right^T`` of columns, four by two: of the first with themselves (upper triangle), of later ones.
+def _multiply(wide: Array, crossed: int, out: Array) -> None:
+    """Set products of columns, four by two: of the first with themselves (upper triangle), of later ones with some.
 
     Columns come in fours; as many as `out` has are the first.
     """
     for a in range(0, out.shape[0], 4):
-        for b in range(a if a < out.shape[1] else 0, out.shape[1], 2):
+        first, stop = (a, out.shape[1]) if a < out.shape[1] else (0, crossed)
+        for b in range(first, stop, 2):
             s00 = s01 = s10 = s11 = s20 = s21 = s30 = s31 = 0.0
             for r in range(wide.shape[1]):
                 s00 += wide[a, r] * wide[b, r]
@@ -371,6 +380,7 @@ def _add_up(
     breakpoints: Array,
     chunk: Chunk,
     runs: Runs,
+    label: IntArray,
     factors: Array,
     models: tuple[Array, Array],
     sums: tuple[Array, Array, Array],
@@ -395,7 +405,7 @@ def _add_up(
     while start < len(sample):
         stop = min(start + _BATCH, runs.stop[run])
         run += 1 if stop == runs.stop[run] else 0
-        count, own, some = stop - start, runs.label[sample[start]], sample[start:stop]
+        count, own, some = stop - start, label[sample[start]], sample[start:stop]
         start = stop
         at = space.lines[: lines * count].reshape(lines, count)
         wide = space.lines[program.moved * count : lines * count].reshape(wide_lines, 3 * count)
@@ -416,7 +426,7 @@ def _add_up(
         if what == _ERRORS:
             _add_errors(wide, square[own], cross[own])
             continue
-        _multiply(wide, space.products)
+        _multiply(wide, space.crossed, space.products)
         if what == _GRAM:
             _add_gram(space.products, column, square[own], cross[own])
         else:
@@ -435,27 +445,35 @@ def motion_lines(rate: Array, acceleration: Array, dense: Array) -> Array:
     return np.ascontiguousarray(np.concatenate(lines))
 
 
-def runs_of(table: Table, breakpoints: Array, inputs: Array, label: IntArray) -> Runs:
+def runs_of(table: Table, breakpoints: Array, inputs: Array) -> Runs:
     """Put samples in the order of the cells that all breakpoints cut roll and pitch into, those of one in that of time.
 
     Parameters
     ----------
     breakpoints : array, shape (partitions, most functions)
     inputs : array, shape (lines, samples)
-    label : array of int, shape (samples,)
     """
     partitions, cell, cells = table.program.partitions[:-1], np.zeros(inputs.shape[1], np.int64), 1
-    for line in np.unique(partitions[:, _ANTECEDENT]):
-        own = zip(partitions, breakpoints, strict=True)
-        inner = np.sort(np.concatenate([b[1 : p[_FUNCTIONS] - 1] for p, b in own if p[_ANTECEDENT] == line]))
+    antecedents, functions = partitions[:, _ANTECEDENT], partitions[:, _FUNCTIONS]
+    place = np.arange(breakpoints.shape[1])
+    for line in table.antecedents:
+        own = breakpoints[antecedents == line]
+        inner = np.sort(own[(place > 0) & (place < functions[antecedents == line, None] - 1)])
         if len(inner):
             cell = cell * (len(inner) + 1) + np.searchsorted(inner, inputs[line - FIRST_LINE], "right")
             cells *= len(inner) + 1
     # Small numbers are sorted by their digits.
     sample = np.argsort(cell.astype(np.uint16 if cells < 2**16 else np.int64), kind="stable")
-    ordered, labels = cell[sample], label[sample]
-    ends = np.flatnonzero((ordered[1:] != ordered[:-1]) | (labels[1:] != labels[:-1])) + 1
-    return Runs(sample, np.append(ends, len(sample)), label)
+    ordered = cell[sample]
+    stop = np.append(np.flatnonzero(ordered[1:] != ordered[:-1]) + 1, len(sample))
+    return Runs(sample, stop, int(np.diff(stop, prepend=0).max()))
+
+
+def _by_label(runs: Runs, label: IntArray) -> Runs:
+    """End runs where the label changes, too."""
+    labels = label[runs.sample]
+    changes = np.flatnonzero(labels[1:] != labels[:-1]) + 1
+    return runs._replace(stop=np.union1d(runs.stop, changes)) if len(changes) else runs
 
 
 def _sums(
@@ -463,6 +481,7 @@ def _sums(
     table: Table,
     breakpoints: Array,
     chunk: Chunk,
+    runs: Runs,
     scale: Array,
     label: IntArray,
     models: tuple[Array, Array],
@@ -475,17 +494,18 @@ def _sums(
     places = np.arange(len(models[0])) if what != _MOVED else np.full(2 * partitions - 1, table.breakpoints)
     width, beside = fours(active + dense), fours(len(places))
     space = _Space(
-        lines=np.empty((program.moved + 3 * (width + beside)) * min(_BATCH, len(label))),
+        lines=np.empty((program.moved + 3 * (width + beside)) * min(_BATCH, runs.longest)),
         column=np.zeros(active, np.int64),
         interval=np.zeros(partitions, np.int64),
         places=places,
         weights=np.zeros(width),
         products=np.empty((width + beside, width if what == _GRAM else beside)),
         beside=beside,
+        crossed=2 if what == _COMBINED else beside,
     )
     factors = np.array([1.0, -0.5, -1.0, *scale])
-    runs = runs_of(table, breakpoints, chunk.inputs, label)
-    _add_up(what, program, breakpoints, chunk, runs, factors, models, sums, space)
+    labelled = runs if what in (_COMBINED, _MOVED) else _by_label(runs, label)
+    _add_up(what, program, breakpoints, chunk, labelled, label, factors, models, sums, space)
 
 
 def fours(count: int) -> int:
@@ -497,13 +517,22 @@ _NOTHING = np.zeros((0, 0))
 
 
 def add_gram(
-    table: Table, breakpoints: Array, chunk: Chunk, scale: Array, label: IntArray, gram: Array, moment: Array
+    table: Table,
+    breakpoints: Array,
+    chunk: Chunk,
+    runs: Runs,
+    scale: Array,
+    label: IntArray,
+    gram: Array,
+    moment: Array,
 ) -> None:
     """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk to sums by label.
 
     Parameters
     ----------
     breakpoints : array, shape (partitions, most functions)
+    runs : Runs
+        Of the chunk, by these breakpoints.
     scale : array, shape (3,)
         Factor of the rows about each axis.
     label : array of int, shape (samples,)
@@ -513,13 +542,14 @@ def add_gram(
     moment : array, shape (sums, parameters, dense)
         Changed in place.
     """
-    _sums(_GRAM, table, breakpoints, chunk, scale, label, (_NOTHING, _NOTHING), (gram, moment, _NOTHING))
+    _sums(_GRAM, table, breakpoints, chunk, runs, scale, label, (_NOTHING, _NOTHING), (gram, moment, _NOTHING))
 
 
 def add_errors(
     table: Table,
     breakpoints: Array,
     chunk: Chunk,
+    runs: Runs,
     scale: Array,
     label: IntArray,
     coefficients: Array,
@@ -531,7 +561,7 @@ def add_errors(
 
     Parameters
     ----------
-    table, breakpoints, chunk, scale
+    table, breakpoints, chunk, runs, scale
         See `add_gram`.
     label : array of int, shape (samples,)
         Sum that a sample adds to.
@@ -545,13 +575,14 @@ def add_errors(
         Largest absolute residuals, changed in place.
     """
     models, sums = (coefficients, dense_weights), (square[:, :, None], largest[:, :, None], _NOTHING)
-    _sums(_ERRORS, table, breakpoints, chunk, scale, label, models, sums)
+    _sums(_ERRORS, table, breakpoints, chunk, runs, scale, label, models, sums)
 
 
 def add_combined(
     table: Table,
     breakpoints: Array,
     chunk: Chunk,
+    runs: Runs,
     scale: Array,
     coefficients: Array,
     dense_weights: Array,
@@ -563,7 +594,7 @@ def add_combined(
 
     Parameters
     ----------
-    table, breakpoints, chunk, scale
+    table, breakpoints, chunk, runs, scale
         See `add_gram`.
     coefficients : array, shape (models, parameters)
     dense_weights : array, shape (models, dense)
@@ -575,13 +606,14 @@ def add_combined(
         The dense columns times the first residual, changed in place.
     """
     label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients, dense_weights)
-    _sums(_COMBINED, table, breakpoints, chunk, scale, label, models, (square[None], back[None], dense_back))
+    _sums(_COMBINED, table, breakpoints, chunk, runs, scale, label, models, (square[None], back[None], dense_back))
 
 
 def add_moved(
     table: Table,
     breakpoints: Array,
     chunk: Chunk,
+    runs: Runs,
     scale: Array,
     coefficients: Array,
     dense_weights: Array,
@@ -595,7 +627,7 @@ def add_moved(
 
     Parameters
     ----------
-    table, breakpoints, chunk, scale
+    table, breakpoints, chunk, runs, scale
         See `add_gram`.
     coefficients : array, shape (parameters,)
         c.
@@ -609,4 +641,4 @@ def add_moved(
         ``[M, r]^T [M, r]``, upper triangle, changed in place; entries mean the sum with their mirror images.
     """
     label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients[None], dense_weights[None])
-    _sums(_MOVED, table, breakpoints, chunk, scale, label, models, (square[None], cross[None], dense_cross))
+    _sums(_MOVED, table, breakpoints, chunk, runs, scale, label, models, (square[None], cross[None], dense_cross))

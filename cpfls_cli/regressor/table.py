@@ -213,15 +213,16 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     """
-    settings = structure.settings
+    settings, program = structure.settings, _Layout(structure).program()
     return Table(
-        program=_Layout(structure).program(),
+        program=program,
         parameters=structure.parameters,
         breakpoints=sum(max(partition.functions - 2, 0) for partition in structure.partitions),
         circular=structure.circular,
         data_range=settings.input_map == "data-range",
         harmonic_order=settings.harmonic_order if settings.consequents == "harmonic" else 0,
         ranges=np.array([(data_range.minimum, data_range.maximum) for data_range in ranges]),
+        antecedents=tuple(np.unique(program.partitions[:, 0]).tolist()),
     )
 
 
