@@ -148,6 +148,12 @@ def run(cpfls: Path, output: Path, names: list[str]) -> None:
             said = f"$ cpfls {line}\nexit code {done.returncode}\n{done.stdout}--- stderr\n{_calm(done.stderr)}"
             (folder / f"{number:02}.said").write_text(said.replace(str(folder), "."))
             print(f"{name}: {line[:90]}: {done.returncode} in {time.perf_counter() - begun:.1f} s", flush=True)
+        for file in sorted(folder.rglob("*.h5")):
+            for words in ("-v", "--json"):
+                done = subprocess.run(
+                    [cpfls, "info", file, words], capture_output=True, text=True, env=os.environ | {"COLUMNS": "120"}
+                )
+                file.with_suffix(f".info{words}").write_text(done.stdout.replace(str(folder), "."))
         for page in folder.rglob("*.html"):
             words = _Words()
             words.feed(page.read_text())
@@ -159,21 +165,30 @@ def _calm(text: str) -> str:
     return re.sub(r" in [\d.]+ (s|min)\b|\([\d.]+ k?MB?\)|\b[\d.]+ s elapsed", "", text)
 
 
+_HASHES = re.compile(r"\b(?:[0-9a-f]{64}|[0-9a-f]{12})\b|\b\d+ bytes|\b[1-9]\.\d+\.\d+\b")
+"""What differs with every change of a file or the version."""
+_CHECKOUT = re.compile(r"/\S+(?=/(?:configs|data)/)")
+
+
+def _plain(text: str) -> list[str]:
+    """Leave out hashes, and where the checkout lies."""
+    return [_HASHES.sub("#", _CHECKOUT.sub("CHECKOUT", line)) for line in text.splitlines()]
+
+
 def hold(old: Path, new: Path) -> int:
     """Print what differs between two runs; gives the number of files that do."""
     paths = sorted({each.relative_to(root) for root in (old, new) for each in root.rglob("*") if each.is_file()})
     differing = 0
     for path in paths:
-        if path.suffix not in (".said", ".words", ".h5", ".json", ".yaml", ".c", ".xml"):
+        if path.suffix not in (".said", ".words", ".h5", ".json", ".yaml", ".c", ".xml", ".info-v"):
             continue
         if not (old / path).exists() or not (new / path).exists():
             lines = [f"only in {(old if (old / path).exists() else new)}"]
         elif path.suffix == ".h5":
             lines = _numbers_differ(old / path, new / path)
         else:
-            lines = list(
-                difflib.unified_diff(*((root / path).read_text().splitlines() for root in (old, new)), lineterm="", n=0)
-            )[2:]
+            one, other = (_plain((root / path).read_text()) for root in (old, new))
+            lines = list(difflib.unified_diff(one, other, lineterm="", n=0))[2:]
         if lines:
             differing += 1
             print(f"=== {path}", *lines[:60], sep="\n")

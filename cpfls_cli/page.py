@@ -7,7 +7,8 @@ Beside what Markdown has, a template knows
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
-- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page.
+- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page; an answer
+  that begins with a verdict, ``# NO CHANGE: nothing moved {good}``, is a box with the paragraphs behind it.
 
 Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 """
@@ -18,9 +19,9 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Any, cast
 from urllib.parse import quote
@@ -34,7 +35,7 @@ from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
@@ -48,6 +49,7 @@ TONES = ("good", "note", "warning", "unsure")
 _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
+_VERDICT = re.compile(r"([A-Z][A-Z -]+): (.+)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _LONG = 36
@@ -140,7 +142,7 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 
 
 @cache
-def _environment(folder: Path) -> Environment:
+def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -151,13 +153,27 @@ def _environment(folder: Path) -> Environment:
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote)
+    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **dict(added))
+    functions = {name: each for name, each in added if callable(each)}
+    made.filters.update(functions)
+    made.tests.update(functions)
     return made
 
 
-def words(template: str, given: Any, *, folder: Path = TEMPLATES, **more: Any) -> str:
-    """Word a result by its template, in which it is ``r``."""
-    return _environment(folder).get_template(f"{template}.md.j2").render(r=given, **more)
+def words(
+    template: str, given: Any, *, folder: Path = TEMPLATES, added: Mapping[str, Any] | None = None, **more: Any
+) -> str:
+    """Word a result by its template, in which it is ``r``.
+
+    Parameters
+    ----------
+    added : mapping of str to object, or None
+        What the template knows beside what all do; functions also as filters and tests.
+    **more : object
+        What it knows of this result.
+    """
+    environment = _environment(folder, tuple((added or {}).items()))
+    return environment.get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass
@@ -237,9 +253,17 @@ def _name_cells(table: Sequence[Token]) -> None:
         cell.tag = "th" if cell.type in {"td_open", "td_close"} and column == (cell.type == "td_close") else cell.tag
 
 
-def blocks(text: str) -> list[Block]:
-    """Give what a terminal shows of a page; figures are left out, and headings of nothing."""
-    made = list(_blocks(tree(text)))
+def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str = "") -> list[Block]:
+    """Give a page as blocks, without headings of nothing and figures that are not given, as on a terminal.
+
+    Parameters
+    ----------
+    pictures : mapping of str to Picture, or None
+        Figures that are shown.
+    prefix : str
+        Before their names and those of tables on the page.
+    """
+    made = list(_boxed(_blocks(tree(text), pictures or {}, prefix, count(1))))
     empty = (Heading, Folded, type(None))
     return [
         block
@@ -248,15 +272,40 @@ def blocks(text: str) -> list[Block]:
     ]
 
 
-def _blocks(nodes: Iterable[Node]) -> Iterator[Block]:
+def _boxed(given: Iterable[Block]) -> Iterator[Block]:
+    """Put paragraphs behind a verdict into its box."""
+    box: Box | None = None
+    for block in given:
+        if box and isinstance(block, Text) and block.tone == "plain":
+            box = replace(box, sentences=(*box.sentences, block.text))
+            continue
+        yield from [box] if box else []
+        box = block if isinstance(block, Box) else None
+        yield from [] if box else [block]
+    yield from [box] if box else []
+
+
+def _blocks(
+    nodes: Iterable[Node], pictures: Mapping[str, Picture], prefix: str, numbers: Iterator[int]
+) -> Iterator[Block]:
     for node in nodes:
         if node.kind == "heading":
-            yield Heading(_plain_line(node.text))
+            text = _plain_line(node.text)
+            verdict = _VERDICT.fullmatch(text) if node.level == 1 else None
+            tone = cast(Tone, next((mark for mark in node.marks if mark in TONES), "note"))
+            yield Box(verdict[1], verdict[2], (), tone) if verdict else Heading(text)
         elif node.kind == "fold":
-            yield Folded(_plain_line(node.text), list(_blocks(node.inner)))
+            inner = list(_blocks(node.inner, pictures, prefix, numbers))
+            yield Folded(_plain_line(node.text), inner, "open" in node.marks)
+        elif node.kind == "figure" and node.name in pictures:
+            caption = _plain_line(node.text)
+            yield Plot(f"{prefix}{node.name}", caption, pictures[node.name], caption)
         elif node.kind == "words":
             for each in SyntaxTreeNode(_markdown().parse(node.text)).children:
-                yield from _blocks_of(each)
+                for block in _blocks_of(each):
+                    if prefix and isinstance(block, Table):
+                        block = replace(block, name=f"{prefix}table-{next(numbers)}")
+                    yield block
 
 
 def _plain_line(text: str) -> str:

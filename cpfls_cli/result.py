@@ -34,6 +34,8 @@ class About(NamedTuple):
         Whether values may be missing: not finite.
     least : float
         Below which no value is.
+    ascends : bool
+        Whether each value is above the one before, and there are two at least.
     brief : bool
         Whether `--json` shows it too; what is not is in the file alone.
     """
@@ -44,6 +46,7 @@ class About(NamedTuple):
     frame: str = "none"
     gaps: bool = False
     least: float = -np.inf
+    ascends: bool = False
     brief: bool = True
 
 
@@ -83,6 +86,11 @@ class Described(NamedTuple):
     about: About | None
     default: Any
     optional: bool
+
+    @property
+    def required(self) -> bool:
+        """Whether every file holds it."""
+        return self.default is MISSING
 
     @property
     def named(self) -> bool:
@@ -164,13 +172,16 @@ def column(rows: Iterable[Any], name: str) -> list[Any]:
     return [getattr(row, name) for row in rows]
 
 
-def datasets(cls: Any, prefix: str = "") -> Iterator[tuple[str, Described]]:
-    """List the values of a result by path, for documentation."""
+def datasets(cls: Any, prefix: str = "", row: str = "", required: bool = True) -> Iterator[tuple[str, Described]]:
+    """List the values of a result by path, for documentation; those of tables have an axis of their rows first."""
     for own in described_fields(cls):
+        needed = required and own.required
         if own.about:
-            yield f"{prefix}{own.name}", own
+            about = own.about._replace(axes=(row, *own.about.axes) if row else own.about.axes)
+            yield f"{prefix}{own.name}", own._replace(about=about, default=MISSING if needed else None)
         else:
-            yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}")
+            inner = own.name if row or own.table else ""
+            yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}", inner, needed)
 
 
 @result

@@ -9,22 +9,28 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.job import Progress, take_inputs
+from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
-from cpfls_cli.report.content import Facts, Folded, Table, Text
+from cpfls_cli.report.canvas import picture_of
+from cpfls_cli.report.content import Box, Facts, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.forms import Form
+from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
+from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import datasets, plain
 
+PAGE = "report.html"
+"""File of the page of a folder with one answer."""
 _INDEX = "index"
 """File of the page over several results, and the end of the name of its template."""
 
@@ -39,62 +45,96 @@ class _Taken:
     cautions: dict[str, None] = field(default_factory=dict)
 
 
-@dataclass
-class Run:
-    """One run of a stage.
+@dataclass(frozen=True)
+class Filled:
+    """A folder with one answer: files of results, ``report.html`` with all of them, the answer as JSON, what runs keep.
 
     Attributes
     ----------
-    output : Path or None
-        File or folder that is written; None where the answer is only printed.
-    dry_run : bool
-        The stage checks its inputs, and gives None in place of a result.
-    progress, reads : callable
-        Take note of work done, and of every file that is read.
-    study, config : Study, Path, or None
-        Of a stage with a study.
-    next : list of Command
-        To go on with.
+    parts : mapping from str to (str, str)
+        Parts of the result that lie in files of their own, in the order in which they follow from each other: of each
+        the stage that it is a result of, and the part that is an input of it, or nothing. A part that is None has no
+        file. Without parts the result itself lies in a file, named as the stage is.
+    texts : mapping from str to callable
+        Further files: text that is made of the result.
+    kept : str
+        Folder in it that runs of the stage keep files in for each other.
+    grows : bool
+        Whether a folder that the stage filled can be filled again without ``--force``.
     """
 
-    output: Path | None = None
-    force: bool = False
-    dry_run: bool = False
-    progress: Progress = lambda *_: None
-    reads: Callable[[Path], None] = lambda _: None
-    study: Study | None = None
-    config: Path | None = None
+    parts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    kept: str = ""
+    grows: bool = False
+
+
+@dataclass
+class Run(Job):
+    """One run of a stage; in a dry run it checks its inputs, and gives None in place of a result.
+
+    Attributes
+    ----------
+    writes : bool
+        False where the answer is only printed: the output then names nothing.
+    next : list of Command
+        To go on with.
+    exit_code : int
+        Of an answer that a script has to tell from others.
+    with_config : bool
+        Whether the stage takes a config, which its results hold.
+    files : dict of str to InputFile
+        Inputs of all results, by role.
+    outputs : list of Path
+        Files that will be written, as far as they are known before: no input is one of them.
+    also : dict of str to object
+        What ``--json`` says of this run beside its result.
+    last_words : str
+        Behind the answer.
+    """
+
+    writes: bool = True
     next: list[Command] = field(default_factory=list)
-    inputs: list[Path] = field(default_factory=list)
+    exit_code: int = 0
+    with_config: bool = True
+    files: dict[str, InputFile] = field(default_factory=dict)
+    outputs: list[Path] = field(default_factory=list)
+    also: dict[str, Any] = field(default_factory=dict)
+    last_words: str = ""
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
         """Check inputs, and take note of what they hold: those of all results, or of the one of this name."""
         own = self._of(of)
         own.files.update(take_inputs(own, roles))
-        if self.output is not None:
-            refuse_inputs(self.output, self.inputs)
+        for path in self.outputs:
+            refuse_inputs(path, self.inputs)
         return own.files
 
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
 
-    def cautions(self, *of: str) -> tuple[str, ...]:
+    def cautions_of(self, *names: str) -> tuple[str, ...]:
         """List what speaks against results of these names, and against all."""
-        return tuple(dict.fromkeys(each for name in ("", *of) for each in self._of(name).cautions))
+        return tuple(dict.fromkeys(each for name in ("", *names) for each in self._of(name).cautions))
 
-    def origin(self, of: str = "") -> store.Origin:
-        """Tell where a result comes from."""
+    def origin(self, stage: str, of: str = "") -> store.Origin:
+        """Say where a result comes from."""
         return store.Origin(
-            inputs={**self._of("").files, **self._of(of).files},
-            seed=self.study.seed if self.study else None,
-            config=resolved_yaml(self.study) if self.study else "",
-            cautions=self.cautions(of),
+            stage=stage,
+            inputs={**self.files, **self._of(of).files},
+            seed=self.study.seed if self.with_config else None,
+            config=resolved_yaml(self.study) if self.with_config else "",
+            cautions=self.cautions_of(of),
         )
 
-    def _of(self, name: str) -> _Taken:
-        return self._taken.setdefault(name, _Taken(self.reads, self.inputs))
+    def go_on(self, command: str, *words: str | Path, output: Path) -> None:
+        """Name a command that goes on with the config of this run."""
+        self.next.append(go_on(self, command, *words, output=output))
+
+    def _of(self, name: str) -> Run | _Taken:
+        return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
 
 @dataclass(frozen=True)
@@ -108,19 +148,31 @@ class Stage:
         name, with a page each; or None in a dry run.
     kind : type
         Class of the result.
+    title : str
+        Of the section of a report that shows it.
     figures : mapping from str to callable
-        HTML of each figure of the template, made of the result.
+        Of each figure of the template its HTML, made of the result: `Drawn` of `report.canvas`, or a function.
+    words : mapping from str to object
+        What the template uses beside what all templates know: functions, also as filters and tests, and constants.
     folder : bool
-        Whether its output is a folder, and may be left out: the answer is only printed then.
+        Whether its output is a folder with a page for each result; left out, the answer is only printed.
+    fills : Filled or None
+        Whether its output is a folder with one answer.
     study : bool
         Whether it takes a config.
+    several : bool
+        Whether options that may be repeated take all values that follow.
     """
 
     function: Callable[..., Any]
     kind: Any
+    title: str
     figures: Mapping[str, Callable[[Any], str]]
+    words: Mapping[str, Any]
     folder: bool
+    fills: Filled | None
     study: bool
+    several: bool
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -128,40 +180,82 @@ class Stage:
 
     @property
     def name(self) -> str:
-        """Of the command."""
-        return str(self.kind.FORMAT).removeprefix("cpfls/")
+        """Of the command: that of its module."""
+        return self.function.__module__.rpartition(".")[2].replace("_", "-")
 
-    def text(self, given: Any, ending: str = "") -> str:
-        """Word a result, or all results by name where the ending says so."""
+    def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
+        """Word a result, or all results by name where the ending says so.
+
+        Parameters
+        ----------
+        about : Source or None
+            Where the result comes from, for templates that name it: ``source``.
+        """
         module = sys.modules[self.function.__module__]
         folder = Path(str(module.__file__)).parents[1] / "templates"
-        return page.words(self.name.replace("-", "_") + ending, given, folder=folder)
+        template = self.name.replace("-", "_") + ending
+        return page.words(template, given, folder=folder, added=self.words, source=about)
 
-    def page(self, title: str, given: Any) -> str:
+    def page(self, title: str, given: Any, about: Source | None = None) -> str:
         """Write the page of a result."""
-        figures = {name: lambda draw=draw: draw(given) for name, draw in self.figures.items()}
-        return page.html(title, self.text(given), figures)
+
+        def html(name: str) -> str:
+            picture = picture_of(self.figures[name], name, given)
+            return "" if picture is None else figure_html(picture)
+
+        figures = {name: partial(html, name) for name in self.figures}
+        return page.html(title, self.text(given, about=about), figures)
+
+    def verdict(self, about: Source) -> list[Box]:
+        """Give the verdict on a result, where its template begins with one, for the summary of a report."""
+        return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
+
+    def section(self, about: Source, number: int) -> Section:
+        """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
+
+        That stands in the summary.
+        """
+        pictures = {
+            name: picture
+            for name, draw in self.figures.items()
+            if (picture := picture_of(draw, f"{self.name}-{number}-{name}", about.record)) is not None
+        }
+        anchor = self.name if number == 1 else f"{self.name}-{number}"
+        blocks = page.blocks(self.text(about.record, about=about), pictures, f"{self.name}-{number}-")
+        shown = (block for block in blocks if not isinstance(block, Box))
+        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *shown])
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
-        if run.output is not None:
+        if run.writes:
             self._check(run, run.output)
         found = self.function(run, **given)
         if found is None:
-            where = f"{run.output}: would be written; " if run.output else ""
-            return Outcome({"dry_run": True}, (Text(f"{where}all inputs are good"),))
+            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
+            where = where if run.writes else ""
+            named = {"output": str(run.output)} if run.writes else {}
+            config = "the config and " if self.study else ""
+            return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
-        if run.output is not None:
+        if run.writes:
             self._write(run, run.output, results)
+        if self.fills and run.writes:
+            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
-        texts = [*([self.text(results, f"_{_INDEX}")] if several else []), *map(self.text, results.values())]
-        cautions = run.cautions(*results)
+        texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
+        texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+        cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
-            {**summary, **({"cautions": list(cautions)} if cautions else {})},
-            (*(block for text in texts for block in page.blocks(text)), *caution_texts(cautions)),
+            {**summary, **run.also, **({"cautions": list(cautions)} if cautions else {})},
+            (
+                *(block for text in texts for block in page.blocks(text)),
+                *([Text(run.last_words)] if run.last_words else []),
+                *caution_texts(cautions),
+            ),
+            run.exit_code,
             next=tuple(run.next),
-            written=run.output,
+            written=run.output if run.writes else None,
         )
 
     def info(self, path: Path) -> Outcome:
@@ -177,7 +271,7 @@ class Stage:
         return Outcome(
             {**summary, "cautions": list(origin.cautions), "result": plain(given)},
             (
-                *page.blocks(self.text(given)),
+                *page.blocks(self.text(given, about=source_of_result(given, origin, path, path.name, ""))),
                 *caution_texts(origin.cautions),
                 Folded("where it comes from", [Facts(made)]),
                 Folded(f"what its {len(rows)} datasets hold", [table]),
@@ -187,12 +281,30 @@ class Stage:
 
     def report(self, path: Path, form: Form) -> str:
         """Write the page of a file in any form."""
-        given, _ = store.read(path, self.kind)
+        given, origin = store.read(path, self.kind)
         if form is Form.JSON:
             return json.dumps(plain(given), allow_nan=False, indent=2) + "\n"
-        return page.markdown(self.text(given)) if form is Form.MARKDOWN else self.page(path.stem, given)
+        about = source_of_result(given, origin, path, path.name, "")
+        return (
+            page.markdown(self.text(given, about=about))
+            if form is Form.MARKDOWN
+            else self.page(path.stem, given, about)
+        )
+
+    def _source(self, run: Run, name: str, given: Any) -> Source:
+        """Name a result of this run as its file will be."""
+        label = f"{name or self.name}.h5" if self.folder or self.fills else run.output.name
+        return source_of_result(given, run.origin(self.name, name), run.output, label, "", run.study)
 
     def _check(self, run: Run, output: Path) -> None:
+        if self.fills:
+            names = self._names(self.fills)
+            run.outputs = [output / name for name in names]
+            first = next(iter(self.fills.parts.values()), (self.name, ""))[0]
+            again = self.fills.grows and store.stage_of(output / names[0]) == first
+            check_folder(output, run.force or again, names, kept=self.fills.kept)
+            return
+        run.outputs = [output]
         if not self.folder:
             check_output(output, run.force, run.inputs)
             return
@@ -202,9 +314,39 @@ class Stage:
             )
         check_folder(output, run.force, ())
 
+    def _names(self, fills: Filled) -> list[str]:
+        results = (f"{name}.h5" for name in fills.parts or (self.name,))
+        return [*results, PAGE, f"{self.name}.json", *fills.texts]
+
+    def _fill(self, run: Run, output: Path, given: Any, fills: Filled) -> None:
+        """Write what one answer fills a folder with."""
+        parts = fills.parts or {self.name: (self.name, "")}
+        results = {name: getattr(given, name) if fills.parts else given for name in parts}
+        held = {name: each for name, each in results.items() if each is not None}
+        for name, each in held.items():
+            store.require_sound(output / f"{name}.h5", each)
+        with filled_folder(output, self._names(fills)) as folder:
+            for name, each in held.items():
+                stage, before = parts[name]
+                origin = run.origin(stage, name)
+                made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
+                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+            cautions = run.cautions_of(*parts)
+            summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
+            write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
+            for name, text in fills.texts.items():
+                write_text(folder / name, text(given))
+            # Above this module: a report shows results of all stages. Without a bar of its own: that is of the whole.
+            report = import_module("cpfls_cli.commands.report")
+            quiet = replace(run, output=folder / PAGE, progress=lambda *_: None, reads=lambda _: None)
+            report.run(quiet, [folder / f"{name}.h5" for name in held])
+
     def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
+        if self.fills:
+            self._fill(run, output, results[""], self.fills)
+            return
         if not self.folder:
-            store.write(output, results[""], run.origin())
+            store.write(output, results[""], run.origin(self.name))
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
@@ -214,8 +356,8 @@ class Stage:
             store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, names) as folder:
             for name, each in results.items():
-                store.write(folder / f"{name}.h5", each, run.origin(name))
-                write_text(folder / f"{name}.html", self.page(name, each))
+                store.write(folder / f"{name}.h5", each, run.origin(self.name, name))
+                write_text(folder / f"{name}.html", self.page(name, each, self._source(run, name, each)))
             for name, every in several.items():
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
 
@@ -228,12 +370,16 @@ def loaded(module: str) -> Stage:
 def stage(
     kind: Any,
     *,
+    title: str = "",
     figures: Mapping[str, Callable[[Any], str]] | None = None,
+    words: Mapping[str, Any] | None = None,
     folder: bool = False,
+    fills: Filled | None = None,
     study: bool = False,
+    several: bool = False,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, figures or {}, folder, study)
+    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

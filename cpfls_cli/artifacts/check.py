@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import h5py
 import numpy as np
 
-from cpfls_cli.artifacts.formats import record_of_format, stage_of_format
+from cpfls_cli.artifacts.formats import record_of_format, stage_module
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import (
     CONFIG,
@@ -25,16 +26,13 @@ from cpfls_cli.artifacts.spec import (
 )
 from cpfls_cli.errors import InputError, NotAnArtifactError
 from cpfls_cli.files import is_hdf5, is_sealed, read_content, text_sha256
+from cpfls_cli.version import __version__
 from cpfls_cli.words import some
 
 # Text in memory and in a file.
 _KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
 _LARGEST = 1e150
 """Nothing that is measured or computed comes near; the square of a larger number is none."""
-_MODEL, _MODELS_SINCE = "cpfls/model", 2
-"""Schema version since which all models are of one format."""
-_FORMER = {"cpfls/extended": "extend", "cpfls/vehicle": "vehicle"}
-"""Formats that models had before, and the commands that make them."""
 _BLOCK = 1 << 18
 """Numbers that are checked at a time."""
 
@@ -283,16 +281,61 @@ def _identify(path: Path, file: h5py.File) -> Format:
         raise InputError(
             f"{path}: schema_version = {version}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
         )
-    if name in _FORMER or (name == _MODEL and version < _MODELS_SINCE):
-        raise InputError(
-            f"{path}: a model written by an earlier cpfls, before all models shared one format; make it again with "
-            f"`cpfls {_FORMER.get(name, 'identify')}`"
-        )
+    if version < SCHEMA_VERSION:
+        raise old_file(path, file)
     known = record_of_format(name, _text_attribute(file, "kind") or "")
     if known is None:
-        where = "command; `cpfls info` shows what it holds" if stage_of_format(name) else "cpfls"
+        where = "command; `cpfls info` shows what it holds" if stage_module(file.attrs) else "cpfls"
         raise InputError(f"{path}: format = '{name}': not known to this {where}")
     return known.spec()
+
+
+def old_file(path: Path, file: h5py.File) -> InputError:
+    """Say of a file of an earlier version that it has to be made again."""
+    version = file.attrs.get("cpfls_version", "1")
+    return InputError(f"{path}: was written by cpfls {version}, whose files this version does not read; make it again")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Where the result of a stage comes from.
+
+    Attributes
+    ----------
+    stage : str
+        That made it, as its command is typed.
+    inputs : mapping of str to InputFile
+        By role.
+    seed : int or None
+        None where nothing is drawn.
+    config : str
+        The resolved study; empty where there is none.
+    cautions : tuple of str
+        What speaks against what it rests on.
+    """
+
+    stage: str
+    inputs: Mapping[str, InputFile] = field(default_factory=dict)
+    seed: int | None = None
+    config: str = ""
+    cautions: tuple[str, ...] = ()
+    version: str = __version__
+
+
+def origin_of(file: h5py.File) -> Origin:
+    """Read where a result comes from."""
+    inputs = {
+        role: InputFile(*(str(own.attrs[key]) for key in ("name", "sha256", "format")))
+        for role, own in file.get(INPUTS, {}).items()
+    }
+    return Origin(
+        stage=str(file.attrs["stage"]),
+        inputs=inputs,
+        seed=int(file.attrs["seed"]) if "seed" in file.attrs else None,
+        config=bytes(file[CONFIG][()]).decode() if CONFIG in file else "",
+        cautions=tuple(str(file.attrs["cautions"]).splitlines()),
+        version=str(file.attrs["cpfls_version"]),
+    )
 
 
 def _read_header(file: h5py.File) -> Header:

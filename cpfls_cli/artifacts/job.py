@@ -36,7 +36,7 @@ def _uninterrupted() -> AbstractContextManager[Interrupted]:
     return nullcontext(lambda: None)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Job:
     """One run of a stage.
 

@@ -16,17 +16,20 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.check import (
+    Origin,
     Stored,
     check_artifact,
     check_structure,
     check_values,
     one_line,
     opened,
+    opened_file,
+    origin_of,
     refuse,
     require_all,
     stored_of,
 )
-from cpfls_cli.artifacts.formats import record_of_format
+from cpfls_cli.artifacts.formats import record_of_format, stage_module
 from cpfls_cli.artifacts.output import EnduringFile, sealed_output
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import (
@@ -200,6 +203,19 @@ def _origin_of(state: FileState) -> _Origin:
         return _Origin(stored.spec, stored.header, {name: own.shape for name, own in stored.data.items()})
 
 
+class _Result(NamedTuple):
+    """What the result of a stage is, and where it comes from."""
+
+    format: str
+    header: Origin
+
+
+@lru_cache(maxsize=64)
+def _result_of(state: FileState) -> _Result | None:
+    with opened_file(state.path) as file:
+        return _Result(str(file.attrs["format"]), origin_of(file)) if stage_module(file.attrs) else None
+
+
 @dataclass(frozen=True)
 class Outline:
     """What an artifact holds, without what is large.
@@ -248,14 +264,8 @@ def findings_of(path: Path) -> tuple[Format, list[str]]:
 
 def format_name(path: Path) -> str | None:
     """Tell the format of a file without reading it whole; None where it is no artifact."""
-    known = _known(path, _origin_of)
-    return None if known is None else known.spec.name
-
-
-def kind_name(path: Path) -> str | None:
-    """Tell the kind that a file is of its format without reading it whole; None where it is no artifact."""
-    known = _known(path, _origin_of)
-    return None if known is None else known.spec.kind
+    known, result = _known(path, _origin_of), _known(path, _result_of)
+    return known.spec.name if known else result.format if result else None
 
 
 def holds(path: Path, wanted: type[Record]) -> bool:
@@ -264,9 +274,9 @@ def holds(path: Path, wanted: type[Record]) -> bool:
     return known is not None and wanted.spec().includes(known.spec)
 
 
-def read_header(path: Path) -> Header:
+def read_header(path: Path) -> Header | Origin:
     """Read where an artifact comes from, and none of its data."""
-    known = _known(path, _origin_of)
+    known = _known(path, _origin_of) or _known(path, _result_of)
     if known is not None:
         return known.header
     with opened(path) as stored:

@@ -2,24 +2,60 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
-from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cpfls_cli.arguments import (
+    AnywayOption,
+    ArtifactsArgument,
+    AutopilotChoice,
+    ChooseOnOption,
+    DiagnosisArgument,
+    DisagreementArgument,
+    EveryOption,
+    ExportAnywayOption,
+    ExportedArgument,
+    ExportFormat,
+    FileArgument,
+    FlightArgument,
+    FlightsArgument,
+    Flown,
+    FlownArgument,
+    FolderOption,
+    HeldOutOption,
+    HistoryOption,
+    HoldOption,
+    HorizonOption,
+    JudgedOption,
+    LogArgument,
+    LogsArgument,
+    ModelArgument,
+    ModelOption,
+    PlayedArgument,
+    ResumeOption,
+    ResumeSweepOption,
+    SchedulerOption,
+    SweepTimeLimitOption,
+    TimeLimitOption,
+    TimeOrder,
+    TrainingArgument,
+    ValidateOption,
+    WorkersOption,
+    WriteConfigOption,
+    moments,
+)
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
     SeveralAfterOption,
-    moments,
     refuse_overrides,
-    seconds,
     sheet,
     with_common,
 )
@@ -40,15 +76,15 @@ from cpfls_cli.cli.path_options import (
     ToTellOption,
     WaypointsOption,
 )
-from cpfls_cli.cli.stages import AllCommands
+from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
-from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
+from cpfls_cli.errors import InputError
+from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from typer.core import TyperCommand
 
@@ -66,178 +102,6 @@ app = typer.Typer(
     # Lines behind a backspace stay as they are.
     help=f"From flight logs: what a model of a multirotor misses, and how far to trust it.\n\n\b\n{sheet()}",
 )
-
-FlownArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="TRAJECTORY", help="Made by `cpfls trajectory`; or a flight or log, whose setpoints --autopilot flies."
-    ),
-]
-FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`.")]
-TrainingArgument = Annotated[
-    list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
-]
-LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
-LogsArgument = Annotated[
-    list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
-]
-ModelArgument = Annotated[
-    Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
-]
-ExportedArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
-        "disagreement, diagnosis or response.",
-    ),
-]
-FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
-ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
-FlightsArgument = Annotated[
-    list[Path],
-    typer.Argument(metavar="FLIGHT...", help=f"Flights, or logs ({formats_in_words()}) that the config describes."),
-]
-DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
-DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]
-FolderOption = Annotated[
-    Path, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill.", show_default=False)
-]
-ModelOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--model",
-        metavar="MODEL",
-        help="Made by `cpfls identify` or `vehicle` (`compare` takes one of `extend` too); default: the vehicle of "
-        "the config.",
-    ),
-]
-WriteConfigOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--write-config", metavar="FILE", help="Write the config again with the numbers of a finished search."
-    ),
-]
-HeldOutOption = Annotated[
-    list[Path] | None,
-    typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing from it; may be repeated."),
-]
-ValidateOption = Annotated[
-    list[Path] | None,
-    typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
-]
-ChooseOnOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--choose-on",
-        metavar="FLIGHT",
-        help="Choose the model on this flight (identification.choice: held-out); may be repeated.",
-    ),
-]
-ResumeOption = Annotated[
-    bool, typer.Option("--resume", help="Go on with a search that was stopped, from OUTPUT.checkpoint.")
-]
-TimeLimitOption = Annotated[
-    float | None,
-    typer.Option(
-        "--time-limit",
-        metavar="TIME",
-        parser=seconds,
-        help="Stop the search after TIME (90, 90s, 10m, 2h) and write the best so far; --resume goes on.",
-    ),
-]
-AnywayOption = Annotated[
-    bool,
-    typer.Option(
-        "--anyway",
-        help="Search in logs that contradict themselves, or are too slow to tell what is sought, too; nothing found "
-        "there is to be used.",
-    ),
-]
-ExportAnywayOption = Annotated[
-    bool,
-    typer.Option(
-        "--anyway",
-        help="Also where numbers of the model are impossible, its search was stopped or its verdict is do-not-use; the "
-        "file says so first.",
-    ),
-]
-ResumeSweepOption = Annotated[
-    bool,
-    typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
-]
-SweepTimeLimitOption = Annotated[
-    float | None,
-    typer.Option(
-        "--time-limit",
-        metavar="TIME",
-        parser=seconds,
-        help="Stop all runs together after TIME (90, 90s, 10m, 2h) and write the finished ones; --resume goes on.",
-    ),
-]
-
-
-PlayedArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; or the word vehicle: that of the config.",
-    ),
-]
-JudgedOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--model",
-        metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; default: the vehicle of the config.",
-    ),
-]
-HorizonOption = Annotated[
-    float | None,
-    typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); default: half a second."),
-]
-HistoryOption = Annotated[
-    float | None,
-    typer.Option(
-        "--history",
-        metavar="TIME",
-        parser=seconds,
-        help="Use so much of the flight before each start too (0.5, 0.5s), where `cpfls vehicle` found a forecast "
-        "for that.",
-    ),
-]
-EveryOption = Annotated[int, typer.Option("--every", metavar="N", min=1, help="Begin at every N-th sample.")]
-
-Between = StrEnum("Between", "linear previous")
-"""What a rotor speed is between samples."""
-
-HoldOption = Annotated[
-    Between | None,
-    typer.Option(
-        "--hold",
-        help="Between samples a rotor speed is a straight line, or its last value; default: the first for measured "
-        "speeds, the second for commands.",
-    ),
-]
-
-TimeOrder = StrEnum("TimeOrder", "date name given")
-"""What tells which flight came first."""
-ExportFormat = StrEnum(
-    "ExportFormat", "json c python sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv"
-)
-"""What a model is exported as."""
-AutopilotChoice = StrEnum("AutopilotChoice", "px4 ardupilot betaflight crazyflie")
-"""Whose control law is meant."""
-Flown = StrEnum("Flown", "sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax")
-"""What an exported vehicle is flown in."""
-
-WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler", metavar="ADDRESS", help="Evaluate on the workers of this Dask scheduler (tcp://host:port)."
-    ),
-]
 
 
 def _version(asked: bool) -> None:
@@ -314,10 +178,8 @@ def simulate(
         typer.Option(
             "--model",
             metavar="MODEL",
-            help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
-            "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
-            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top. Along "
-            "a FLIGHT: fly it beside the vehicle of the config.",
+            help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
+            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
         ),
     ] = None,
     mode: Annotated[
@@ -325,8 +187,8 @@ def simulate(
         typer.Option(
             "--mode",
             metavar="MODE",
-            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it; "
-            "computed-torque: attitude control by --model. Overrides simulation.mode.",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
+            "Overrides simulation.mode.",
         ),
     ] = None,
     effect: Annotated[
@@ -418,12 +280,6 @@ def init(
 def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, common: Common) -> None:
     """Turn a flight log into a flight."""
     _run("import", config, output, common, lambda command, job: command.run(job, log))
-
-
-@_command()
-def reduce(config: ConfigArgument, flights: TrainingArgument, output: OutputOption, *, common: Common) -> None:
-    """Pick the samples of flights that are worth learning from."""
-    _run("reduce", config, output, common, lambda command, job: command.run(job, flights))
 
 
 @_command()
@@ -855,10 +711,25 @@ def verify_export(
 
 
 @_command()
-def info(file: FileArgument, *, common: Common) -> None:
-    """Show what the command that wrote an artifact answered, what it holds and where it comes from."""
+def info(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Any artifact.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--format", metavar="NAME", help="Describe the datasets of a format, such as flight.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Show what the command that wrote an artifact answered, what it holds and where it comes from.
+
+    Without FILE, list all formats, or describe one.
+    """
     with messages_for_errors():
-        tell(_of("show").info(file), common)
+        if file is None:
+            tell(_of("formats").run(name), common)
+        elif name is None:
+            tell(_of("show").info(file), common)
+        else:
+            raise InputError("--format describes files of a format in general: leave out FILE or --format")
 
 
 @_command()
@@ -926,17 +797,6 @@ def _run_without_config(title: str, output: Path, common: Common, call: Callable
         _run_with(validate({}, "default"), title, [], output, common, _narration(title, common), call)
 
 
-@contextmanager
-def _noted(job: Job) -> Iterator[None]:
-    """Say beside what cannot be computed what speaks against the model and the numbers that it came about with."""
-    try:
-        yield
-    except ComputationError as error:
-        for caution in list(job.cautions)[: bool(job.study.vehicle.unknown)]:
-            error.add_note(caution)
-        raise
-
-
 def _narration(title: str, common: Common) -> Narration:
     return Narration(title, common.verbose and not common.quiet)
 
@@ -967,7 +827,7 @@ def _run_with(
             open_numbers="guessed" if common.accept_guesses else "refused",
         )
         job = replace(job, config=inputs[0]) if inputs else job
-        with nullcontext() if common.dry_run else locked(output, title), _noted(job):
+        with nullcontext() if common.dry_run else locked(output, title), noted(job):
             outcome = cautioned(call(_of(title), job), job)
     if not common.dry_run:
         narration.wrote(output)

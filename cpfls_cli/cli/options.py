@@ -6,7 +6,6 @@ import copy
 import difflib
 import functools
 import inspect
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -24,7 +23,6 @@ ConfigArgument = Annotated[Path, typer.Argument(metavar="CONFIG", help="Study co
 OutputOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default=False)
 ]
-_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -96,16 +94,21 @@ class SeveralAfterOption(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat such an option before each of its values."""
-        several = {name for own in self.params if getattr(own, "multiple", False) for name in own.opts} - {"--set"}
-        given: list[str] = []
-        option = ""
-        for index, word in enumerate(args):
-            if word.startswith("-"):
-                option = word if word in several else ""
-            elif option and args[index - 1] != option:
-                given.append(option)
-            given.append(word)
-        return super().parse_args(ctx, given)
+        return super().parse_args(ctx, repeated(self.params, args))
+
+
+def repeated(params: Sequence[Any], args: Sequence[str]) -> list[str]:
+    """Repeat options that may be given several times before each of the values that follow."""
+    several = {name for own in params if getattr(own, "multiple", False) for name in own.opts} - {"--set"}
+    given: list[str] = []
+    option = ""
+    for index, word in enumerate(args):
+        if word.startswith("-"):
+            option = word if word in several else ""
+        elif option and args[index - 1] != option:
+            given.append(option)
+        given.append(word)
+    return given
 
 
 def _in_own_words(error: typer.BadParameter) -> str:
@@ -218,39 +221,6 @@ def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None
         refuse_misplaced_config(command, given, output)
         if "log" in arguments:
             refuse_misplaced_log(arguments["log"])
-
-
-def seconds(text: str) -> float:
-    """Read a duration, such as ``90``, ``90s``, ``10m`` or ``2h``.
-
-    Returns
-    -------
-    float, s
-    """
-    unit = _SECONDS.get(text[-1:])
-    try:
-        value = float(text if unit is None else text[:-1]) * (unit or 1.0)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise typer.BadParameter(f"{text!r} is not a duration; write 90, 90s, 10m or 2h")
-    return value
-
-
-def moments(text: str | Sequence[float]) -> tuple[float, float, float]:
-    """Read three moments of inertia, such as ``0.011,0.012,0.02``.
-
-    Returns
-    -------
-    tuple of float, kg m^2
-    """
-    try:
-        x, y, z = (float(part) for part in (text.split(",") if isinstance(text, str) else text))
-    except ValueError:
-        x = y = z = math.nan
-    if not all(0.0 < value < math.inf for value in (x, y, z)):
-        raise typer.BadParameter(f"{text!r} is not three moments of inertia above 0; write IXX,IYY,IZZ in kg m^2")
-    return x, y, z
 
 
 WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (

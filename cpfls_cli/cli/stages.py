@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -14,15 +14,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, with_common
+from cpfls_cli.arguments import FolderOption
+from cpfls_cli.cli.interrupts import deferred_interrupts
+from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, repeated, with_common
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
+from cpfls_cli.errors import ComputationError
 
 if TYPE_CHECKING:
-    from cpfls_cli.stage import Stage
+    from cpfls_cli.artifacts.job import Job, Progress
+    from cpfls_cli.stage import Run, Stage
 
 STAGES = Path(__file__).parents[1] / "stages"
-_FIRST = ("look",)
-"""Stages that stand at the head of the list."""
+ORDER = (
+    *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle", "predict"),
+    *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
+)
+"""Of the list of commands; what it does not name stands behind."""
 _DOCSTRING = re.compile(r'^"""(.*?)"""', re.DOTALL)
 FilledOption = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill.", show_default=False)
@@ -39,9 +46,18 @@ class StageCommand(TyperCommand):
         super().__init__(file.stem.replace("_", "-"), help=inspect.cleandoc(described[1]), rich_markup_mode=None)
 
     @cached_property
+    def _stage(self) -> Stage:
+        own: Stage = import_module("cpfls_cli.stage").loaded(self._file.stem)
+        return own
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat options that take all values that follow."""
+        return super().parse_args(ctx, repeated(self.params, args) if self._stage.several else args)
+
+    @cached_property
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        app.command(self.name)(with_common(command_of(import_module("cpfls_cli.stage").loaded(self._file.stem))))
+        app.command(self.name)(with_common(command_of(self._stage)))
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -67,18 +83,55 @@ class StageCommand(TyperCommand):
 
 
 class AllCommands(Commands):
-    """The commands of stages, and behind them all others."""
+    """The commands of stages and all others, in the order of the way through them."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        self.commands = {**stage_commands(), **self.commands}
+        every = {**stage_commands(), **self.commands}
+        self.commands = {name: every[name] for name in (*(own for own in ORDER if own in every), *every)}
 
 
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
     """List the commands of the stages in a folder."""
     files = {file.stem.replace("_", "-"): file for file in sorted(folder.glob("[a-z]*.py"))}
-    names = [*(name for name in _FIRST if name in files), *(name for name in files if name not in _FIRST)]
-    return {name: StageCommand(files[name]) for name in names}
+    return {name: StageCommand(file) for name, file in files.items()}
+
+
+def run_of(
+    own: Stage,
+    common: Common,
+    output: Path | None,
+    config: Path | None,
+    reads: Callable[[Path], None],
+    progress: Progress,
+) -> Run:
+    """Make the run of a stage, with the study of its config and what that leaves open."""
+    from cpfls_cli.artifacts.job import require_numbers
+    from cpfls_cli.config.load import validate
+    from cpfls_cli.stage import Run
+
+    study = common.study(config) if config else validate({}, "default")
+    run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
+    run.writes, run.with_config = output is not None, own.study
+    if config:
+        reads(config)
+        run.inputs.append(config)
+        run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
+        if common.numbers is not None:
+            run = import_module("cpfls_cli.commands.numbers").with_numbers_of(run, common.numbers)
+        require_numbers(run, own.name)
+    return run
+
+
+@contextmanager
+def noted(job: Job) -> Iterator[None]:
+    """Say with what cannot be computed what speaks against the numbers that it came about with."""
+    try:
+        yield
+    except ComputationError as error:
+        for caution in list(job.cautions)[: bool(job.study.vehicle.unknown)]:
+            error.add_note(caution)
+        raise
 
 
 def command_of(own: Stage) -> Callable[..., None]:
@@ -90,14 +143,11 @@ def command_of(own: Stage) -> Callable[..., None]:
     def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
         with messages_for_errors():
             from cpfls_cli.artifacts.output import locked
-            from cpfls_cli.stage import Run
 
             narration = Narration(own.name, common.verbose and not common.quiet)
-            study = common.study(config) if config else None
             with progress_bar(own.name, common) as progress:
-                run = Run(output, common.force, common.dry_run, progress, narration.reads, study, config)
-                run.inputs += [config] if config else []
-                with locked(output, own.name) if output and not common.dry_run else nullcontext():
+                run = run_of(own, common, output, config, narration.reads, progress)
+                with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
                     outcome = own.run(run, **given)
             if output and not common.dry_run:
                 narration.wrote(output)
@@ -105,7 +155,8 @@ def command_of(own: Stage) -> Callable[..., None]:
 
     keyword = inspect.Parameter.KEYWORD_ONLY
     added = {"config": ConfigArgument} if own.study else {}
-    output = inspect.Parameter("output", keyword, annotation=FilledOption if own.folder else OutputOption)
+    option = FilledOption if own.folder else FolderOption if own.fills else OutputOption
+    output = inspect.Parameter("output", keyword, annotation=option)
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
         *(each.replace(kind=keyword) for each in parameters),

@@ -12,7 +12,6 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import resolved
-from cpfls_cli.errors import InputError
 from cpfls_cli.pages.comparison import model_verdicts
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
@@ -20,15 +19,16 @@ from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.stage import loaded
-from cpfls_cli.store import stage_of
+from cpfls_cli.report.source import source_of_result
+from cpfls_cli.stage import Stage, loaded
+from cpfls_cli.store import read, stage_of
 from cpfls_cli.version import __version__
 
 
 def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
     """Write a report about artifacts."""
-    if of_stages := [path for path in artifacts if stage_of(path)]:
-        return _of_result(job, of_stages[0], artifacts, form or form_of(job.output))
+    if len(artifacts) == 1 and (name := stage_of(artifacts[0])) and not (own := loaded(name)).study:
+        return _of_result(job, own, artifacts[0], form or form_of(job.output))
     inputs = begin(job, {str(path): path for path in artifacts})
     files = {path: inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
@@ -44,12 +44,10 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     return _outcome(job.output, page, given, [*again, *equal])
 
 
-def _of_result(job: Job, path: Path, given: Sequence[Path], form: Form) -> Outcome:
+def _of_result(job: Job, own: Stage, path: Path, form: Form) -> Outcome:
     """Write the page that a result has by itself."""
-    if len(given) > 1:
-        raise InputError(f"{path}: has a page of its own, which no other artifact goes into; report on it alone")
     begin(job, {str(path): path})
-    text = loaded(stage_of(path)).report(path, form)
+    text = own.report(path, form)
     if job.dry_run:
         return nothing_written(job)
     write_text(job.output, text)
@@ -61,7 +59,13 @@ def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
     """Read artifacts of any format for a report, each under a name of its own."""
     labels = map(_printable, unique_labels(paths))
     given = zip(paths, labels, hashes, strict=True)
-    return [source_of_record(read_any(path), path, label, sha256) for path, label, sha256 in given]
+    return [_source(path, label, sha256) for path, label, sha256 in given]
+
+
+def _source(path: Path, label: str, sha256: str) -> Source:
+    if not (name := stage_of(path)):
+        return source_of_record(read_any(path), path, label, sha256)
+    return source_of_result(*read(path, loaded(name).kind), path, label, sha256)
 
 
 def source_of_record(record: Record, path: object, label: str, sha256: str) -> Source:

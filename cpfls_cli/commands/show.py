@@ -24,7 +24,6 @@ _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/trajectory": "trajectory",
-    "cpfls/selection": "selection",
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",
@@ -85,6 +84,8 @@ def artifact_that_tells(output: Path) -> Path | None:
     """Find the artifact among what a command wrote whose `info` tells its answer again; None where there is none."""
     paths = [output / "diagnosis.h5", output / "changed.h5", output / "trend.h5"] if output.is_dir() else [output]
     for path in paths:
+        if stage_of(path):
+            return path
         with suppress(InputError):
             if read_outline(path).spec.name in _PAGES:
                 return path

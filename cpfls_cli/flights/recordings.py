@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, stretches
+from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
@@ -176,7 +177,7 @@ def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
             )
 
 
-def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:
+def units_of(path: Path, made: Header | Origin, study: Study) -> Mapping[str, str]:
     """Give the units that the import of a flight read, empty for one that was simulated."""
     made_by = stored_study(made.config, path)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)

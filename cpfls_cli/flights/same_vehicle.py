@@ -7,15 +7,18 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
+from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.store import read
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 R = TypeVar("R", bound=Record)
+T = TypeVar("T")
 
 
 def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSettings) -> None:
@@ -35,6 +38,14 @@ def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
     made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
     require_same_vehicle(path, made_with, study.vehicle)
     return record
+
+
+def read_result_of_vehicle(path: Path, wanted: type[T], study: Study) -> tuple[T, Origin]:
+    """Read a result that must have been made with the vehicle of the config, and where it comes from."""
+    given, origin = read(path, wanted)
+    made_with = _with_what_was_open(_vehicle_of(path, origin), study.vehicle)
+    require_same_vehicle(path, made_with, study.vehicle)
+    return given, origin
 
 
 def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:
@@ -76,7 +87,7 @@ def _difference_of(path: Path, study: Study) -> str:
         return ""
 
 
-def _vehicle_of(path: Path, header: Header) -> VehicleSettings:
+def _vehicle_of(path: Path, header: Header | Origin) -> VehicleSettings:
     return stored_study(header.config, path).vehicle
 
 

@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import file_sha256, read_record
+from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import flight_source, part_of
 from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
+from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, joined_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.store import Origin, read
 
 REST = "held-out rest"
 # Samples whose regressor is written out at a time.
@@ -133,11 +134,11 @@ def _refuse_twice(flights: Sequence[Path], inputs: Mapping[str, InputFile] | Non
 
 
 def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray) -> IntArray:
-    record = read_record(selection, SelectionRecord)
-    _require_made_from(flights, selection, record)
-    indices = np.unique(record.indices)
-    if len(indices) == 0 or indices[0] < 0 or len(indices) != len(record.indices):
-        raise InputError(f"{selection}: indices is empty, negative or has repeats; run `cpfls reduce` again")
+    chosen, origin = read(selection, Selection)
+    _require_made_from(flights, selection, origin)
+    indices = np.unique(chosen.indices)
+    if len(indices) == 0 or len(indices) != len(chosen.indices):
+        raise InputError(f"{selection}: indices is empty or has repeats; run `cpfls reduce` again")
     if not np.isin(indices, candidates).all():
         raise InputError(
             f"{selection}: selects samples other than the {len(candidates)} training samples; "
@@ -146,8 +147,8 @@ def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray
     return indices
 
 
-def _require_made_from(flights: Mapping[Path, str], selection: Path, record: SelectionRecord) -> None:
-    sources = {role: source for role, source in record.origin.inputs.items() if role.startswith("flight")}
+def _require_made_from(flights: Mapping[Path, str], selection: Path, origin: Origin) -> None:
+    sources = {role: source for role, source in origin.inputs.items() if role.startswith("flight")}
     roles = flight_roles(list(flights))
     names = " ".join(str(path) for path in flights)
     if len(sources) != len(roles):

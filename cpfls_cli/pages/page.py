@@ -26,12 +26,10 @@ from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.response import response_blocks
-from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.tracking import tracking_blocks
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
@@ -42,6 +40,7 @@ from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.stage import loaded
 
 
 def _of_each(
@@ -69,8 +68,18 @@ def _of_each(
     return section
 
 
+def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
+    """Make the sections of all results of a stage."""
+
+    def sections(sources: Sources) -> list[Section]:
+        own = [source for source in sources.all if source.stage == name]
+        return [loaded(name).section(source, number) for number, source in enumerate(own, start=1)]
+
+    return sections
+
+
 _MODELS = attrgetter("models")
-_SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
+_SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
     comparison_section,
     models_section,
@@ -85,7 +94,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     vehicle_section,
     _of_each("path", "Training path", attrgetter("trajectories"), path_blocks),
     _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),
-    reduction_section,
+    _of_stage("reduce"),
     identification_section,
     _of_each("validation", "How far to trust it", _MODELS, validation_blocks),
     _of_each("residuals", "What the model leaves unexplained", _MODELS, residual_blocks, holds=attrgetter("residuals")),
@@ -113,14 +122,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
         lambda given: given.of_kind(FlightNumbersRecord),
         flight_numbers_blocks,
     ),
-    _of_each(
-        "tracking",
-        "Control with the model",
-        attrgetter("flights"),
-        tracking_blocks,
-        holds=attrgetter("tracking"),
-        among=True,
-    ),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )
@@ -141,7 +142,8 @@ class Page:
 
 def sections_of(sources: Sources) -> list[Section]:
     """List what there is to say of artifacts, section by section."""
-    return [section for make in _SECTIONS if (section := make(sources)) is not None]
+    made = (make(sources) for make in _SECTIONS)
+    return [each for own in made if own for each in (own if isinstance(own, list) else [own])]
 
 
 def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import count
@@ -17,7 +17,8 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.report.content import Block, Origin, Text
+from cpfls_cli.report.content import Block, Text
+from cpfls_cli.report.source import Source as Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -32,40 +33,14 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
     from cpfls_cli.artifacts.response import ResponseRecord
-    from cpfls_cli.artifacts.selection import SelectionRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.reduction.selection import Selection
 
-R = TypeVar("R", bound=Record, default=Any)
-
-
-@dataclass(frozen=True)
-class Source(Origin, Generic[R]):
-    """One artifact and the study that made it.
-
-    Attributes
-    ----------
-    config : mapping
-        The resolved study, by section and key.
-    parameters : int
-        Linear parameters of the fuzzy part that the study asks for.
-    """
-
-    record: R
-    config: Mapping[str, Any]
-    vehicle: VehicleSettings
-    parameters: int
-
-    def made_from(self, role: str) -> str | None:
-        """Hash of an input by its role; None where it had none."""
-        return self.record.made_from(role)
-
-    def input_name(self, role: str) -> str:
-        """File name of an input by its role; empty where it had none."""
-        return self.record.input_name(role)
+R = TypeVar("R", default=Any)
 
 
 class _OfFormat(Generic[R]):
@@ -75,8 +50,7 @@ class _OfFormat(Generic[R]):
         self.format = (name, kind)
 
     def __get__(self, sources: Sources, _: type[Sources]) -> list[Source[R]]:
-        formats = ((source, source.record.FORMAT) for source in sources.all)
-        return [source for source, own in formats if (own.name, own.kind) == self.format]
+        return [source for source in sources.all if (source.format, source.kind) == self.format]
 
 
 @dataclass(frozen=True)
@@ -89,7 +63,7 @@ class Sources:
 
     trajectories: ClassVar[_OfFormat[TrajectoryRecord]] = _OfFormat("cpfls/trajectory")
     flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
-    selections: ClassVar[_OfFormat[SelectionRecord]] = _OfFormat("cpfls/selection")
+    selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
     sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, Criterion
 from cpfls_cli.reduction.factor import TriangularFactor
 from cpfls_cli.reduction.survey import RowSpace
+from cpfls_cli.result import about, result
 
 StopReason = Literal["size", "condition-number", "all-samples", "pool"]
 
@@ -19,7 +20,7 @@ StopReason = Literal["size", "condition-number", "all-samples", "pool"]
 class Subset:
     """Samples of a regressor and how well they determine its parameters.
 
-    Other fields are described at `SelectionRecord`.
+    Other fields are described at `Selection`.
 
     Attributes
     ----------
@@ -41,37 +42,59 @@ class Subset:
         return self.rank == self.rank_full
 
 
-@dataclass(frozen=True)
-class Selection(Subset):
-    """A subset with the history of its selection.
+@result
+class Selection:
+    """The samples of flights that are worth learning from, with the history of their selection."""
 
-    Attributes
-    ----------
-    condition_number_trace : array, shape (size,)
-        Condition number after each sample; infinite before full rank.
-    singular_value_min_trace : array, shape (size,)
-        Smallest singular value after each sample; zero before full rank.
-    singular_value_max_trace : array, shape (size,)
-        Largest singular value after each sample.
-    rank_trace : array of int, shape (size,)
-        Numerical rank after each sample.
-    stop_reason : {"size", "condition-number", "all-samples", "pool"}
-        Which limit ended the selection; the pool where it, and not all samples, was used up.
-    exchanges : int
-        Samples that were replaced by others on the way.
-    """
+    FORMAT: ClassVar = "cpfls/selection"
+    SHOWN: ClassVar = ("selected", "stalled", "condition_number_random")
 
-    condition_number_trace: Array
-    singular_value_min_trace: Array
-    singular_value_max_trace: Array
-    rank_trace: IntArray
-    stop_reason: StopReason
-    exchanges: int = 0
+    indices: IntArray = about("indices of the samples, in order of selection", "selected", least=0, brief=False)
+    candidates: int = about("number of samples that could be selected", default=0)
+    criterion: str = about("the rule, as in reduction.criterion")
+    rank: int = about("numerical rank of the selection")
+    rank_full: int = about("numerical rank of all candidates")
+    condition_number: float = about(
+        "largest over smallest singular value, over as many as the rank of all; infinite below that rank",
+        gaps=True,
+        least=1.0,
+    )
+    condition_number_full: float = about("of all candidates, over the kept rank", least=1.0)
+    stop_reason: StopReason = about("which limit ended the selection; the pool where it, and not all, was used up")
+    exchanges: int = about("samples that were replaced by others on the way", default=0)
+    condition_number_trace: Array = about(
+        "condition number after each sample; infinite while rank deficient",
+        "selected",
+        gaps=True,
+        least=1.0,
+        brief=False,
+    )
+    singular_value_min_trace: Array = about("smallest singular value after each", "selected", unit="SI", brief=False)
+    singular_value_max_trace: Array = about("largest singular value after each", "selected", unit="SI", brief=False)
+    rank_trace: IntArray = about("numerical rank after each", "selected", brief=False)
+    random: Array | None = about(
+        "condition numbers of random selections of equal size", "draw", gaps=True, least=1.0, brief=False, default=None
+    )
+
+    @property
+    def selected(self) -> int:
+        """Number of samples."""
+        return len(self.indices)
+
+    @property
+    def full_rank(self) -> bool:
+        """Whether the samples determine everything that all candidates determine."""
+        return self.rank == self.rank_full
 
     @property
     def stalled(self) -> bool:
-        """Whether the rule ended below full rank, so that the subset must not be trained on."""
+        """Whether the rule ended below full rank, so that the selection must not be trained on."""
         return not self.full_rank
+
+    @property
+    def condition_number_random(self) -> float:
+        """Condition number of random selections of equal size, the median; NaN where none was drawn."""
+        return float(np.median(self.random)) if self.random is not None and len(self.random) else float("nan")
 
     def beginning(self, size: int) -> Selection | None:
         """Give what a smaller size would have chosen, or None where this selection did not begin with it.

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.report.content import Panel, Plot
+from cpfls_cli.report.content import Panel, Picture, Plot
 from cpfls_cli.report.numbers import plain, power_of_ten
 
 if TYPE_CHECKING:
@@ -146,6 +146,54 @@ class _Drawing:
             self.draw(figure)
             _show_as_written(figure)
             yield figure
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure of a result.
+
+    Attributes
+    ----------
+    height : float, inch, or callable
+        At a width of 7.6; or what gives it, of the result.
+    draw : callable
+        Fills the figure, with the result before it.
+    holds : callable
+        Whether there is anything to draw.
+    """
+
+    description: str
+    height: float | Callable[[Any], float]
+    draw: Callable[[Any, Figure], None]
+    holds: Callable[[Any], object] = bool
+
+    def __call__(self, given: Any) -> str:
+        """Write it as HTML, under no name."""
+        picture = picture_of(self, "figure", given)
+        return "" if picture is None else picture.svg
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A figure that is HTML already."""
+
+    svg: str
+    panels: Sequence[Panel] = ()
+
+    def figure(self) -> Figure:
+        """Draw nothing."""
+        raise NotImplementedError("it is HTML alone")
+
+
+def picture_of(draw: Callable[[Any], str], name: str, given: Any) -> Picture | None:
+    """Give a figure of a result, its ids beginning with a name; None where there is nothing to draw."""
+    if isinstance(draw, Drawn):
+        if not draw.holds(given):
+            return None
+        height = draw.height(given) if callable(draw.height) else draw.height
+        return _Drawing(name, draw.description, height, lambda figure: draw.draw(given, figure))
+    written = draw(given)
+    return _Written(written) if written else None
 
 
 def _panels_of(figure: Figure) -> list[Panel]:

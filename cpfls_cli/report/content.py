@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
+from cpfls_cli import store
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import Header, Record
+from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.files import text_sha256
 
 if TYPE_CHECKING:
@@ -266,21 +267,35 @@ class Section:
 
 @dataclass(frozen=True)
 class Origin:
-    """An artifact that a document is about, with a label that is unique there and the hash of the file."""
+    """An artifact that a document is about, with a label that is unique there and the hash of the file.
+
+    Attributes
+    ----------
+    record : Record or result
+    found : store.Origin or None
+        Where a result comes from; a record knows it by itself.
+    """
 
     label: str
     sha256: str
-    record: Record
+    record: Any
+    found: store.Origin | None = field(default=None, kw_only=True)
 
     @property
     def format(self) -> str:
         """Name of its format."""
-        return self.record.FORMAT.name
+        return str(getattr(self.record.FORMAT, "name", self.record.FORMAT))
 
     @property
-    def header(self) -> Header:
+    def header(self) -> Header | store.Origin:
         """Where it comes from."""
-        return self.record.origin
+        header: Header | store.Origin = self.found or self.record.origin
+        return header
+
+    @property
+    def stage(self) -> str:
+        """Module of the stage that made a result; empty for a record."""
+        return self.found.stage if self.found else ""
 
     @property
     def short_hash(self) -> str:

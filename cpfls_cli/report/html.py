@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import visible
 from cpfls_cli.report.canvas import evenly_spread
-from cpfls_cli.report.content import STRUCK, Document, Panel, Series, Table
+from cpfls_cli.report.content import STRUCK, Document, Panel, Picture, Series, Table
 from cpfls_cli.report.numbers import number, plain
 
 _CODE = re.compile("`([^`]+)`")
@@ -47,6 +47,27 @@ def _template() -> Template:
 def with_code(text: str) -> Markup:
     """Escape a sentence, set what stands between backticks in it as code, and strike numbers that no vehicle has."""
     return Markup(STRUCK.sub(r"<s>\1</s>", _CODE.sub(r"<code>\1</code>", str(escape(visible(text))))))
+
+
+def figure_html(picture: Picture) -> str:
+    """Write a figure for the page of a result, its numbers folded away."""
+    tables = figure_tables(picture.panels)
+    if not tables:
+        return picture.svg
+    numbers = "".join(map(_table_html, tables))
+    return f'<div class="plot">{picture.svg}</div><details><summary>Numbers</summary>{numbers}</details>'
+
+
+def _table_html(table: Table) -> str:
+    head = "".join(f'<th scope="col">{with_code(name)}</th>' for name in table.header)
+    rows = "".join(
+        f'<tr><th scope="row">{with_code(first.text)}</th>'
+        f"{''.join(f'<td>{with_code(cell.text)}</td>' for cell in rest)}</tr>"
+        for first, *rest in table.cells
+    )
+    caption = f"<caption>{with_code(table.caption)}</caption>" if table.caption else ""
+    head = f"<thead><tr>{head}</tr></thead>"
+    return f'<div class="table" tabindex="0"><table>{caption}{head}<tbody>{rows}</tbody></table></div>'
 
 
 @dataclass

@@ -15,7 +15,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, header_of
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, SweepRecord
@@ -130,7 +129,7 @@ class SweptSetting:
     def selection(self) -> InputFile:
         """The samples learned from, as if they were a file."""
         digest = hashlib.sha256(self.data.indices.astype("<i8").tobytes())
-        return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), SelectionRecord.FORMAT.name)
+        return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), Selection.FORMAT)
 
     @property
     def genes(self) -> int:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from cpfls_cli.commands.reduce import _naming
+
 from cpfls_cli.errors import ComputationError
 
 

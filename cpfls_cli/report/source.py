@@ -1,0 +1,60 @@
+"""An artifact with the study that made it, as pages speak of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Generic
+
+from typing_extensions import TypeVar
+
+from cpfls_cli import store
+from cpfls_cli.config.load import stored_study
+from cpfls_cli.config.study import Study, resolved
+from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.report.content import Origin
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+R = TypeVar("R", default=Any)
+
+
+@dataclass(frozen=True)
+class Source(Origin, Generic[R]):
+    """One artifact and the study that made it.
+
+    Attributes
+    ----------
+    config : mapping
+        The resolved study, by section and key.
+    parameters : int
+        Linear parameters of the fuzzy part that the study asks for.
+    """
+
+    record: R
+    config: Mapping[str, Any]
+    vehicle: VehicleSettings
+    parameters: int
+
+    @property
+    def kind(self) -> str:
+        """Kind of a format that has several."""
+        return str(getattr(getattr(self.record, "FORMAT", ""), "kind", ""))
+
+    def made_from(self, role: str) -> str | None:
+        """Hash of an input by its role; None where it had none."""
+        file = self.header.inputs.get(role)
+        return file.sha256 if file else None
+
+    def input_name(self, role: str) -> str:
+        """File name of an input by its role; empty where it had none."""
+        file = self.header.inputs.get(role)
+        return file.name if file else ""
+
+
+def source_of_result(
+    given: Any, origin: store.Origin, path: object, label: str, sha256: str, study: Study | None = None
+) -> Source:
+    """Name a result; its study is the one that it holds where none is given, of a stage without one the usual."""
+    study = study or stored_study(origin.config, path)
+    parameters = model_structure(study.identification).parameters
+    return Source(label, sha256, given, resolved(study), study.vehicle, parameters, found=origin)
