@@ -405,13 +405,11 @@ wheel: $(INSTALLED_RELEASE)
 # Every table is also written to benchmarks/results, as JSON. Programs that measure times run one after the other, the
 # rest two at once. Stopped and started again it goes on where it was, unless the code has changed since.
 TIMED := evaluation whole_run workers long_flights reduction reduction_streamed gap replay vehicle_search \
-	time_to_quality trajectory_planning excitation full_circle attitude_inertia export_speed simulators fuzzy_fitting
-UNTIMED := evolution_hypervolume judging quality_elsewhere full_circle_limit full_circle_noise unseen_path seam \
-	band_coverage
+	excitation full_circle export_speed simulators
+UNTIMED := judging band_coverage
 STUDY := data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
 ON_reduction_streamed := --samples 100000
 ON_judging := configs/paper-gentle.yaml $(STUDY)
-ON_time_to_quality := $(ON_judging)
 ON_report_cost = configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
 bench: $(INSTALLED_BENCH)
 	$(MAKE) --jobs=1 $(STUDY) data/paper/times.json $(TIMED:%=benchmarks/results/%.done)

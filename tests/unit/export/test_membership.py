@@ -6,7 +6,6 @@ their value about pitch. Derivatives by the breakpoints are compared in `tests/u
 """
 
 import re
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,7 +26,7 @@ from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structu
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.compiled_c import evaluate, require_gcc, written
 from tests.builders.exported_models import Case, model_of, sheet_of
-from tests.builders.exported_vehicles import FORMS
+from tests.builders.exported_vehicles import FORMS, on_numpy
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"
 FUNCTIONS = 6
@@ -107,12 +106,9 @@ def test_the_exported_c(case, tmp_path):
 
 
 def test_the_exported_python(case):
-    names = {"__name__": "vehicle"}
-    exec(python_source(sheet_of(case.model), "vehicle.py"), names)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torque, _ = names["torque"](*vars(case.motion).values())
-    assert_same(torque, case)
+    torque = on_numpy(python_source(sheet_of(case.model), "vehicle.py", "jax"))["torque"]
+    found = [torque(*motion)[0] for motion in zip(*vars(case.motion).values(), strict=True)]
+    assert_same(np.array(found), case)
 
 
 @pytest.fixture
