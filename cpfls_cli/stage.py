@@ -159,7 +159,7 @@ class Stage:
     ----------
     function : callable
         Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder, results by
-        name, with a page each; or None in a dry run.
+        name, with a page each; or None in a dry run; or the outcome of another command that it hands over to.
     kind : type
         Class of the result.
     title : str
@@ -198,7 +198,7 @@ class Stage:
     @property
     def name(self) -> str:
         """Of the command: that of its module."""
-        return self.function.__module__.rpartition(".")[2].replace("_", "-")
+        return self.function.__module__.rpartition(".")[2].strip("_").replace("_", "-")
 
     def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
         """Word a result, or all results by name where the ending says so.
@@ -253,6 +253,8 @@ class Stage:
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+        if isinstance(found, Outcome):
+            return found
         results = dict(found) if self.folder else {"": found}
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
@@ -277,8 +279,13 @@ class Stage:
         )
 
     def info(self, path: Path) -> Outcome:
-        """Say again what a file answers, where it comes from and what it holds."""
-        given, origin = store.read(path, self.kind)
+        """Say again what a file answers, where it comes from and what it holds; of a long one no values."""
+        long = store.is_long(path, self.kind)
+        if long:
+            store.check_rows(path, self.kind, store.held_rows(path, self.kind))
+        given, origin = store.read_first(path, self.kind) if long else store.read(path, self.kind)
+        about = source_of_result(given, origin, path, path.name, "")
+        answer = "too long to be shown: its values are in the file" if long else self.text(given, about=about)
         seed = "" if origin.seed is None else f", seed {origin.seed}"
         made = [("made by", f"cpfls {origin.version}{seed}")]
         made += [(role, f"{own.name} (sha256 {own.sha256[:12]})") for role, own in origin.inputs.items()]
@@ -287,9 +294,9 @@ class Stage:
         inputs = {role: vars(own) for role, own in origin.inputs.items()}
         summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "inputs": inputs}
         return Outcome(
-            {**summary, "cautions": list(origin.cautions), "result": plain(given)},
+            {**summary, "cautions": list(origin.cautions), **({} if long else {"result": plain(given)})},
             (
-                *page.blocks(self.text(given, about=source_of_result(given, origin, path, path.name, ""))),
+                *page.blocks(answer),
                 *caution_texts(origin.cautions),
                 Folded("where it comes from", [Facts(made)]),
                 Folded(f"what its {len(rows)} datasets hold", [table]),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
-    ("cpfls/flight", ""): "flight.FlightRecord",
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
@@ -44,9 +44,15 @@ def record_of_format(name: str, kind: str = "") -> type[Record] | None:
 
 def stage_module(attributes: Mapping[str, Any]) -> str:
     """Name the module of the stage that made a file, by its root attributes; empty where it holds no result."""
-    module = str(attributes.get("stage", "")).replace("-", "_")
+    module = module_of(str(attributes.get("stage", "")))
     found = re.fullmatch(r"[a-z]\w*", module) and (Path(__file__).parents[1] / "stages" / f"{module}.py").is_file()
     return module if found else ""
+
+
+def module_of(stage: str) -> str:
+    """Name the module of a stage: as the command, with a trailing underscore where Python has that word."""
+    module = stage.replace("-", "_")
+    return f"{module}_" if iskeyword(module) else module
 
 
 def records() -> list[type[Record]]:

@@ -44,7 +44,7 @@ class StageCommand(TyperCommand):
         self._file = file
         described = _DOCSTRING.match(file.read_text(encoding="utf-8"))
         assert described is not None, "a stage says in its docstring what it does"
-        super().__init__(file.stem.replace("_", "-"), help=inspect.cleandoc(described[1]), rich_markup_mode=None)
+        super().__init__(_named(file), help=inspect.cleandoc(described[1]), rich_markup_mode=None)
 
     @cached_property
     def _stage(self) -> Stage:
@@ -92,9 +92,13 @@ class AllCommands(Commands):
         self.commands = {name: every[name] for name in (*(own for own in ORDER if own in every), *every)}
 
 
+def _named(file: Path) -> str:
+    return file.stem.strip("_").replace("_", "-")
+
+
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
     """List the commands of the stages in a folder."""
-    files = {file.stem.replace("_", "-"): file for file in sorted(folder.glob("[a-z]*.py"))}
+    files = {_named(file): file for file in sorted(folder.glob("[a-z]*.py"))}
     return {name: StageCommand(file) for name, file in files.items()}
 
 

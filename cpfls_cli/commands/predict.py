@@ -11,13 +11,13 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import UncertaintyGroup
-from cpfls_cli.artifacts.flight import CLOCK, ClockGroup, FlightRecord
+from cpfls_cli.artifacts.flight import ClockGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_number, read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
@@ -27,6 +27,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import (
     FlightStretch,
     FlightStretches,
@@ -49,6 +50,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.store import count_rows, read_first
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.weak_form.windows import Recording
 
@@ -76,13 +78,13 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(findings)))
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
-    torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
+    torque = count_rows(flight, Flight, "torque") is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
     draws = _draws(identified.uncertainty)
     parts = _along(functions, draws, flown, torque, findings, job.progress)
-    finish_parts(job, _on_clock(parts, read_number(flight, CLOCK)), len(flown), inputs)
+    finish_parts(job, _on_clock(parts, read_first(flight, Flight)[0].begins), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*unjudged(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))

@@ -18,7 +18,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.pages.trust import stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
-from cpfls_cli.store import examine, stage_of
+from cpfls_cli.store import findings_in, stage_of
 
 _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
@@ -127,7 +127,7 @@ def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     if stage := stage_of(path):
         made = import_module("cpfls_cli.stage").loaded(stage).kind
-        name, kind, findings = made.FORMAT, None, examine(path, made)[2]
+        name, kind, findings = made.FORMAT, None, findings_in(path, made)
     else:
         spec, findings = findings_of(path)
         name, kind = spec.name, None if findings else record_of_format(spec.name, spec.kind)

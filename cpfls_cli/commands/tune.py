@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup, ParameterRow
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, refuse_own, write_text
 from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
-from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.store import format_name, holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.autopilots.motors import straightening
 from cpfls_cli.autopilots.parameters import Autopilot
@@ -24,6 +23,7 @@ from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import file_of, parameter_file
+from cpfls_cli.flights.flight import Flight, Imported, read_whole
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
 from cpfls_cli.logs.formats import log_contents, read_log
@@ -201,11 +201,11 @@ class _Log:
 def _read(flight: Path, study: Study) -> _Log:
     """Read a log, or what an imported flight keeps of its log, which is low-passed and so tells no noise."""
     nothing = (np.zeros(0), np.zeros((0, 3)), "")
-    if holds(flight, FlightRecord):
-        kept = read_record(flight, FlightRecord).autopilot
-        if kept is None:
+    if format_name(flight) == Flight.FORMAT:
+        kept, _ = read_whole(flight)
+        if not isinstance(kept, Imported) or not kept.parameters:
             return _Log(flight.name, "", {}, *nothing)
-        return _Log(flight.name, kept.system, kept.parameters, *nothing)
+        return _Log(flight.name, kept.system, dict(kept.parameters), *nothing)
     contents = log_contents(flight, ())
     rates = _rates(flight, study) if _maps_rates(study) else nothing
     return _Log(flight.name, contents.system, contents.parameters, *rates)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.rebuilt import estimates
@@ -24,6 +23,7 @@ from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
+from cpfls_cli.flights.flight import Imported, read_whole
 from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
@@ -246,8 +246,8 @@ def _parameters(path: Path) -> Mapping[str, float | str]:
     """Read what a log, or a flight that was imported from one, knows of its autopilot."""
     if is_log(path):
         return log_contents(path, ()).parameters
-    kept = read_record(path, FlightRecord).autopilot
-    return {} if kept is None else kept.parameters
+    kept, _ = read_whole(path)
+    return kept.parameters if isinstance(kept, Imported) else {}
 
 
 def _thrust_is_share(path: Path, study: Study) -> bool:

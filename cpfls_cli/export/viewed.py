@@ -11,7 +11,6 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gap_flights import FlightsGroup
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import ReplayRecord
@@ -35,8 +34,10 @@ from cpfls_cli.export.tracks import (
     Track,
     View,
 )
+from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.simulation.twin import FRAMES, UNITS
+from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
 
 _ASKED = "setpoint_"
@@ -45,21 +46,21 @@ _OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
 """Signals whose unit is that of the import."""
 
 
-def view_of(path: Path, record: Record) -> View:
-    """Gather what is to be drawn of an artifact.
+def view_of(path: Path, given: Any, config: str) -> View:
+    """Gather what is to be drawn of an artifact that was made with a config.
 
     Raises
     ------
     InputError
         If there is nothing.
     """
-    study = stored_study(record.origin.config, path)
+    study = stored_study(config, path)
     for kind, made in _KINDS.items():
-        if isinstance(record, kind):
-            return made(path.name, record, study)
-    *others, last = (kind.FORMAT.name for kind in _KINDS)
+        if isinstance(given, kind):
+            return made(path.name, given, study)
+    *others, last = map(format_of, _KINDS)
     raise InputError(
-        f"{path}: is a {record.FORMAT.name}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
+        f"{path}: is a {format_of(given)}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
         f"and {last}"
     )
 
@@ -122,17 +123,19 @@ def _pose(child: str, time: Array, attitude: Array | None, position: Array | Non
     return [Pose(child, time, np.full_like(attitude, np.nan) if position is None else position, attitude)]
 
 
-def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
-    time = _log_time(record.time, record.begins)
-    specs = {spec.path: spec for spec in record.spec().datasets}
-    signals = {name: values for name, values in record.signals.items() if name != "time"}
-    units = _units_of(study, imported="log" in record.origin.inputs)
+def _of_flight(title: str, given: Flight, study: Study) -> View:
+    time = _log_time(given.time, given.begins)
+    specs = {
+        name: DatasetSpec(name, own.axes, own.unit, own.frame, own.text) for name, own in Flight.about_signals().items()
+    }
+    signals = {name: values for name, values in given.signals.items() if name != "time"}
+    units = _units_of(study, imported=isinstance(given, Imported))
     return View(
         title,
         tuple(_signals("", time, signals, specs, units)),
-        poses=_pose(BODY_FRAME, time, record.attitude, record.position),
+        poses=_pose(BODY_FRAME, time, given.attitude, given.position),
         stamps=_stamps(study),
-        on_log_clock=record.clock is not None,
+        on_log_clock=bool(np.isfinite(given.begins)),
     )
 
 
@@ -358,8 +361,8 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
     return names
 
 
-_KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
-    FlightRecord: _of_flight,
+_KINDS: dict[type, Callable[[str, Any, Study], View]] = {
+    Flight: _of_flight,
     PredictionRecord: _of_prediction,
     ReplayRecord: _of_replay,
     DisagreementRecord: _of_disagreement,

@@ -8,6 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.artifacts.formats import module_of
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
@@ -15,7 +16,6 @@ from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
-from cpfls_cli.pages.flight import flight_blocks, vehicle_section
 from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
@@ -33,6 +33,7 @@ from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
+from cpfls_cli.pages.vehicle import vehicle_section
 from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
@@ -72,7 +73,7 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
-        return [loaded(name).section(source, number) for number, source in enumerate(own, start=1)]
+        return [loaded(module_of(name)).section(source, number) for number, source in enumerate(own, start=1)]
 
     return sections
 
@@ -92,7 +93,8 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     unseen_section,
     vehicle_section,
     _of_stage("trajectory"),
-    _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),
+    _of_stage("simulate"),
+    _of_stage("import"),
     _of_stage("reduce"),
     identification_section,
     _of_each("validation", "How far to trust it", _MODELS, validation_blocks),

@@ -8,9 +8,9 @@ from typing import Any
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
@@ -56,7 +56,7 @@ _Lack = tuple[type, str, str]
 _LACKS: tuple[_Lack, ...] = (
     (PlannedPath, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
     (
-        FlightRecord,
+        Flight,
         "Figure 4 and the quality of the flight",
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
@@ -88,8 +88,8 @@ def missing(sources: Sources) -> dict[str, str]:
     dict of str to str
         One sentence by format, such as ``selection``: what is not shown, and the command that makes it.
     """
-    given = {type(source.record) for source in sources.all}
-    lacking = {_word(wanted): (shows, command) for wanted, shows, command in _wanted(sources) if wanted not in given}
+    listed = _wanted(sources)
+    lacking = {_word(kind): (shows, command) for kind, shows, command in listed if not sources.of_kind(kind)}
     return {
         word: f"Not shown, because no {_SHOWN.get(word, word)} was given: {shows}; made by: {command}."
         for word, (shows, command) in lacking.items()

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
-    from cpfls_cli.artifacts.flight import FlightRecord
     from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.flights.flight import Flight
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.reduction.selection import Selection
 
@@ -62,7 +62,7 @@ class Sources:
     settings: ReportSettings
 
     trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
-    flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
+    flights: ClassVar[_OfFormat[Flight]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
     sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")

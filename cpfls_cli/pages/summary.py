@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.formats import module_of
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
+from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.gains import gains_box
@@ -37,14 +38,13 @@ def summary_section(sources: Sources) -> Section:
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
-    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
+    blocks += [box for source in sources.all if source.stage for box in loaded(module_of(source.stage)).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
-    for flight in sources.flights:
-        quality = flight.record.quality
-        said = () if quality is None else quality.warning or ()
+    for flight in sources.of_kind(Imported):
+        said = (*flight.record.contradictions, *flight.record.warnings)
         blocks += [Text(f"{flight.label}: {warning}.", "warning") for warning in said]
     if len(sources.models) < 2:
         blocks += _missing(sources)
@@ -160,7 +160,7 @@ def _beside_rigid_body(model: Source[IdentifiedRecord], sources: Sources) -> Ite
         )
 
 
-def _noise_free(flight: Source[FlightRecord]) -> bool:
+def _noise_free(flight: Source[Flight]) -> bool:
     """Tell whether a flight was simulated and nothing was added to it."""
     added = [*flight.config["simulation"]["noise"].values(), *flight.config["simulation"]["relative_noise"].values()]
     return flight.made_from("trajectory") is not None and not any(added)
