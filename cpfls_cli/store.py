@@ -230,7 +230,8 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
         if held != wanted:
-            raise InputError(f"{path}: is a {held}; this command needs a {wanted}")
+            made_by = f" (made by {kind.MADE_BY})" if hasattr(kind, "MADE_BY") else ""
+            raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
         if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
             raise old_file(path, file)
         origin, missing = origin_of(file), list[str]()
@@ -407,7 +408,7 @@ def _read_lines(own: Described, group: h5py.Group, rows: int, missing: list[str]
 
 
 def _values(group: h5py.Group, name: str, own: Described, rows: Any = ()) -> np.ndarray[Any, Any]:
-    dataset = dataset_of(group.file, f"{group.name}/{name}")
+    dataset = dataset_of(group.file, f"{group.name}/{name}".lstrip("/"))
     if dataset is None or dataset.dtype.kind not in _HELD[own.scalar]:
         raise ValueError(f"{group.name}/{name} holds no {own.scalar.__name__}")
     array = np.asarray(dataset[rows])

@@ -267,9 +267,9 @@ def test_what_leads_elsewhere_is_refused(refuse, changed, pipeline):
             f"{path}: damaged: torque is a {type(link).__name__}; an artifact must hold all that it refers to"
         ]
     raw = (str(pipeline.flight), 0, h5py.h5f.UNLIMITED)
-    path = changed("flight", lambda file: file.create_dataset("delay/value", (1,), float, external=[raw]))
+    path = changed("flight", lambda file: file.create_dataset("voltage", (1,), float, external=[raw]))
     assert refuse("check", path) == [
-        f"{path}: damaged: delay/value lies in another file; an artifact must hold all that it refers to"
+        f"{path}: damaged: voltage lies in another file; an artifact must hold all that it refers to"
     ]
 
 
