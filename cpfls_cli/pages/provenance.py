@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -21,9 +20,9 @@ from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.changes.results import Changed, Trend
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
@@ -102,8 +101,8 @@ _COMMANDS: dict[type, _Command] = {
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
-    ChangedRecord: _Command("changed", ("today",), ("since",)),
-    TrendRecord: _Command("trend", ("flight",)),
+    Changed: _Command("changed", ("today",), ("since",)),
+    Trend: _Command("trend", ("flight",)),
     VehicleRecord: _Command("vehicle", ("flight",), ("held-out",)),
 }
 _IMPORT = _Command("import", ("log",))

@@ -23,7 +23,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.changed import ChangedRecord
     from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -35,9 +34,9 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.response import ResponseRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-    from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.reduction.selection import Selection
 
 R = TypeVar("R", default=Any)
@@ -74,8 +73,8 @@ class Sources:
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
-    trends: ClassVar[_OfFormat[TrendRecord]] = _OfFormat("cpfls/trend")
-    changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
+    trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
+    changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property
