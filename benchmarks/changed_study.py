@@ -30,6 +30,7 @@ from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Tri
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
+from cpfls_cli.changes.results import Changed
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.effects.signals import Signals

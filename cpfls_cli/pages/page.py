@@ -27,7 +27,6 @@ from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.tracking import tracking_blocks
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
@@ -114,14 +113,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("trend"),
     _of_stage("changed"),
     _of_stage("_flight_numbers"),
-    _of_each(
-        "tracking",
-        "Control with the model",
-        attrgetter("flights"),
-        tracking_blocks,
-        holds=attrgetter("tracking"),
-        among=True,
-    ),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )
