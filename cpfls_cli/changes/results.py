@@ -134,7 +134,7 @@ class Changed(Compared):
     since_flight: int = about("index of the flight of today from which on it looks most as if it had changed", least=0)
     hover: float = about("what the loads of all rotors have in common, today less the reference, logarithm", gaps=True)
     hover_deviation: float = about("what that differs by where nothing changed", gaps=True)
-    fewest: int = about("reference flights that tell what flights differ by; of fewer, what is usual replaces that")
+    fewest: int = about("reference flights that say what flights differ by; of fewer, what is usual replaces that")
     missing: tuple[str, ...] = about(
         "other numbers that every reference flight has, and not every one of today", "missing", default=()
     )
@@ -164,7 +164,7 @@ class Changed(Compared):
 
     @property
     def reference_flights_lacking(self) -> int:
-        """How many more reference flights would tell what flights differ by, which is assumed without them."""
+        """How many more reference flights would say what flights differ by, which is assumed without them."""
         return max(self.fewest - len(self.reference_flights), 0)
 
     @property

@@ -21,7 +21,7 @@ FOLDER = "flights"
 """Of the folder that a command fills, where numbers are kept."""
 
 _HASH = 8
-"""Digits by which flights of one name are told apart."""
+"""Digits by which flights of one name are kept apart."""
 
 
 def kept_numbers(

@@ -18,7 +18,7 @@ from cpfls_cli.report.change_words import WORDS
 from cpfls_cli.stage import Run, stage
 
 CANNOT_TELL_CODE = 3
-"""Exit code where it cannot be told whether a vehicle changed."""
+"""Exit code where it cannot be said whether a vehicle changed."""
 
 _APART = 3
 """Facts that are named where two logs are of different vehicles."""
@@ -29,9 +29,9 @@ OtherVehicleOption = Annotated[
 ]
 
 
-@stage(FlightNumbers, title="What each flight tells", words=WORDS, study=True)
+@stage(FlightNumbers, title="Numbers of each flight", words=WORDS, study=True)
 def flight_numbers(run: Run, flight: Path) -> FlightNumbers:
-    """Compute the numbers of a flight, or take those that are kept beside the output."""
+    """Compute the numbers of a flight, or take those that are kept in the folder of the output."""
     return kept_numbers(flight, run.take({"flight": flight})["flight"], run.study, run.beside(FOLDER), run.cautions)
 
 

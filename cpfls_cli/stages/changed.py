@@ -59,7 +59,7 @@ _LONG = 18
 """Letters of a flight's name from which on names stand one below the other."""
 
 _ROW, _HEAD = 0.19, 0.8
-"""Inches of a picture for each number, and beside them."""
+"""Inches of a picture for each number, and around them."""
 
 _REFERENCE: dict[str, Any] = {"color": GREY, "marker": "|", "markersize": 7, "linestyle": "none", "zorder": 2}
 _TODAY: dict[str, Any] = {
@@ -267,13 +267,13 @@ def _warnings(today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], n
         for each in lost:
             by_flights.setdefault(joined(own.name for own in flights if each not in own.values), []).append(each)
         listed = "; ".join(f"{joined(each)} (not {without})" for without, each in by_flights.items())
-        yield f"not compared, for not all flights tell it: {listed}"
+        yield f"not compared, for not all flights have it: {listed}"
 
 
 def flown_unlike(
     found: Changed, today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], vehicle: VehicleSettings
 ) -> Iterator[str]:
-    """Say that today's flights are flown unlike those of the reference, where that makes them tell less."""
+    """Say that today's flights are flown unlike those of the reference, where that makes them say less."""
     names, deviation = column(found.numbers, "name"), np.array(column(found.numbers, "deviation"))
     reference = Reference.of(before, names, vehicle)
     without = [flight.name for flight in [*before, *today] if not np.isfinite(flight.agility)]

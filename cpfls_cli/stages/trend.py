@@ -53,10 +53,10 @@ _COMPARED, _BEFORE = 3, 5
 """Flights that the command to go on with names: the last ones, and of the reference."""
 
 _OF_A_LOG = (InputError, ComputationError)
-"""Why a log tells nothing: where another does, it is left out."""
+"""Why a log is left out, where another is not."""
 
 _COLUMNS, _HEIGHT, _HEAD = 3, 1.35, 0.7
-"""Of small multiples: side by side, inches of each, and beside them."""
+"""Of small multiples: side by side, inches of each, and around them."""
 
 _BAND: dict[str, Any] = {"color": "#dddddd"}
 _FLIGHTS: dict[str, Any] = {"color": "black", "linestyle": "none", "markersize": 3.2, "marker": "o"}
@@ -198,7 +198,7 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 
 @dataclass(frozen=True)
 class Reading:
-    """Tell the numbers of flights, given by their index, and keep them in a folder: work that can be shared out."""
+    """Compute numbers of flights, given by their index, and keep them in a folder: work that can be shared out."""
 
     flights: tuple[Path, ...]
     files: tuple[InputFile, ...]
@@ -207,7 +207,7 @@ class Reading:
     cautions: tuple[str, ...]
 
     def __call__(self, genes: IntArray) -> Evaluation:
-        """Give 0 for each flight whose numbers are kept now, and 1 where it tells none."""
+        """Give 0 for each flight whose numbers are kept now, and 1 where it has none."""
         refused = [self._refuses(int(index)) for index in genes[:, 0]]
         return Evaluation(genes, np.array(refused, dtype=float)[:, None])
 
@@ -222,7 +222,7 @@ class Reading:
 def _numbers(
     run: Run, given: Mapping[str, Path], inputs: Mapping[str, InputFile], workers: int, scheduler: str | None
 ) -> tuple[dict[str, FlightNumbers], int, list[str]]:
-    """Give the numbers of all flights by role, of how many they were not kept, and why others are left out."""
+    """Give the numbers of all flights by role, how many of them are new, and why others are left out."""
     folder = run.output / FOLDER
     labels = dict(zip(given, unique_labels(list(given.values())), strict=True))
     known = {role: find_kept(path, inputs[role], run.study, folder) for role, path in given.items()}
@@ -241,14 +241,14 @@ def _numbers(
         interrupt.add_note(f"what was read is kept in {folder}; the same command goes on from there")
         raise
     run.progress(len(new), len(new))
-    told = {role: replace(own, name=labels[role]) for role, own in known.items() if own is not None}
-    if not told:
+    numbers = {role: replace(own, name=labels[role]) for role, own in known.items() if own is not None}
+    if not numbers:
         raise refused[0]
-    return told, len(new) - len(refused), _left_out(refused)
+    return numbers, len(new) - len(refused), _left_out(refused)
 
 
 def _left_out(refused: Sequence[Exception]) -> list[str]:
-    """Name flights that tell nothing, in one sentence: each says its own name and the first reason."""
+    """Name flights that are left out, in one sentence: each says its own name and the first reason."""
     if not refused:
         return []
     first = [str(error).splitlines()[0] for error in refused]
@@ -258,7 +258,7 @@ def _left_out(refused: Sequence[Exception]) -> list[str]:
 def _share_out(
     run: Run, given: Mapping[str, Path], inputs: Mapping[str, InputFile], workers: int, scheduler: str | None
 ) -> None:
-    """Let workers tell and keep the numbers; why a flight tells none is found out afterwards."""
+    """Let workers compute and keep the numbers; why a flight has none is found out afterwards."""
     reading = Reading(
         # Workers on a scheduler may have another folder than this process.
         tuple(Path(os.path.abspath(path)) for path in given.values()),
@@ -288,7 +288,9 @@ def _trend(
     apart = of_other_vehicles(stated_by(ordered), anyway=anyway)
     found = over_flights(ordered, run.study.vehicle, generator(run.study, "trend"), reference)
     unlike, ranges = of_other_autopilots(ordered, loads=any(each.name.startswith("load ") for each in found.numbers))
-    lacking = f"left out, for they do not tell {len(found.numbers)} numbers that most do: {', '.join(found.left_out)}"
+    lacking = (
+        f"left out, for they lack some of {len(found.numbers)} numbers that most have: {', '.join(found.left_out)}"
+    )
     warnings = [
         *notes,
         *apart,
@@ -318,22 +320,22 @@ def _of_commands(flights: Sequence[FlightNumbers]) -> Iterator[str]:
         )
 
 
-def _ordered(told: Mapping[str, FlightNumbers], order: str | None) -> tuple[list[FlightNumbers], str, list[str]]:
+def _ordered(numbers: Mapping[str, FlightNumbers], order: str | None) -> tuple[list[FlightNumbers], str, list[str]]:
     """Put flights in time order, and say by what, and which cannot be."""
-    flights = list(told.values())
+    flights = list(numbers.values())
     undated = [own.name for own in flights if not np.isfinite(own.flown_at_s)]
     if order == "given":
         return flights, order, []
     if order == "date" and undated:
         if len(undated) == len(flights):
-            raise InputError("--order date: no log tells when it was flown; take --order name or given")
-        notes = [f"left out, for their logs do not tell when they were flown: {', '.join(undated)}"]
+            raise InputError("--order date: no log says when it was flown; take --order name or given")
+        notes = [f"left out, for their logs do not say when they were flown: {', '.join(undated)}"]
         flights = [own for own in flights if own.name not in undated]
         return sorted(flights, key=lambda own: own.flown_at_s), "date", notes
     if order != "name" and not undated:
         return sorted(flights, key=lambda own: own.flown_at_s), "date", []
     some = 0 < len(undated) < len(flights) and order is None
-    notes = [f"{len(undated)} of {len(flights)} logs do not tell when they were flown, so names order them all"]
+    notes = [f"{len(undated)} of {len(flights)} logs do not say when they were flown, so names order them all"]
     return sorted(flights, key=lambda own: _natural(Path(own.name))), "name", notes if some else []
 
 

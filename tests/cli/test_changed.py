@@ -131,7 +131,7 @@ def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
     assert "without attitude: all flights; how any flight is flown is not known" in notes
     assert "another sampling rate than the usual one of the reference, 100 Hz: slow.csv (50 Hz)" in notes
     assert "note: left out: short.csv: flies for " in notes
-    assert "not compared, for not all flights tell it: vibration gyroscope x" in notes
+    assert "not compared, for not all flights have it: vibration gyroscope x" in notes
     # A flight that is not compared is said first, not behind "more notes".
     assert "note: left out: short.csv: flies for only 2 s" in changed(slow, short).stderr.splitlines()[0]
     notes = changed(speeds, options=["-v"]).stderr
@@ -168,8 +168,7 @@ def test_artifact_report_and_info_say_the_same(cpfls, changed, folder):
     assert first.partition(": ")[2].partition(";")[0] in (folder / "out" / "report.html").read_text()
     page = folder / "page.md"
     assert cpfls("report", folder / "study.yaml", made, "-o", page, "--force").exit_code == 0
-    assert "cpfls changed study-" in page.read_text()
-    assert "weak1.csv weak2.csv --since before1.csv --since before2.csv" in page.read_text()
+    assert all(name in page.read_text() for name in ("weak1.csv", "weak2.csv", "before1.csv", "before5.csv"))
 
 
 def test_nothing_is_written_when_dry(cpfls, folder, tmp_path):
