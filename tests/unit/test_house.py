@@ -193,7 +193,6 @@ SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
-    : "the page of an artifact",
     "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
