@@ -81,7 +81,7 @@ class _Amount(NamedTuple):
             return f"{number(value, 2)} times as strong ({number(low, 2)} to {number(high, 2)})"
         if value < 0:
             value, low, high = -value, -high, -low
-        way = f" {ways.split('/')[size.value <= 0]}" if ways else ""
+        way = f" {ways.split('/')[int(size.value <= 0)]}" if ways else ""
         return f"{number(value, 2)}{name}{way} ({number(low, 2)} to {number(high, 2)}{name})"
 
     def _scale(self, unit: str, size: float) -> tuple[Callable[[float], float], str]:

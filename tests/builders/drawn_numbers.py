@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import FlightNumbers, numbers_of
 from cpfls_cli.changes.reference import usual_covariance
 from cpfls_cli.changes.trend import trend
@@ -49,3 +50,10 @@ def drawn_trend():
     row = flights(20, rng, 0.25 * (np.arange(len(NAMES)) == 2), since=12)
     dated = [replace(own, flown_at_s=1.7e9 + 86400.0 * day) for day, own in enumerate(row)]
     return replace(trend(dated, QUAD, rng), order="date", warnings=("left out, 1 flight: a.csv",))
+
+
+def drawn_changed(**more):
+    """Find what changed of a flight whose third rotor pulls less, against four that are as ever; with other fields."""
+    rng = np.random.default_rng(2)
+    (today,) = flights(1, rng, 0.35 * (np.arange(len(NAMES)) == 2))
+    return replace(changed([replace(today, name="today.csv")], flights(4, rng), QUAD, rng), **more)
