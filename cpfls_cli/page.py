@@ -7,7 +7,8 @@ Beside what Markdown has, a template knows
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
-- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page.
+- ``#`` for the answer, a verdict where a word in capitals and a colon come first, ``##`` for a section, ``###`` for a
+  card of it, with ``{wide}`` as wide as the page.
 
 Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 """
@@ -34,7 +35,7 @@ from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
@@ -275,7 +276,10 @@ def _blocks(
 ) -> Iterator[Block]:
     for node in nodes:
         if node.kind == "heading":
-            yield Heading(_plain_line(node.text))
+            label, colon, title = _plain_line(node.text).partition(": ")
+            verdict = node.level == 1 and colon and label.isupper()
+            tone = cast(Tone, next(iter(node.marks), "plain"))
+            yield Box(label, title, (), tone) if verdict else Heading(_plain_line(node.text))
         elif node.kind == "fold":
             inner = list(_blocks(node.inner, pictures, prefix, numbers))
             yield Folded(_plain_line(node.text), inner, "open" in node.marks)

@@ -22,7 +22,7 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
-from cpfls_cli.report.content import Facts, Folded, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
@@ -59,6 +59,8 @@ class Run(Job):
         Whether the stage takes a config, which its results hold.
     files : dict of str to InputFile
         Inputs of all results, by role.
+    also : dict of Path to str
+        Texts that are written behind the result, such as a table that an option asks for.
     """
 
     writes: bool = True
@@ -66,6 +68,7 @@ class Run(Job):
     exit_code: int = 0
     with_config: bool = True
     files: dict[str, InputFile] = field(default_factory=dict)
+    also: dict[Path, str] = field(default_factory=dict)
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -169,7 +172,7 @@ class Stage:
         return page.html(title, self.text(given, about=about), figures)
 
     def section(self, about: Source, number: int) -> Section:
-        """Make the section of a report that shows a result, the first, second, ... of this stage."""
+        """Make the section of a report that shows a result, the first, second, ... of this stage, but its answer."""
         pictures = {
             name: picture
             for name, draw in self.figures.items()
@@ -177,7 +180,12 @@ class Stage:
         }
         anchor = self.name if number == 1 else f"{self.name}-{number}"
         blocks = page.blocks(self.text(about.record, about=about), pictures, f"{self.name}-{number}-")
-        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *blocks])
+        shown = [block for block in blocks if not isinstance(block, Box)]
+        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *shown])
+
+    def answer(self, about: Source) -> list[Block]:
+        """Give the answer of a result alone, which stands in the summary of a report."""
+        return [each for each in page.blocks(self.text(about.record, about=about)) if isinstance(each, Box)]
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
@@ -192,6 +200,8 @@ class Stage:
         results = dict(found) if self.folder else {"": found}
         if run.writes:
             self._write(run, run.output, results)
+        for path, text in run.also.items():
+            write_text(path, text)
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
@@ -199,7 +209,11 @@ class Stage:
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
             {**summary, **({"cautions": list(cautions)} if cautions else {})},
-            (*(block for text in texts for block in page.blocks(text)), *caution_texts(cautions)),
+            (
+                *(block for text in texts for block in page.blocks(text)),
+                *(Text(f"{path}: written") for path in run.also),
+                *caution_texts(cautions),
+            ),
             run.exit_code,
             next=tuple(run.next),
             written=run.output if run.writes else None,

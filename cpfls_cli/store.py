@@ -30,8 +30,8 @@ T = TypeVar("T")
 _PACKED_BYTES = 1 << 16
 """Size from which a dataset is compressed."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
-_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
-_HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
+_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
+_HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
 """Kinds of arrays that hold values of a type."""
 
 Lengths = MutableMapping[str, tuple[int, str]]
@@ -142,6 +142,11 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
     return given, origin, findings(given)
+
+
+def format_of(given: Any) -> str:
+    """Name the format of a record or a result, or of its class."""
+    return str(getattr(given.FORMAT, "name", given.FORMAT))
 
 
 def stage_of(path: Path) -> str:
@@ -271,7 +276,7 @@ def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths
         known, where = (fixed, "its description") if fixed else lengths.setdefault(label, (length, path))
         if length != known:
             yield f"{path}: {length} along '{label}', but {known} by {where}"
-    if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
+    if array.dtype.kind in "fc" and not about.gaps and not np.isfinite(array).all():
         yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
     if array.dtype.kind in "iuf" and np.any(array < about.least):
         yield f"{path}: is below {about.least:g}"

@@ -22,7 +22,6 @@ _RECORDS = {
     ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
-    ("cpfls/response", ""): "response.ResponseRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",

@@ -28,7 +28,6 @@ _PAGES = {
     "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",
     "cpfls/replay": "replay",
-    "cpfls/response": "response",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",

@@ -81,8 +81,8 @@ def stated_vehicle(config: str | os.PathLike[str]) -> Model:
     ConfigError
         If the config is not good; the message names every wrong key.
     """
-    from cpfls_cli.artifacts.replay import VEHICLE
     from cpfls_cli.config.load import load_study
+    from cpfls_cli.playback.settings import VEHICLE
 
     return Model(Path(VEHICLE), load_study(Path(config)), None)
 

@@ -16,8 +16,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
-from cpfls_cli.artifacts.response import ResponseRecord
+from cpfls_cli.artifacts.replay import USUAL, ReplayRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
@@ -26,8 +25,10 @@ from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
+from cpfls_cli.response.flown import Responses
 
 _REPEAT = (
     "To make these artifacts again, save each config below, as it is, under the name that stands before it, and run "
@@ -97,7 +98,7 @@ _COMMANDS: dict[type, _Command] = {
     PredictionRecord: _Command("predict", ("model", "flight")),
     ReplayRecord: _Command("replay", ("model", "flight")),
     TwinRecord: _Command("simulate", ("flight",), ("model",)),
-    ResponseRecord: _Command("response", ("flight",), ("model",)),
+    Responses: _Command("response", ("flight",), ("model",)),
     GainsRecord: _Command("tune", ("model",), ("flight",)),
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.twin import GainsGroup
 from cpfls_cli.commands.twin import record_of
