@@ -31,11 +31,11 @@ def summary_section(sources: Sources) -> Section:
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
-    blocks += [each for source in sources.all if source.stage for each in loaded(source.stage).answer(source)]
     blocks += [twin_box(twin.record) for twin in sources.twins]
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
+    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

@@ -195,7 +195,7 @@ def response(
     )
     run.next.append(_next(run, found, flights, model))
     if table is not None:
-        run.also[table] = _csv(found)
+        run.write_text(table, _csv(found), "written, the curves as CSV")
     return found
 
 
