@@ -16,7 +16,6 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import USUAL, ReplayRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
@@ -25,6 +24,7 @@ from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.playback.along_flights import USUAL, Playback
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
@@ -96,7 +96,7 @@ _COMMANDS: dict[type, _Command] = {
     IdentifiedRecord: _Command("identify", ("flight",), ("selection", "validate", "choose-on")),
     SweepRecord: _Command("sweep", ("flight",), ("validate", "choose-on")),
     PredictionRecord: _Command("predict", ("model", "flight")),
-    ReplayRecord: _Command("replay", ("model", "flight")),
+    Playback: _Command("replay", ("model", "flight")),
     TwinRecord: _Command("simulate", ("flight",), ("model",)),
     Responses: _Command("response", ("flight",), ("model",)),
     GainsRecord: _Command("tune", ("model",), ("flight",)),
@@ -175,7 +175,7 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:
         # Of a replay of the vehicle of the config a word stands in the place of the model.
-        of_config = [VEHICLE] if isinstance(source.record, ReplayRecord) and role == "model" else []
+        of_config = [VEHICLE] if isinstance(source.record, Playback) and role == "model" else []
         words += _files(inputs, role, paths) or of_config
     for role in command.options:
         for file in _files(inputs, role, paths):
@@ -191,7 +191,7 @@ def _asked(record: Record) -> list[str]:
         asked = {"gain": record.asked_gain, "phase": record.asked_phase, "disk": record.asked_disk}
         margins = [word for name, value in asked.items() for word in (f"--{name}-margin", f"{value:g}")]
         return ["--autopilot", record.autopilot, *margins]
-    if not isinstance(record, ReplayRecord):
+    if not isinstance(record, Playback):
         return []
     hold = [] if record.hold == USUAL else ["--hold", record.hold]
     return ["--horizon", repr(record.asked_s), "--every", str(record.every), *hold]
