@@ -201,10 +201,10 @@ def flat(path: Path) -> dict[str, tuple[DatasetSpec, Any]]:
     def take(name: str, held: h5py.Group | h5py.Dataset) -> None:
         if isinstance(held, h5py.Dataset) and name != CONFIG.strip("/"):
             labels = tuple(each.label for each in held.dims)
-            words = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
+            unit, frame, text = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
             values = np.asarray(held[()])
             values = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
-            found[name] = DatasetSpec(name, labels, *words), values
+            found[name] = DatasetSpec(name, labels, unit, frame, text), values
 
     with opened_file(path) as file, patient(path):
         file.visititems(take)
