@@ -56,7 +56,7 @@ def write(path: Path, given: Any, origin: Origin) -> None:
 
 
 def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> None:
-    """Write a result of which no more than a part is in memory: what is not along ``STREAMED`` is that of the first.
+    """Write a result of which no more than a part is in memory: what is not along ``STREAMED`` is that of the last.
 
     Parameters
     ----------
@@ -69,12 +69,15 @@ def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> 
             if not done:
                 require_sound(path, part)
                 _write_origin(file, type(part), origin)
-                _write(file, part, rows)
+                _write(file, part, rows, streamed=True)
             for name in _streamed(part):
                 values = getattr(part, name)
                 file[name][done : done + len(values)] = values
             done += len(getattr(part, type(part).STREAMED)) if rows else 1
             output.require_written()
+        require_sound(path, part)
+        _write(file, part, rows, streamed=False)
+        output.require_written()
         if wrong := list(_wrong_rows(file, type(part), _streamed(part))) if rows else []:
             raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
@@ -106,14 +109,15 @@ def require_sound(path: Path, given: Any) -> None:
         raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
 
-def _write(group: h5py.Group, given: Any, rows: int = 0) -> None:
-    streamed = _streamed(given) if rows else ()
+def _write(group: h5py.Group, given: Any, rows: int = 0, *, streamed: bool = False) -> None:
+    """Write a part of a result: what is streamed, or all else."""
+    along = _streamed(given) if rows else ()
     for own in described_fields(type(given)):
         value = getattr(given, own.name)
-        if value is None:
+        if value is None or (own.name in along) != streamed:
             continue
         if own.about:
-            _write_values(group, own.name, value, own, own.about, rows if own.name in streamed else 0)
+            _write_values(group, own.name, value, own, own.about, rows if streamed else 0)
         elif own.table:
             _write_table(group.create_group(own.name), own.inner, value)
         else:
