@@ -75,11 +75,14 @@ def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> 
                 file[name][done : done + len(values)] = values
             done += len(getattr(part, type(part).STREAMED)) if rows else 1
             output.require_written()
-        require_sound(path, part)
+        streamed = _streamed(part) if rows else []
+        # What lies along the axis is checked in the file, all of it.
+        wrong = list(_wrong_rows(file, type(part), streamed)) if rows else []
+        wrong = wrong or [each for each in findings(part) if each.partition(":")[0] not in streamed]
+        if wrong:
+            raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
         _write(file, part, rows, streamed=False)
         output.require_written()
-        if wrong := list(_wrong_rows(file, type(part), _streamed(part))) if rows else []:
-            raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
 
 def _streamed(given: Any) -> list[str]:

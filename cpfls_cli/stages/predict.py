@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.evidence import UncertaintyGroup
@@ -40,6 +39,7 @@ from cpfls_cli.pages.trust import NOT_SEEN, seen_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, stacked, style_of
+from cpfls_cli.rotations import attitude_rate, generalised_torque
 from cpfls_cli.stage import Parts, Run, stage
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.prediction import AlongFlight, Totals
@@ -234,7 +234,7 @@ def _prediction(signals: Signals, model: VehicleModel, body_torque: Array, measu
     """Arrange torques along a flight with attitude, shape (time, 3) each, N m, body frame."""
     attitude = signals.attitude
     assert attitude is not None, "checked before"
-    torque, given = (rotations.generalised_torque(attitude, each) for each in (body_torque, measured))
+    torque, given = (generalised_torque(attitude, each) for each in (body_torque, measured))
     inertia = _inertia_values(model, attitude)
     return AlongFlight(
         time=signals.time,
@@ -244,7 +244,7 @@ def _prediction(signals: Signals, model: VehicleModel, body_torque: Array, measu
         measured_torque=given,
         error=given - torque,
         inertia=inertia.value,
-        coriolis=coriolis_matrix(inertia, rotations.attitude_rate(attitude, signals.body_rate)),
+        coriolis=coriolis_matrix(inertia, attitude_rate(attitude, signals.body_rate)),
         extrapolates=np.zeros(len(attitude), dtype=bool) if model.fuzzy is None else model.fuzzy.outside(attitude),
     )
 
