@@ -222,7 +222,7 @@ def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flig
 def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
     result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
     assert result.exit_code == 0, result.stderr
-    first, *_, last = result.stdout.splitlines()
+    _, first, *_, last = result.stdout.splitlines()
     assert first.endswith(
         "held against what the motion takes with its inertia, noise of the differentiated rates included"
     )
@@ -231,7 +231,7 @@ def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, n
     assert page.exit_code == 0, page.stderr
     text = (tmp_path / "page.md").read_text()
     assert "Force on the body without weight" in text
-    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from." in text
+    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from" in text
 
 
 def without(flown, target, *names):
