@@ -25,9 +25,6 @@ _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/prediction": "prediction",
-    "cpfls/replay": "replay",
-    "cpfls/response": "response",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",
