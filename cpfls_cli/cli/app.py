@@ -17,29 +17,20 @@ from cpfls_cli.arguments import (
     ChooseOnOption,
     DiagnosisArgument,
     DisagreementArgument,
-    EveryOption,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightArgument,
     FlightsArgument,
     FolderOption,
     HeldOutOption,
-    HistoryOption,
-    HoldOption,
-    HorizonOption,
-    JudgedOption,
     LogsArgument,
-    ModelArgument,
     ModelOption,
-    PlayedArgument,
     ResumeOption,
     ResumeSweepOption,
     SchedulerOption,
     SweepTimeLimitOption,
     TimeLimitOption,
-    TimeOrder,
     TrainingArgument,
     ValidateOption,
     WorkersOption,
@@ -51,7 +42,6 @@ from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
-    SeveralAfterOption,
     refuse_overrides,
     sheet,
     with_common,
@@ -59,7 +49,6 @@ from cpfls_cli.cli.options import (
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
 
@@ -232,52 +221,6 @@ def vehicle(
 
 
 @_command()
-def predict(
-    config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
-) -> None:
-    """Predict torque, inertia and Coriolis matrices of a model along a flight."""
-    _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def replay(
-    config: ConfigArgument,
-    model: PlayedArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    horizon: HorizonOption = None,
-    every: EveryOption = 1,
-    hold: HoldOption = None,
-    history: HistoryOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
-        )
-        return command.run(job, model, flights, options)
-
-    _run("replay", config, output, common, call)
-
-
-@_command()
-def response(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    model: JudgedOption = None,
-    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
-    *,
-    common: Common,
-) -> None:
-    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
-    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
-
-
-@_command()
 def tune(
     config: Annotated[
         Path, typer.Argument(metavar="CONFIG|LOG", help="Study config (YAML); or a log, alone.", show_default=False)
@@ -415,95 +358,6 @@ def gap(
 ) -> None:
     """Compare, diagnose and extend in one go, with a report."""
     _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
-
-
-OtherVehicleOption = Annotated[
-    bool,
-    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
-]
-
-
-@_command(kind=SeveralAfterOption)
-def changed(
-    config: ConfigArgument,
-    today: Annotated[
-        list[Path],
-        typer.Argument(metavar="TODAY...", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
-    ],
-    output: FolderOption,
-    since: Annotated[
-        list[Path],
-        typer.Option(
-            "--reference",
-            "--since",
-            metavar="FLIGHT...",
-            help="Flights or logs of the same vehicle from before, three or more, one after another.",
-            show_default=False,
-        ),
-    ],
-    fail_on_change: Annotated[
-        bool,
-        typer.Option(
-            "--fail-on-change",
-            help="End with exit code 1 where something has changed, for scripts; with two reference flights 0 "
-            "says only that nothing is beyond what is usual of vehicles. Where that is unknown the exit code is 3, "
-            "with or without this.",
-        ),
-    ] = False,
-    anyway: OtherVehicleOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Say what has changed about a vehicle since reference flights: a rotor, its weight, its battery, or nothing."""
-    _run(
-        "changed",
-        config,
-        output,
-        common,
-        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change, anyway=anyway),
-    )
-
-
-@_command()
-def trend(
-    config: ConfigArgument,
-    flights: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FLIGHT...", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill, or to add to.", show_default=False),
-    ],
-    reference: Annotated[
-        int | None,
-        typer.Option(
-            "--reference",
-            metavar="N",
-            min=1,
-            help="The first N flights are those of the unchanged vehicle; default: half of them, as far as they do not "
-            "change, and three at least.",
-        ),
-    ] = None,
-    order: Annotated[
-        TimeOrder | None,
-        typer.Option("--order", help="What orders flights; default: their dates where all logs have one, or names."),
-    ] = None,
-    anyway: OtherVehicleOption = False,
-    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that read logs.")] = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Say since which of many flights what is changed about a vehicle; a second call reads only new ones."""
-
-    def call(command: Any, job: Job) -> Any:
-        chosen = command.Options(reference, order and order.value, anyway, workers, scheduler)
-        return command.run(job, flights, chosen)
-
-    _run("trend", config, output, common, call)
 
 
 @_command()

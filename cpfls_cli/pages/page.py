@@ -7,30 +7,22 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.artifacts.formats import module_of
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
-from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
-from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
-from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.response import response_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle import vehicle_section
@@ -40,7 +32,7 @@ from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import stage_named
 
 
 def _of_each(
@@ -73,7 +65,7 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
-        return [loaded(module_of(name)).section(source, number) for number, source in enumerate(own, start=1)]
+        return [stage_named(name).section(source, number) for number, source in enumerate(own, start=1)]
 
     return sections
 
@@ -110,19 +102,14 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
-    _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
+    _of_stage("predict"),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
-    _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
+    _of_stage("response"),
     _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
-    _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
-    _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
-    _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
-    _of_each(
-        "flight-numbers",
-        "What each flight tells",
-        lambda given: given.of_kind(FlightNumbersRecord),
-        flight_numbers_blocks,
-    ),
+    _of_stage("replay"),
+    _of_stage("trend"),
+    _of_stage("changed"),
+    _of_stage("_flight_numbers"),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from cpfls_cli.artifacts.formats import module_of
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.flights.flight import Flight, Imported
-from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
-from cpfls_cli.pages.replay import told_at, verdict_box
-from cpfls_cli.pages.response import response_box
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trend import trend_box
 from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import stage_named
 
 
 def summary_section(sources: Sources) -> Section:
@@ -32,13 +27,9 @@ def summary_section(sources: Sources) -> Section:
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
-    blocks += [response_box(response.record) for response in sources.responses]
     blocks += [twin_box(twin.record) for twin in sources.twins]
     blocks += [gains_box(gains.record) for gains in sources.gains]
-    blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
-    blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
-    blocks += [box for source in sources.all if source.stage for box in loaded(module_of(source.stage)).verdict(source)]
+    blocks += [box for source in sources.all if source.stage for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
