@@ -174,7 +174,7 @@ def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins 
         asked_gain=asked.gain_db,
         asked_phase=asked.phase_deg,
         asked_disk=asked.disk_deg,
-        required=float(np.degrees(2 * np.arctan(asked.disk / 2))),
+        required=asked.required_deg,
         rows=tuple(rows),
         axes=tuple(axes),
         fly=tuple(manoeuvres(flight.autopilot, weak)),
@@ -500,7 +500,7 @@ def _noise(flight: LogFlight, autopilot: Autopilot, law: Law) -> Noise | None:
     step = _NOISE_STEP_HZ
     frequency = np.arange(step, 0.5 * law.rate_hz, step)
     mean = np.stack([_binned(noise.frequency, each, frequency, step) for each in noise.density.T], axis=1)
-    return Noise(frequency, np.where(np.isfinite(mean), mean, level))
+    return Noise(frequency=frequency, density=np.where(np.isfinite(mean), mean, level))
 
 
 def _binned(frequency: Array, values: Array, middle: Array, width: float) -> Array:
