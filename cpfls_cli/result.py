@@ -34,6 +34,8 @@ class About(NamedTuple):
         Whether values may be missing: not finite.
     least : float
         Below which no value is.
+    ascends : bool
+        Whether each value is above the one before, and there are two at least.
     brief : bool
         Whether `--json` shows it too; what is not is in the file alone.
     """
@@ -44,6 +46,7 @@ class About(NamedTuple):
     frame: str = "none"
     gaps: bool = False
     least: float = -np.inf
+    ascends: bool = False
     brief: bool = True
 
 

@@ -2,25 +2,28 @@
 
 A field of a result is a dataset, a part is a group. A table is a group with one dataset for each field of its rows, as
 long as the table; what some rows lack, or hold several of, lies in a group of its own with the ``row`` of each line.
+Of a class with the axis ``STREAMED`` arrays along it are written and read some rows at a time, so that a long flight
+needs little memory.
 """
 
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from dataclasses import MISSING
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import MISSING, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.check import Origin as Origin
 from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_of
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
-from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.result import AXES, About, Described, described_fields
 from cpfls_cli.words import some
@@ -29,6 +32,10 @@ T = TypeVar("T")
 
 _PACKED_BYTES = 1 << 16
 """Size from which a dataset is compressed."""
+_LARGEST = 1e150
+"""Nothing that is measured or computed comes near; the square of a larger number is none."""
+_BLOCK = 1 << 18
+"""Rows that are checked at a time."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
 _NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
 _HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
@@ -41,20 +48,56 @@ Lengths = MutableMapping[str, tuple[int, str]]
 def write(path: Path, given: Any, origin: Origin) -> None:
     """Write a result, whose class names its ``FORMAT``; one that breaks its own description is refused."""
     require_sound(path, given)
+    axis = getattr(type(given), "STREAMED", "")
+    rows = len(getattr(given, axis)) if axis else 0
+    # In parts too, so that equal content is equal bytes however it came.
+    parts = ({name: getattr(given, name)[at : at + PART] for name in _streamed(given)} for at in range(0, rows, PART))
+    write_parts(path, (replace(given, **part) for part in parts) if rows else [given], rows, origin)
+
+
+def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> None:
+    """Write a result of which no more than a part is in memory: what is not along ``STREAMED`` is that of the first.
+
+    Parameters
+    ----------
+    rows : int
+        Along ``STREAMED``, in all parts together.
+    """
     with sealed_output(path) as output, h5py.File(output, "w") as file:
-        file.attrs["format"] = type(given).FORMAT
-        file.attrs["stage"] = origin.stage
-        file.attrs["schema_version"] = SCHEMA_VERSION
-        file.attrs["cpfls_version"] = origin.version
-        file.attrs["cautions"] = "\n".join(origin.cautions)
-        if origin.seed is not None:
-            file.attrs["seed"] = origin.seed
-        if origin.config:
-            file[CONFIG] = np.bytes_(origin.config.encode())
-        for role, source in sorted(origin.inputs.items()):
-            file.create_group(f"{INPUTS}/{role}").attrs.update(vars(source))
-        _write(file, given)
-        output.require_written()
+        done = 0
+        for part in parts:
+            if not done:
+                require_sound(path, part)
+                _write_origin(file, type(part), origin)
+                _write(file, part, rows)
+            for name in _streamed(part):
+                values = getattr(part, name)
+                file[name][done : done + len(values)] = values
+            done += len(getattr(part, type(part).STREAMED)) if rows else 1
+            output.require_written()
+        if wrong := list(_wrong_rows(file, type(part), _streamed(part))) if rows else []:
+            raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
+
+
+def _streamed(given: Any) -> list[str]:
+    """Name what a result holds along the axis that is written in parts."""
+    axis = getattr(type(given), "STREAMED", None)
+    along = [own for own in described_fields(type(given)) if own.about and own.about.axes[:1] == (axis,)]
+    return [own.name for own in along if getattr(given, own.name) is not None]
+
+
+def _write_origin(file: h5py.File, kind: Any, origin: Origin) -> None:
+    file.attrs["format"] = kind.FORMAT
+    file.attrs["stage"] = origin.stage
+    file.attrs["schema_version"] = SCHEMA_VERSION
+    file.attrs["cpfls_version"] = origin.version
+    file.attrs["cautions"] = "\n".join(origin.cautions)
+    if origin.seed is not None:
+        file.attrs["seed"] = origin.seed
+    if origin.config:
+        file[CONFIG] = np.bytes_(origin.config.encode())
+    for role, source in sorted(origin.inputs.items()):
+        file.create_group(f"{INPUTS}/{role}").attrs.update(vars(source))
 
 
 def require_sound(path: Path, given: Any) -> None:
@@ -63,13 +106,14 @@ def require_sound(path: Path, given: Any) -> None:
         raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
 
-def _write(group: h5py.Group, given: Any) -> None:
+def _write(group: h5py.Group, given: Any, rows: int = 0) -> None:
+    streamed = _streamed(given) if rows else ()
     for own in described_fields(type(given)):
         value = getattr(given, own.name)
         if value is None:
             continue
         if own.about:
-            _write_values(group, own.name, value, own, own.about)
+            _write_values(group, own.name, value, own, own.about, rows if own.name in streamed else 0)
         elif own.table:
             _write_table(group.create_group(own.name), own.inner, value)
         else:
@@ -108,13 +152,19 @@ def _lines(own: Described, value: Any) -> Sequence[Any]:
     return () if value is None else value if own.table or own.many else (value,)
 
 
-def _write_values(group: h5py.Group, name: str, value: Any, own: Described, about: About) -> None:
+def _write_values(group: h5py.Group, name: str, value: Any, own: Described, about: About, rows: int = 0) -> None:
+    """Write a dataset; of one with rows that come in parts make it alone."""
     array = _as(own, value)
     if array.dtype.kind == "U":
         # Text of fixed length: that of variable length lies in a heap whose bytes are not reproducible.
         array = np.char.encode(array, "utf-8", "backslashreplace")
-    packed = {"compression": "gzip", "shuffle": True} if array.nbytes >= _PACKED_BYTES else {}
-    dataset = group.create_dataset(name, data=array.astype(np.uint8) if array.dtype == bool else array, **packed)
+    array = array.astype(np.uint8) if array.dtype == bool else array
+    packed = {"compression": "gzip", "shuffle": True} if rows or array.nbytes >= _PACKED_BYTES else {}
+    if rows:
+        shape, chunk = (rows, *array.shape[1:]), (min(rows, PART), *array.shape[1:])
+        dataset = group.create_dataset(name, shape, array.dtype, chunks=chunk, **packed)
+    else:
+        dataset = group.create_dataset(name, data=array, **packed)
     unit = "text" if array.dtype.kind == "S" else about.unit
     dataset.attrs.update(units=unit, frame=about.frame, description=about.text)
     for axis, label in enumerate(about.axes[: array.ndim]):
@@ -142,6 +192,74 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
     return given, origin, findings(given)
+
+
+def count_rows(path: Path, kind: Any, name: str) -> int | None:
+    """Count the rows of a dataset; None where a file lacks it or holds no result of this class."""
+    try:
+        with opened_file(path) as file:
+            dataset = dataset_of(file, name) if _holds(file, kind) and name in file else None
+            return None if dataset is None or not dataset.ndim else int(dataset.shape[0])
+    except InputError:
+        return None
+
+
+def held_rows(path: Path, kind: Any) -> list[str]:
+    """Name what a file holds along the axis that is written in parts."""
+    with opened_file(path) as file:
+        return [
+            own.name
+            for own in described_fields(kind)
+            if own.about and own.about.axes[:1] == (kind.STREAMED,) and own.name in file
+        ]
+
+
+def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int) -> Iterator[list[Array]]:
+    """Read rows of datasets of equal length, up to the one before `stop`, so many at a time."""
+    with opened_file(path) as file:
+        datasets = [_dataset(file, path, name) for name in names]
+        for first in range(start, stop, rows):
+            last = min(first + rows, stop)
+            with patient(path):
+                read = [np.asarray(dataset[first:last], dtype=float) for dataset in datasets]
+            yield read
+
+
+def check_rows(path: Path, kind: Any, names: Sequence[str]) -> None:
+    """Refuse datasets along the axis that is written in parts which break their description, some rows at a time."""
+    with opened_file(path) as file, patient(path):
+        for name in names:
+            _dataset(file, path, name)
+        wrong = list(_wrong_rows(file, kind, names))
+    if wrong:
+        raise InputError("\n".join(f"{path}: {each}" for each in wrong))
+
+
+def _wrong_rows(file: h5py.File, kind: Any, names: Sequence[str]) -> Iterator[str]:
+    fields = {own.name: own for own in described_fields(kind)}
+    length = len(file[kind.STREAMED])
+    for name in names:
+        own, dataset = fields[name], file[name]
+        assert own.about is not None, "a part has no rows"
+        if len(dataset) != length:
+            yield f"{name}: {len(dataset)} along '{kind.STREAMED}', but {length} by {kind.STREAMED}"
+        for start in range(0, len(dataset), _BLOCK):
+            # With the row before it, to see whether it ascends.
+            block = dataset[max(0, start - own.about.ascends) : start + _BLOCK]
+            if found := [f"{each}, in rows from {start}" for each in _wrong(name, block, own, own.about, {})]:
+                yield from found
+                break
+
+
+def _dataset(file: h5py.File, path: Path, name: str) -> h5py.Dataset:
+    dataset = dataset_of(file, name) if name in file else None
+    if dataset is None or not dataset.ndim:
+        raise InputError(f"{path}: lacks {name}")
+    return dataset
+
+
+def _holds(file: h5py.File, kind: Any) -> bool:
+    return bool(file.attrs.get("format") == kind.FORMAT and stage_module(file.attrs))
 
 
 def stage_of(path: Path) -> str:
@@ -273,5 +391,11 @@ def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths
             yield f"{path}: {length} along '{label}', but {known} by {where}"
     if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
         yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
+    if array.dtype.kind == "f" and np.any(np.abs(array, dtype=float) > _LARGEST, where=np.isfinite(array)):
+        yield f"{path}: holds values beyond {_LARGEST:g}"
     if array.dtype.kind in "iuf" and np.any(array < about.least):
         yield f"{path}: is below {about.least:g}"
+    if about.ascends and len(array) < 2:
+        yield f"{path}: holds {len(array)} samples; at least two are needed"
+    elif about.ascends and np.any(falls := np.diff(array) <= 0):
+        yield f"{path}: does not ascend at index {int(np.argmax(falls)) + 1}"

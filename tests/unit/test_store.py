@@ -15,7 +15,11 @@ from cpfls_cli.result import about, part, plain, result
 from tests.builders.results import Craft, craft, estimate
 
 ORIGIN = store.Origin(
-    inputs={"log": InputFile("a.bbl", "0" * 64, "bbl")}, seed=3, config="seed: 3\n", cautions=("one", "two")
+    stage="look",
+    inputs={"log": InputFile("a.bbl", "0" * 64, "bbl")},
+    seed=3,
+    config="seed: 3\n",
+    cautions=("one", "two"),
 )
 
 
@@ -55,7 +59,7 @@ def test_tables_may_be_empty_and_seed_and_config_missing(tmp_path):
     own = craft(
         rotors=(), curves={}, notes=(), order=np.zeros(0, int), marked=np.zeros(0, bool), hover=None, battery="4S"
     )
-    store.write(tmp_path / "a.h5", own, store.Origin())
+    store.write(tmp_path / "a.h5", own, store.Origin(stage="look"))
     given, origin = store.read(tmp_path / "a.h5", Craft)
     assert repr(flat(given)) == repr(flat(own))
     assert (origin.seed, origin.config, origin.cautions) == (None, "", ())
@@ -71,7 +75,8 @@ def test_any_reader_sees_what_each_dataset_is(written):
     with h5py.File(written) as file:
         assert dict(file.attrs) | {"cpfls_version": ""} == {
             "format": "cpfls/craft",
-            "schema_version": 2,
+            "stage": "look",
+            "schema_version": 3,
             "cpfls_version": "",
             "seed": 3,
             "cautions": "one\ntwo",
@@ -92,7 +97,7 @@ def test_single_precision_stays_and_what_is_large_is_compressed(tmp_path):
         values: np.typing.NDArray[np.float32] = about("samples", "sample")
 
     values = np.arange(100_000, dtype=np.float32)
-    store.write(tmp_path / "a.h5", Long(values=values), store.Origin())
+    store.write(tmp_path / "a.h5", Long(values=values), store.Origin(stage="look"))
     given, _ = store.read(tmp_path / "a.h5", Long)
     assert given.values.dtype == np.float32
     assert np.array_equal(given.values, values)
@@ -216,3 +221,82 @@ def test_other_files_are_refused(written, tmp_path):
 
 def test_json_is_the_same_after_reading(written):
     assert plain(store.read(written, Craft)[0]) == plain(craft())
+
+
+@result
+class Track:
+    """A long track."""
+
+    FORMAT: ClassVar = "cpfls/track"
+    STREAMED: ClassVar = "time"
+
+    time: np.ndarray = about("time", "time", unit="s", ascends=True)
+    place: np.ndarray = about("place", "time", "axis", unit="m")
+    wind: np.ndarray | None = about("wind", "time", default=None)
+    name: str = about("who flew")
+
+
+def track(samples, start=0, **more):
+    time = np.arange(start, start + samples) * 0.01
+    return Track(time=time, place=np.outer(time, [1.0, 2.0, 3.0]), name="Ann", **more)
+
+
+def test_parts_of_a_long_result_are_the_bytes_of_the_whole(tmp_path):
+    whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
+    store.write(whole, track(20_000), ORIGIN)
+    store.write_parts(parts, (track(min(8192, 20_000 - at), at) for at in range(0, 20_000, 8192)), 20_000, ORIGIN)
+    assert whole.read_bytes() == parts.read_bytes()
+    given, _ = store.read(parts, Track)
+    assert np.array_equal(given.place, track(20_000).place)
+    store.write(whole, track(8193), ORIGIN)
+    assert len(store.read(whole, Track)[0].time) == 8193
+
+
+def test_a_part_that_breaks_its_description_is_not_written(tmp_path):
+    path = tmp_path / "parts.h5"
+    with pytest.raises(ComputationError, match="time: does not ascend at index 100, in rows from 0"):
+        store.write_parts(path, iter([track(100), track(100)]), 200, ORIGIN)
+    assert not path.exists()
+
+
+def test_rows_are_read_some_at_a_time(tmp_path):
+    path = tmp_path / "track.h5"
+    store.write(path, track(1000), ORIGIN)
+    assert store.count_rows(path, Track, "time") == 1000
+    assert store.count_rows(path, Track, "wind") is store.count_rows(path, Craft, "time") is None
+    assert store.held_rows(path, Track) == ["time", "place"]
+    store.check_rows(path, Track, ["time", "place"])
+    times, places = zip(*store.read_rows(path, ["time", "place"], 100, 350, 100), strict=True)
+    assert [len(each) for each in times] == [100, 100, 50]
+    assert np.array_equal(np.concatenate(places), track(1000).place[100:350])
+    with pytest.raises(InputError, match="lacks wind"):
+        store.check_rows(path, Track, ["wind"])
+
+
+def test_rows_that_break_their_description_are_found_without_reading_all(tmp_path):
+    path = tmp_path / "track.h5"
+    store.write(path, track(600_000), ORIGIN)
+
+    def spoil(file):
+        file["time"][300_000] = 0.0
+        file["place"][500_000] = np.inf
+
+    changed(path, spoil)
+    with pytest.raises(InputError) as error:
+        store.check_rows(path, Track, ["time", "place"])
+    assert [line.partition(": ")[2] for line in str(error.value).splitlines()] == [
+        "time: does not ascend at index 37857, in rows from 262144",
+        "place: 3 of 786432 values are not finite, in rows from 262144",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("own", "finding"),
+    [
+        (track(1), "time: holds 1 samples; at least two are needed"),
+        (dataclasses.replace(track(3), time=np.array([0.0, 2.0, 2.0])), "time: does not ascend at index 2"),
+        (dataclasses.replace(track(3), place=np.full((3, 3), 1e200)), "place: holds values beyond 1e+150"),
+    ],
+)
+def test_findings_of_time_and_of_size(own, finding):
+    assert finding in store.findings(own)
