@@ -17,7 +17,14 @@ from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
+from cpfls_cli.artifacts.output import (
+    check_folder,
+    check_output,
+    filled_folder,
+    refuse_inputs,
+    refuse_own,
+    write_text,
+)
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
@@ -91,6 +98,8 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
+    text : tuple of (Path, str) or None
+        A file of text that is written behind the result.
     """
 
     writes: bool = True
@@ -101,6 +110,7 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
+    text: tuple[Path, str] | None = None
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -133,6 +143,14 @@ class Run(Job):
         """Name a command that goes on with the config of this run."""
         self.next.append(go_on(self, command, *words, output=output))
 
+    def write_text(self, path: Path, text: str, what: str) -> None:
+        """Have a file of text written behind the result, or alone where none is written; `what` says what it is."""
+        if self.writes:
+            refuse_own(path, self.output)
+        check_output(path, self.force, self.inputs)
+        self.text = path, text
+        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
@@ -158,8 +176,10 @@ class Stage:
         Whether its output is a folder with a page for each result; left out, the answer is only printed.
     fills : Filled or None
         Whether its output is a folder with one answer.
-    study : bool
-        Whether it takes a config.
+    study : bool or callable
+        Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
+    output : object
+        Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
     """
@@ -171,7 +191,8 @@ class Stage:
     words: Mapping[str, Any]
     folder: bool
     fills: Filled | None
-    study: bool
+    study: bool | Callable[[Mapping[str, Any]], bool]
+    output: Any
     several: bool
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -234,11 +255,13 @@ class Stage:
             where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if self.study else ""
+            config = "the config and " if run.with_config else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
         if run.writes:
             self._write(run, run.output, results)
+        if run.text:
+            write_text(*run.text)
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
@@ -255,7 +278,7 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else None,
+            written=run.output if run.writes else run.text and run.text[0],
         )
 
     def info(self, path: Path) -> Outcome:
@@ -375,11 +398,14 @@ def stage(
     words: Mapping[str, Any] | None = None,
     folder: bool = False,
     fills: Filled | None = None,
-    study: bool = False,
+    study: bool | Callable[[Mapping[str, Any]], bool] = False,
+    output: Any = None,
     several: bool = False,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
+    return lambda function: Stage(
+        function, kind, title, figures or {}, words or {}, folder, fills, study, output, several
+    )
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

@@ -37,8 +37,8 @@ _LARGEST = 1e150
 _BLOCK = 1 << 18
 """Rows that are checked at a time."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
-_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
-_HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
+_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
+_HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
 """Kinds of arrays that hold values of a type."""
 
 Lengths = MutableMapping[str, tuple[int, str]]
@@ -389,7 +389,7 @@ def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths
         known, where = (fixed, "its description") if fixed else lengths.setdefault(label, (length, path))
         if length != known:
             yield f"{path}: {length} along '{label}', but {known} by {where}"
-    if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
+    if array.dtype.kind in "fc" and not about.gaps and not np.isfinite(array).all():
         yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
     if array.dtype.kind == "f" and np.any(np.abs(array, dtype=float) > _LARGEST, where=np.isfinite(array)):
         yield f"{path}: holds values beyond {_LARGEST:g}"

@@ -24,7 +24,6 @@ _RECORDS = {
     ("cpfls/replay", ""): "replay.ReplayRecord",
     ("cpfls/response", ""): "response.ResponseRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",
-    ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

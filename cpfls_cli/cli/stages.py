@@ -16,7 +16,15 @@ from typer.core import TyperCommand
 
 from cpfls_cli.arguments import FolderOption
 from cpfls_cli.cli.interrupts import deferred_interrupts
-from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, repeated, with_common
+from cpfls_cli.cli.options import (
+    Commands,
+    Common,
+    ConfigArgument,
+    OutputOption,
+    refuse_overrides,
+    repeated,
+    with_common,
+)
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import ComputationError
 
@@ -112,7 +120,7 @@ def run_of(
 
     study = common.study(config) if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
-    run.writes, run.with_config = output is not None, own.study
+    run.writes, run.with_config = output is not None, config is not None
     if config:
         reads(config)
         run.inputs.append(config)
@@ -139,12 +147,17 @@ def command_of(own: Stage) -> Callable[..., None]:
     parameters = [
         each for each in inspect.signature(own.function, eval_str=True).parameters.values() if each.name != "run"
     ]
+    declared = any(each.name == "config" for each in parameters)
 
     def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
         with messages_for_errors():
             from cpfls_cli.artifacts.output import locked
 
             narration = Narration(own.name, common.verbose and not common.quiet)
+            given |= {"config": config} if declared else {}
+            if callable(own.study) and not own.study(given):
+                refuse_overrides(common)
+                config = None
             with progress_bar(own.name, common) as progress:
                 run = run_of(own, common, output, config, narration.reads, progress)
                 with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
@@ -154,13 +167,13 @@ def command_of(own: Stage) -> Callable[..., None]:
             tell(outcome, common)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    added = {"config": ConfigArgument} if own.study else {}
-    option = FilledOption if own.folder else FolderOption if own.fills else OutputOption
+    added = {"config": ConfigArgument} if own.study and not declared else {}
+    option = own.output or (FilledOption if own.folder else FolderOption if own.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
         *(each.replace(kind=keyword) for each in parameters),
-        output.replace(default=None) if own.folder else output,
+        output.replace(default=None) if own.folder or own.output else output,
         inspect.Parameter("common", keyword, annotation=Common),
     ]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]

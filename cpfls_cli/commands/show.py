@@ -30,7 +30,6 @@ _PAGES = {
     "cpfls/replay": "replay",
     "cpfls/response": "response",
     "cpfls/twin": "twin",
-    "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",

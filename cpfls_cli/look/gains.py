@@ -15,6 +15,7 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.law import flown_feedback
 from cpfls_cli.look.manoeuvres import Manoeuvre, manoeuvres
+from cpfls_cli.look.vibration import Change
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, disk_of, frequencies, is_stable, moved_by
@@ -146,6 +147,13 @@ class TunedGains:
     def changes(self) -> tuple[GainRow, ...]:
         """Rows that change."""
         return tuple(row for row in self.rows if row.direction != "keep")
+
+
+@result
+class LogGains(TunedGains):
+    """Gains from a log alone, with the filters that its spectra ask for."""
+
+    filters: tuple[Change, ...] = part(default=())
 
 
 def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins | None = None) -> TunedGains:

@@ -18,7 +18,6 @@ from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.flight import flight_blocks, vehicle_section
 from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
-from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.prediction import prediction_blocks
@@ -113,7 +112,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
     _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
-    _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
+    _of_stage("tune"),
     _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
     _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
     _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),

@@ -13,7 +13,6 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
@@ -28,6 +27,7 @@ from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
+from cpfls_cli.tuning.vehicle import Gains
 
 _REPEAT = (
     "To make these artifacts again, save each config below, as it is, under the name that stands before it, and run "
@@ -98,7 +98,7 @@ _COMMANDS: dict[type, _Command] = {
     ReplayRecord: _Command("replay", ("model", "flight")),
     TwinRecord: _Command("simulate", ("flight",), ("model",)),
     ResponseRecord: _Command("response", ("flight",), ("model",)),
-    GainsRecord: _Command("tune", ("model",), ("flight",)),
+    Gains: _Command("tune", ("model",), ("flight",)),
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
@@ -186,8 +186,8 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
 
 def _asked(record: Record) -> list[str]:
     """Give the options that are no files."""
-    if isinstance(record, GainsRecord):
-        asked = {"gain": record.asked_gain, "phase": record.asked_phase, "disk": record.asked_disk}
+    if isinstance(record, Gains):
+        asked = {"gain": record.asked.gain_db, "phase": record.asked.phase_deg, "disk": record.asked.disk_deg}
         margins = [word for name, value in asked.items() for word in (f"--{name}-margin", f"{value:g}")]
         return ["--autopilot", record.autopilot, *margins]
     if not isinstance(record, ReplayRecord):

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
-    from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
     from cpfls_cli.reduction.selection import Selection
+    from cpfls_cli.tuning.vehicle import Gains
 
 R = TypeVar("R", default=Any)
 
@@ -70,7 +70,7 @@ class Sources:
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
     twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
-    gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
+    gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")

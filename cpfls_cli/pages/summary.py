@@ -9,7 +9,6 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
-from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
@@ -34,7 +33,6 @@ def summary_section(sources: Sources) -> Section:
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     blocks += [response_box(response.record) for response in sources.responses]
     blocks += [twin_box(twin.record) for twin in sources.twins]
-    blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
     blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]

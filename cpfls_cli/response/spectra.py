@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers, runs
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.response.mismatch import clearness
-from cpfls_cli.result import about, result
 
 _LENGTHS = 5
 """Windows of so many lengths, from the shortest to the longest by equal ratios."""
@@ -83,22 +82,6 @@ class Stretch(NamedTuple):
     model: Channel | None = None
     instrument: Array | None = None
     start: int = 0
-
-
-@result
-class Curve:
-    """Complex gains by frequency, as a Bode plot shows them."""
-
-    magnitude: Array = about("20 log10 of the gain", "frequency", unit="dB", gaps=True, brief=False)
-    phase: Array = about("from -180 to 180", "frequency", unit="deg", gaps=True, brief=False)
-
-    @classmethod
-    def of(cls, gains: Numbers) -> Curve:
-        """Make one of complex gains, shape (frequency,), NaN where they are not known."""
-        known = np.abs(gains) > 0
-        held = np.where(known, gains, 1.0)
-        magnitude, phase = 20 * np.log10(np.abs(held)), np.degrees(np.angle(held))
-        return cls(magnitude=np.where(known, magnitude, np.nan), phase=np.where(known, phase, np.nan))
 
 
 @dataclass(frozen=True, kw_only=True)

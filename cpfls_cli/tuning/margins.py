@@ -8,9 +8,8 @@ from math import nan
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
+from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
-from cpfls_cli.response.spectra import Curve
 from cpfls_cli.result import about, part, result
 from cpfls_cli.tuning.noise import Noise
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
@@ -243,9 +242,9 @@ class AxisEvaluation:
     jitter: float | None = about(
         "root mean square of the command that the noise of the gyroscope makes, share of the full one", default=None
     )
-    loop: Curve = part()
-    loop_worst: Curve = part()
-    angle_closed: Curve = part()
+    loop: ComplexArray = about("gain of the loop, cut at the command", "frequency", brief=False)
+    loop_worst: ComplexArray = about("the same with the plant that comes nearest to -1", "frequency", brief=False)
+    angle_closed: ComplexArray = about("angle over its setpoint", "frequency", brief=False)
     step: Array = about("angle after a step of its setpoint, share of it", "time", brief=False)
     step_low: Array = about("the least with three possible plants", "time", brief=False)
     step_high: Array = about("the largest", "time", brief=False)
@@ -282,9 +281,7 @@ def evaluate(law: Law, hover: HoverPlant, noise: Noise | None = None) -> Evaluat
     time = steps[0].time
     kept = np.unique(np.linspace(0, len(time) - 1, _SHOWN).astype(int))
     roll, pitch, yaw = (_about_axis(law, axis, own, steps, kept, noise) for axis, own in enumerate(every))
-    return Evaluation(
-        rate_hz=law.rate_hz, frequency=frequencies(law), time=time[kept], roll=roll, pitch=pitch, yaw=yaw
-    )
+    return Evaluation(rate_hz=law.rate_hz, frequency=frequencies(law), time=time[kept], roll=roll, pitch=pitch, yaw=yaw)
 
 
 def _about_axis(
@@ -306,9 +303,9 @@ def _about_axis(
         overshoot_most=max(float(each.overshoot[axis]) for each in steps),
         rise_s=float(steps[0].rise_s[axis]),
         jitter=None if noise is None else noise.of_command(law, axis),
-        loop=Curve.of(loops[0].command),
-        loop_worst=Curve.of(worst.command),
-        angle_closed=Curve.of(loops[0].angle_closed),
+        loop=loops[0].command,
+        loop_worst=worst.command,
+        angle_closed=loops[0].angle_closed,
         step=shown[0],
         step_low=shown.min(axis=0),
         step_high=shown.max(axis=0),

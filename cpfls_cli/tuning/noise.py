@@ -39,9 +39,7 @@ class Noise:
     SHOWN = ("lines",)
 
     frequency: Array = about("as far as the logs show", "noise frequency", unit="Hz", brief=False)
-    density: Array = about(
-        "of body rates", "noise frequency", "axis", unit="rad^2/s^2/Hz", frame="body", brief=False
-    )
+    density: Array = about("of body rates", "noise frequency", "axis", unit="rad^2/s^2/Hz", frame="body", brief=False)
 
     @property
     def highest_hz(self) -> float:

@@ -16,7 +16,7 @@ from cpfls_cli.autopilots.motors import straightening
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
-from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
+from cpfls_cli.tuning.gains import AskedMargins, Proposal, Tuned, proposal_of, with_filters
 from cpfls_cli.tuning.margins import Evaluation, evaluate
 from cpfls_cli.tuning.noise import Line, Noise
 from cpfls_cli.tuning.plant import HoverPlant, Spread, hover_plant
@@ -106,7 +106,7 @@ class Gains:
 def gains_for_vehicle(
     autopilot: Autopilot,
     model: VehicleModel,
-    spreads: tuple[Spread, Spread, Spread],
+    spreads: tuple[Spread, ...],
     *,
     vehicle: str,
     rotor_lag: float,
@@ -139,24 +139,13 @@ def gains_for_vehicle(
     def hover_of(whole: Mapping[str, float]) -> HoverPlant:
         return replace(hover_plant(autopilot.law(whole), model.vehicle, model, rotor_lag), spreads=spreads)
 
-    others, warnings = [*_curve(autopilot, model)] if signals else [], list[str]()
-    if noise is not None and noise.lines and _follows(autopilot, today):
-        warnings.append(
-            f"a line at {noise.lines[0].hz:.3g} Hz is in the noise behind a notch that follows the motors; it is left "
-            "as it is, and taken at its centre here"
-        )
-    elif noise is not None:
+    others = [*_curve(autopilot, model)] if signals else []
+    follows = noise is not None and bool(noise.lines) and _follows(autopilot, today)
+    if noise is not None and not follows:
         others += _notches(autopilot, noise.lines)
     whole = {**values, **{each.parameter.name: each.value for each in others}}
     hover = hover_of(whole)
     found = with_filters(autopilot, whole, hover, asked, noise)
-    if any(found.quieter):
-        axes = joined([name for name, limited in zip(AXES, found.quieter, strict=True) if limited])
-        why = "noise" if noise is not None else "noise, which no log shows"
-        warnings.append(
-            f"{axes}: held back by {why}; commands jitter at most twice as much as with the gains before: load these, "
-            "fly, and tune again with that log"
-        )
     held = autopilot.by_role("motors.hover")
     proposals = [*found.proposals, *others, *([] if held is None else [proposal_of(held, hover.share)])]
     chosen = values | {each.parameter.name: each.value for each in proposals}
@@ -190,11 +179,27 @@ def gains_for_vehicle(
         warnings=(
             *_mixer_warnings(autopilot, model.vehicle),
             *_hover_warnings(autopilot, today, hover, model.vehicle),
-            *warnings,
+            *_of_noise(noise, found, follows=follows),
             *_lacking(autopilot, today, proposals),
             *_steps(autopilot, values, today),
         ),
     )
+
+
+def _of_noise(noise: Noise | None, found: Tuned, *, follows: bool) -> Iterator[str]:
+    """Say what noise does to the gains, and which line of it is left to a notch that follows the motors."""
+    if follows and noise is not None:
+        yield (
+            f"a line at {noise.lines[0].hz:.3g} Hz is in the noise behind a notch that follows the motors; it is left "
+            "as it is, and taken at its centre here"
+        )
+    if any(found.quieter):
+        axes = joined([name for name, limited in zip(AXES, found.quieter, strict=True) if limited])
+        why = "noise" if noise is not None else "noise, which no log shows"
+        yield (
+            f"{axes}: held back by {why}; commands jitter at most twice as much as with the gains before: load these, "
+            "fly, and tune again with that log"
+        )
 
 
 def _curve(autopilot: Autopilot, model: VehicleModel) -> Iterator[Proposal]:

@@ -10,13 +10,12 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, gains, model, trend, twin
+from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, model, trend, twin
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
-from tests.builders.autopilots import gains_record
 from tests.builders.changed_flights import write_flights
 from tests.builders.drawn_numbers import trend_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
@@ -25,7 +24,7 @@ from tests.builders.twins import twin_record
 FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "response", "sweep")
 FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "twin", "vehicle", "gains")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "twin", "vehicle")
 # What a plan asks of the vehicle between its samples is not in its artifact.
 ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
@@ -76,14 +75,8 @@ def of_flights(cpfls, tmp_path_factory):
     return {name: source_of(read_any(path), path.name, file_sha256(path)) for name, path in paths.items()}
 
 
-@pytest.fixture(scope="session")
-def tuned():
-    """Gains, once for all."""
-    return source_of(gains_record(), "gains.h5")
-
-
 @pytest.fixture
-def answered(told, of_flights, tuned):
+def answered(told, of_flights):
     """A record by its format, and the blocks that its command says."""
 
     def of(name):
@@ -98,8 +91,6 @@ def answered(told, of_flights, tuned):
         if name == "trend":
             source = source_of(trend_record(), f"{name}.h5")
             return source, tuple(trend.answer(source))
-        if name == "gains":
-            return tuned, tuple(gains.answer(tuned))
         if name in of_flights:
             page = {"flight-numbers": flight_numbers, "changed": changed}[name]
             return of_flights[name], tuple(page.answer(of_flights[name]))
