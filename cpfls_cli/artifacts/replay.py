@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.flight import BEGINS, known_begins
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
+from cpfls_cli.playback.flight import contradictions_of
 from cpfls_cli.playback.replay import (
     AFTER,
     MODEL,
@@ -19,6 +20,7 @@ from cpfls_cli.playback.replay import (
     drawn_runs,
     where_better,
 )
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
@@ -28,9 +30,6 @@ if TYPE_CHECKING:
 
 WORST = 5
 """Windows that are listed."""
-
-VEHICLE = "vehicle"
-"""In the place of a model: the vehicle of the config."""
 
 
 def played_words(played: str) -> str:
@@ -343,11 +342,6 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     return Trust.SIMULATION if simulates else Trust.CONTROL
 
 
-def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...] | None:
-    """Gather what no verdict can stand beside; None where there is nothing."""
-    return tuple(each for flight in flights for each in flight.contradictions) or None
-
-
 @record
 class PlayedFlightsGroup:
     """Flights that a model was played back along."""
@@ -510,7 +504,7 @@ class ReplayRecord(Record):
             worst=WorstGroup.of(windows, played, horizon),
             drawn=DrawnGroup.of(windows, played, horizon),
             warning=tuple(warnings),
-            contradiction=contradictions_of(flights),
+            contradiction=contradictions_of(flights) or None,
             **groups,  # type: ignore[arg-type]  # only the body rate is always known
         )
 

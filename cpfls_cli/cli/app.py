@@ -30,7 +30,6 @@ from cpfls_cli.arguments import (
     HistoryOption,
     HoldOption,
     HorizonOption,
-    JudgedOption,
     LogArgument,
     LogsArgument,
     ModelArgument,
@@ -385,20 +384,6 @@ def replay(
         return command.run(job, model, flights, options)
 
     _run("replay", config, output, common, call)
-
-
-@_command()
-def response(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    model: JudgedOption = None,
-    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
-    *,
-    common: Common,
-) -> None:
-    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
-    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
 
 
 @_command()

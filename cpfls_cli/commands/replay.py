@@ -14,17 +14,15 @@ from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
-from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
+from cpfls_cli.flights.playback import flights_to_play, model_notes, played
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.history import Observer, past_of
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows, replay
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.words import joined
 
 _FORECAST = "{}: its forecast along logged rotor speeds is played, loop included; its constants are a different model"
 
@@ -73,15 +71,6 @@ def _past_notes(observer: Observer, pairs: Sequence[Played], windows: ReplayWind
             f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the start of a "
             f"stretch and use what past there is"
         )
-
-
-def model_notes(name: str, model: VehicleModel, flights: Sequence[LoggedFlight]) -> Iterator[str]:
-    """Say what a model of this name does to flights, and what it lacks in them."""
-    for repair in repairs_of(model):
-        yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
-    still = [flight.name for flight in flights if model.table.feels_air and not flight.playback.translates]
-    if still:
-        yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"
 
 
 def _samples(time_s: float, flight: LoggedFlight, option: str) -> int:

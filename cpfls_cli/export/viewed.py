@@ -15,7 +15,6 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gap_flights import FlightsGroup
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
 from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
@@ -36,7 +35,9 @@ from cpfls_cli.export.tracks import (
     View,
 )
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.response.flown import Responses
 from cpfls_cli.simulation.twin import FRAMES, UNITS
+from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
 
 _ASKED = "setpoint_"
@@ -45,21 +46,21 @@ _OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
 """Signals whose unit is that of the import."""
 
 
-def view_of(path: Path, record: Record) -> View:
-    """Gather what is to be drawn of an artifact.
+def view_of(path: Path, given: Any, config: str) -> View:
+    """Gather what is to be drawn of an artifact that was made with a config.
 
     Raises
     ------
     InputError
         If there is nothing.
     """
-    study = stored_study(record.origin.config, path)
+    study = stored_study(config, path)
     for kind, made in _KINDS.items():
-        if isinstance(record, kind):
-            return made(path.name, record, study)
-    *others, last = (kind.FORMAT.name for kind in _KINDS)
+        if isinstance(given, kind):
+            return made(path.name, given, study)
+    *others, last = map(format_of, _KINDS)
     raise InputError(
-        f"{path}: is a {record.FORMAT.name}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
+        f"{path}: is a {format_of(given)}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
         f"and {last}"
     )
 
@@ -304,17 +305,17 @@ def _of_diagnosis(title: str, record: DiagnosisRecord, study: Study) -> View:
     return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
 
 
-def _of_response(title: str, record: ResponseRecord, study: Study) -> View:
+def _of_response(title: str, given: Responses, study: Study) -> View:
     del study
     curves = [
         Curve(
             name=name.replace(" ", "_"),
             over="frequency_hz",
-            x=record.frequency,
-            values={column: values[row] for column, values in record.columns.items()},
+            x=own.frequency,
+            values=own.columns,
             description=f"frequency response: {name}",
         )
-        for row, name in enumerate(record.name)
+        for name, own in given.responses.items()
     ]
     return View(title, (), curves)
 
@@ -358,12 +359,12 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
     return names
 
 
-_KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
+_KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
     PredictionRecord: _of_prediction,
     ReplayRecord: _of_replay,
     DisagreementRecord: _of_disagreement,
     DiagnosisRecord: _of_diagnosis,
-    ResponseRecord: _of_response,
+    Responses: _of_response,
     TwinRecord: _of_twin,
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cpfls_cli.errors import CpflsError, InputError
-from cpfls_cli.library.artifact import Artifact, read
+from cpfls_cli.library.artifact import Artifact, _read, read
 
 if TYPE_CHECKING:
     import os
@@ -81,8 +81,8 @@ def stated_vehicle(config: str | os.PathLike[str]) -> Model:
     ConfigError
         If the config is not good; the message names every wrong key.
     """
-    from cpfls_cli.artifacts.replay import VEHICLE
     from cpfls_cli.config.load import load_study
+    from cpfls_cli.playback.settings import VEHICLE
 
     return Model(Path(VEHICLE), load_study(Path(config)), None)
 
@@ -325,13 +325,12 @@ class Model:
         """Run a command, and keep in memory what it writes."""
         from tempfile import TemporaryDirectory
 
-        from cpfls_cli.artifacts.store import read_any
         from cpfls_cli.report.outcome import cautioned
 
         with TemporaryDirectory(prefix="cpfls-") as folder:
             job = self._job(Path(folder, "artifact.h5"), force=False)
             _warn(cautioned(command(job), job), 4)
-            return Artifact(read_any(job.output))
+            return _read(job.output)
 
     def _job(self, output: Path, force: bool) -> Job:
         from cpfls_cli.artifacts.job import Job

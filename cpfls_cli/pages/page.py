@@ -24,7 +24,6 @@ from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.response import response_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
@@ -110,7 +109,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
-    _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
+    _of_stage("response"),
     _of_stage("tune"),
     _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
     _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),

@@ -9,7 +9,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.artifacts.replay import (
-    VEHICLE,
     ErrorsByHorizon,
     HeldOutGroup,
     PlaybackGroup,
@@ -38,6 +37,7 @@ from cpfls_cli.playback.replay import (
     STATED,
     WITH_PAST,
 )
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
