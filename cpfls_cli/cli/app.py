@@ -75,6 +75,7 @@ from cpfls_cli.cli.path_options import (
 )
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
+from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__

@@ -240,7 +240,7 @@ def _of_vehicle(
     """Find gains of a vehicle that was found, and have a file of parameters written with them."""
     run.take({"model": model} | numbered_roles("flight", flights))
     record = _trusted(run, model)
-    run.found = with_numbers(run, "tune", model, whole=True).found
+    with_numbers(run, "tune", model, whole=True)
     vehicle = read_model(model, run.study)
     logs = [_read(each, run.study) for each in flights]
     known, refused = _todays(autopilot, logs)
