@@ -18,7 +18,6 @@ _RECORDS = {
     ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
-    ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

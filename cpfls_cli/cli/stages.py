@@ -38,6 +38,8 @@ ORDER = (
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
 )
 """Of the list of commands; what it does not name stands behind."""
+PARTS = ("twin",)
+"""Stages that are a part of another command: of `simulate`, along a flight."""
 _DOCSTRING = re.compile(r'^"""(.*?)"""', re.DOTALL)
 FilledOption = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill.", show_default=False)
@@ -100,8 +102,9 @@ class AllCommands(Commands):
 
 
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
-    """List the commands of the stages in a folder."""
-    files = {file.stem.replace("_", "-"): file for file in sorted(folder.glob("[a-z]*.py"))}
+    """List the commands of the stages in a folder; some are a part of another command, which calls them."""
+    every = (file for file in sorted(folder.glob("[a-z]*.py")) if file.stem not in PARTS)
+    files = {file.stem.replace("_", "-"): file for file in every}
     return {name: StageCommand(file) for name, file in files.items()}
 
 

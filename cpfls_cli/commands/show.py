@@ -28,7 +28,6 @@ _PAGES = {
     "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",
     "cpfls/replay": "replay",
-    "cpfls/twin": "twin",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",

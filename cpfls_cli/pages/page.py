@@ -30,7 +30,6 @@ from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
-from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
@@ -108,7 +107,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
-    _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
+    _of_stage("twin"),
     _of_stage("response"),
     _of_stage("tune"),
     _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
-    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
+    from cpfls_cli.simulation.twin import Twin
     from cpfls_cli.tuning.vehicle import Gains
 
 R = TypeVar("R", default=Any)
@@ -69,7 +69,7 @@ class Sources:
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
-    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
+    twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
     gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")

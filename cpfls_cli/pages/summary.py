@@ -16,7 +16,6 @@ from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trend import trend_box
 from cpfls_cli.pages.trust import learned_words
-from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 from cpfls_cli.stage import loaded
@@ -30,7 +29,6 @@ def summary_section(sources: Sources) -> Section:
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
-    blocks += [twin_box(twin.record) for twin in sources.twins]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
     blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]

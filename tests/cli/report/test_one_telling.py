@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, model, trend, twin
+from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, model, trend
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
@@ -19,12 +19,11 @@ from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.changed_flights import write_flights
 from tests.builders.drawn_numbers import trend_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
-from tests.builders.twins import twin_record
 
 FROM_COMMANDS = ("trajectory", "flight", "model", "prediction", "replay", "response", "sweep")
 FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "twin", "vehicle")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "vehicle")
 # What a plan asks of the vehicle between its samples is not in its artifact.
 ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
@@ -84,9 +83,6 @@ def answered(told, of_flights):
         if name == "vehicle":
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
             return source, tuple(model.answer(source))
-        if name == "twin":
-            source = source_of(twin_record(), f"{name}.h5")
-            return source, tuple(twin.answer(source))
         if name == "trend":
             source = source_of(trend_record(), f"{name}.h5")
             return source, tuple(trend.answer(source))
