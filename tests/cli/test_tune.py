@@ -171,7 +171,7 @@ def test_each_verdict_on_margins_is_said(gains, folder):
     assert box.sentences[1].startswith("Today's give roll ")
     assert box.sentences[1].endswith(", yaw unstable with some.")
     (cells,) = folded.blocks[1].cells
-    assert folded.summary == "Each parameter with today's value"
+    assert folded.summary == "each parameter with today's value"
     assert (cells[1].tone, cells[2].text) == ("warning", "2")
     assert cells[4].text.endswith("; 7 was wanted, which the range does not hold")
 
