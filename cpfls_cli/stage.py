@@ -23,6 +23,7 @@ from cpfls_cli.artifacts.output import (
     filled_folder,
     refuse_inputs,
     refuse_own,
+    write_files,
     write_text,
 )
 from cpfls_cli.artifacts.spec import InputFile
@@ -98,8 +99,10 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
-    text : tuple of (Path, str) or None
-        A file of text that is written behind the result.
+    texts : dict of Path to str
+        Other files that are written with the result.
+    said : list of Text
+        Of this run alone: its file says none of it again.
     """
 
     writes: bool = True
@@ -110,7 +113,8 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
-    text: tuple[Path, str] | None = None
+    texts: dict[Path, str] = field(default_factory=dict)
+    said: list[Text] = field(default_factory=list)
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -124,6 +128,14 @@ class Run(Job):
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
+
+    def say(self, text: str) -> None:
+        """Add to the answer what only this run has to say."""
+        self.said.append(Text(text))
+
+    def note(self, text: str) -> None:
+        """Add a note to the answer of this run."""
+        self.said.append(Text(text, "warning"))
 
     def cautions_of(self, *names: str) -> tuple[str, ...]:
         """List what speaks against results of these names, and against all."""
@@ -148,8 +160,8 @@ class Run(Job):
         if self.writes:
             refuse_own(path, self.output)
         check_output(path, self.force, self.inputs)
-        self.text = path, text
-        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+        self.texts[path], self.also["file"] = text, str(path)
+        self.say(f"{path}: {what}")
 
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
@@ -182,6 +194,8 @@ class Stage:
         Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
+    overrides : callable or None
+        Gives overrides of the config that its options stand for.
     """
 
     function: Callable[..., Any]
@@ -194,6 +208,7 @@ class Stage:
     study: bool | Callable[[Mapping[str, Any]], bool]
     output: Any
     several: bool
+    overrides: Callable[..., list[str]] | None
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -258,15 +273,15 @@ class Stage:
             config = "the config and " if run.with_config else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
-        if run.writes:
-            self._write(run, run.output, results)
-        if run.text:
-            write_text(*run.text)
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+        if run.writes:
+            self._write(run, run.output, results)
+        else:
+            write_files(run.texts)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -274,11 +289,12 @@ class Stage:
             (
                 *(block for text in texts for block in page.blocks(text)),
                 *([Text(run.last_words)] if run.last_words else []),
+                *run.said,
                 *caution_texts(cautions),
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else run.text and run.text[0],
+            written=run.output if run.writes else next(iter(run.texts), None),
         )
 
     def info(self, path: Path) -> Outcome:
@@ -370,6 +386,7 @@ class Stage:
             return
         if not self.folder:
             store.write(output, results[""], run.origin(self.name))
+            write_files(run.texts)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
@@ -401,10 +418,21 @@ def stage(
     study: bool | Callable[[Mapping[str, Any]], bool] = False,
     output: Any = None,
     several: bool = False,
+    overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, output, several
+        function,
+        kind,
+        title,
+        figures or {},
+        words or {},
+        folder,
+        fills,
+        study,
+        output,
+        several,
+        overrides,
     )
 
 

@@ -290,7 +290,7 @@ def _of_log(run: Run, log: Path, asked: AskedMargins) -> LogGains | None:
         suffix, text = parameter_file(AUTOPILOTS[gains.autopilot], gains.version, what, rows)
         run.write_text(asked_for.with_suffix(suffix), text, _WRITTEN)
     elif asked_for is not None:
-        run.last_words = f"{asked_for}: not written, nothing changes"
+        run.say(f"{asked_for}: not written, nothing changes")
     return LogGains(**vars(gains), filters=filters)
 
 

@@ -245,7 +245,7 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
     found = twin_of(flight, asked, flown, settings, gains, warnings, air)
     _go_on(run, found, path, model)
     if not settings.gusts and any(own is not None and own.gusts is not None for own in vehicles.values()):
-        run.last_words = still_air_text().text
+        run.say(still_air_text().text)
     return found
 
 
