@@ -280,7 +280,7 @@ def _of_log(run: Run, log: Path, asked: AskedMargins) -> LogGains | None:
     if run.dry_run:
         return None
     for each in contents.warnings:
-        run.caution(f"{log}: {each}")
+        run.note(f"{log}: {each}")
     vibration = vibration_of(flight)
     filters = () if vibration is None else vibration.changes
     gains = tuned_gains(flight, effectiveness(flight), asked)

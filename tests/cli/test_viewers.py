@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from cpfls_cli.export.viewed import view_of
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
+from tests.builders.twins import twin_found
 
 BEGIN_US = 1_700_000_000_123_456
 TIME_US = BEGIN_US + 5_000 * np.arange(800)
