@@ -23,7 +23,6 @@ from cpfls_cli.arguments import (
     FileArgument,
     FlightArgument,
     FlightsArgument,
-    Flown,
     FlownArgument,
     FolderOption,
     HeldOutOption,
@@ -490,8 +489,8 @@ def export(
         ExportFormat | None,
         typer.Option(
             "--format",
-            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
+            "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
             "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
             "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
             "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
@@ -535,28 +534,6 @@ def spread(
         return command.run(job, model, count, seed, anyway=anyway)
 
     _run_without_config("spread", output, common, call)
-
-
-@_command("verify-export")
-def verify_export(
-    model: ModelArgument,
-    flight: Annotated[
-        Path, typer.Argument(metavar="FLIGHT", help="A flight, or a log that the config of the model describes.")
-    ],
-    form: Annotated[Flown, typer.Option("--format", help="What the exported vehicle is flown in.")],
-    horizon: HorizonOption = None,
-    windows: Annotated[int, typer.Option("--windows", metavar="N", min=1, help="Runs, spread over the flight.")] = 10,
-    hold: HoldOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Export a model, fly that along a flight from measured states, and compare it with the model's own playback."""
-    with messages_for_errors():
-        command = _of("verify-export")
-        options = command.Options(
-            form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
-        )
-        tell(command.run(model, flight, options, force=common.force, dry_run=common.dry_run), common)
 
 
 @_command()
