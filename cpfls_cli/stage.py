@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -75,6 +75,28 @@ class Filled:
     texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     kept: str = ""
     grows: bool = False
+
+
+@dataclass
+class Parts:
+    """A result in parts along its axis ``STREAMED``, of which no more than one is in memory.
+
+    What does not lie along it is that of the last part, which stands for the whole in what is said.
+
+    Attributes
+    ----------
+    rows : int
+        In all parts together.
+    """
+
+    parts: Iterator[Any]
+    rows: int
+    last: Any = None
+
+    def __iter__(self) -> Iterator[Any]:
+        for part in self.parts:
+            self.last = part
+            yield part
 
 
 @dataclass
@@ -174,8 +196,8 @@ class Stage:
     Attributes
     ----------
     function : callable
-        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder, results by
-        name, with a page each; or None in a dry run.
+        Takes a `Run` and what its command line says. It gives a result, or its `Parts`; or, of a stage that fills a
+        folder, results by name, with a page each; or None in a dry run.
     kind : type
         Class of the result.
     title : str
@@ -272,13 +294,18 @@ class Stage:
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if run.with_config else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+        streamed = isinstance(found, Parts)
+        if isinstance(found, Parts):
+            # What there is to say is known behind the last part.
+            store.write_parts(run.output, found, found.rows, run.origin(self.name))
+            found = found.last
         results = dict(found) if self.folder else {"": found}
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        if run.writes:
+        if run.writes and not streamed:
             self._write(run, run.output, results)
         else:
             write_files(run.texts)

@@ -15,8 +15,6 @@ _RECORDS = {
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
-    ("cpfls/prediction", ""): "prediction.PredictionRecord",
-    ("cpfls/replay", ""): "replay.ReplayRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

@@ -13,11 +13,12 @@ from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
-from cpfls_cli.artifacts.replay import FADING, HeldOutGroup, trust_by_playback
+from cpfls_cli.artifacts.playback import HeldOutGroup, by_horizon
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import EXPLAINED
+from cpfls_cli.playback.errors import FADING
 from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, THRUST, response_word
-from cpfls_cli.validation.trust import GOOD, Trust, capped
+from cpfls_cli.validation.trust import GOOD, Trust, capped, trust_by_playback
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
@@ -462,7 +463,7 @@ class VehicleRecord(ModelRecord):
 
     @property
     def _by_playback(self) -> Trust:
-        return capped(trust_by_playback(self.held_out), self.contradiction or ())
+        return capped(trust_by_playback(by_horizon(self.held_out)), self.contradiction or ())
 
     @property
     def forecast_verdict(self) -> Trust:

@@ -16,24 +16,17 @@ from cpfls_cli.arguments import (
     ChooseOnOption,
     DiagnosisArgument,
     DisagreementArgument,
-    EveryOption,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightArgument,
     FlightsArgument,
     FlownArgument,
     FolderOption,
     HeldOutOption,
-    HistoryOption,
-    HoldOption,
-    HorizonOption,
     LogArgument,
     LogsArgument,
-    ModelArgument,
     ModelOption,
-    PlayedArgument,
     ResumeOption,
     ResumeSweepOption,
     SchedulerOption,
@@ -294,38 +287,6 @@ def vehicle(
         return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)
-
-
-@_command()
-def predict(
-    config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
-) -> None:
-    """Predict torque, inertia and Coriolis matrices of a model along a flight."""
-    _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def replay(
-    config: ConfigArgument,
-    model: PlayedArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    horizon: HorizonOption = None,
-    every: EveryOption = 1,
-    hold: HoldOption = None,
-    history: HistoryOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
-        )
-        return command.run(job, model, flights, options)
-
-    _run("replay", config, output, common, call)
 
 
 @_command()

@@ -25,8 +25,6 @@ _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/prediction": "prediction",
-    "cpfls/replay": "replay",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.job import Job, check_outputs, finish
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
-from cpfls_cli.artifacts.replay import HeldOutGroup
+from cpfls_cli.artifacts.playback import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.stopped import stopped, without_model

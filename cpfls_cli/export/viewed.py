@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gap_flights import FlightsGroup
-from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
@@ -34,11 +32,14 @@ from cpfls_cli.export.tracks import (
     View,
 )
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.response.flown import Responses
+from cpfls_cli.result import described_fields
 from cpfls_cli.simulation.twin import Twin
 from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
 from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
+from cpfls_cli.validation.prediction import AlongFlight
 
 _ASKED = "setpoint_"
 _FRAMES = {"body": BODY, "angles": EULER, "world": WORLD}
@@ -137,9 +138,8 @@ def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
     )
 
 
-def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
-    begins = np.nan if record.clock is None else record.clock.begins
-    time = _log_time(record.time, begins)
+def _of_prediction(title: str, record: AlongFlight, study: Study) -> View:
+    time = _log_time(record.time, record.begins_s)
     force = None if record.force is None or record.measured_force is None else record.measured_force - record.force
     held: dict[str, dict[str, Array | None]] = {
         "torque": {
@@ -152,79 +152,79 @@ def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
         "body_torque": {MODEL: record.body_torque},
         "force": {MEASURED: record.measured_force, MODEL: record.force, DIFFERENCE: force},
         "attitude": {MEASURED: record.attitude},
-        "outside": {MODEL: record.outside.astype(float)},
+        "extrapolates": {MODEL: record.extrapolates.astype(float)},
     }
+    abouts = {own.name: own.about for own in described_fields(AlongFlight)}
     tracks = []
     for name, values in held.items():
         known = {what: own for what, own in values.items() if own is not None}
-        spec = record.spec().dataset(name)
-        if known and spec is not None:
+        own = abouts[name]
+        if known and own is not None:
+            spec = DatasetSpec(name, own.axes, own.unit, own.frame, own.text)
             axes = _axes(spec, next(iter(known.values())))
-            about = {"unit": spec.units, "frame": spec.frame, "description": spec.description}
-            tracks.append(Track(name=name, time=time, values=known, axes=axes, **about))
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.clock is not None)
+            words = {"unit": own.unit, "frame": own.frame, "description": own.text}
+            name = "outside" if name == "extrapolates" else name
+            tracks.append(Track(name=name, time=time, values=known, axes=axes, **words))
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=bool(np.isfinite(record.begins_s)))
 
 
-def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
-    begins = np.full(len(record.flown), np.nan) if record.flight.begins is None else record.flight.begins
-    several = len(record.flown) > 1
-    period = float(record.horizon_s[0])
+def _of_replay(title: str, given: Playback, study: Study) -> View:
+    begins = {flight.name: flight.begins_s for flight in given.flights}
+    several, period = len(given.flights) > 1, float(given.horizon_s[0])
 
-    def run(name: str, windows: IntArray, values: Mapping[str, Array | None], unit: str, about: str) -> Iterator[Track]:
+    def run(name: str, flight: str, starts: Array, runs: Mapping[str, Array], unit: str, about: str) -> Track:
         """Put runs one after another; the last sample of a run is the first one of the next."""
-        known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in values.items() if own is not None}
-        if len(known) < len(values):
-            return
+        known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in runs.items()}
         known[DIFFERENCE] = known[MEASURED] - known[MODEL]
-        flight = int(record.window.flight[windows[0]])
-        times = record.window.start[windows][:, None] + period * np.arange(len(record.horizon_s))
+        times = starts[:, None] + period * np.arange(len(given.horizon_s))
         order = np.argsort(times.ravel(), kind="stable")
-        time = _log_time(times.ravel()[order], float(begins[flight]))
-        yield Track(
+        return Track(
             name=name,
-            time=time,
+            time=_log_time(times.ravel()[order], begins[flight]),
             values={what: own[order] for what, own in known.items()},
             unit=unit,
             frame=BODY if unit == "rad/s" else WORLD,
             description=about,
-            flight=_short(record.flown[flight]) if several else "",
+            flight=_short(flight) if several else "",
             axes=AXES,
         )
 
-    drawn, worst = record.drawn, record.worst
-    told = "runs of the model one after another, each from a measured state"
-    tracks = list(run("body_rate", drawn.window, {MEASURED: drawn.measured, MODEL: drawn.model}, "rad/s", told))
-    positions = {MEASURED: drawn.measured_position, MODEL: drawn.model_position}
-    tracks += run("position", drawn.window, positions, "m", told)
-    for index in range(len(worst.window)):
-        own, rates = slice(index, index + 1), f"the run in which the model is off most, number {index + 1}"
-        pair = {MEASURED: worst.measured[own], MODEL: worst.model[own]}
-        tracks += run(f"worst_{index + 1}/body_rate", worst.window[own], pair, "rad/s", rates)
-    for flight, name in enumerate(record.flown):
-        at = np.flatnonzero(record.window.flight == flight)
+    drawn, about = given.drawn, "runs of the model one after another, each from a measured state"
+    rates = {MEASURED: drawn.measured, MODEL: drawn.model}
+    tracks = [run("body_rate", drawn.flight, drawn.start_s, rates, "rad/s", about)]
+    if drawn.measured_position is not None and drawn.model_position is not None:
+        positions = {MEASURED: drawn.measured_position, MODEL: drawn.model_position}
+        tracks.append(run("position", drawn.flight, drawn.start_s, positions, "m", about))
+    for number, worst in enumerate(given.worst, 1):
+        own = {MEASURED: worst.measured[None], MODEL: worst.model[None]}
+        about = f"the run in which the model is off most, number {number}"
+        start = np.array([worst.start_s])
+        tracks.append(run(f"worst_{number}/body_rate", worst.flight, start, own, "rad/s", about))
+    for index, flight in enumerate(given.flights):
+        at = np.flatnonzero(given.window_flight == index)
         tracks.append(
             Track(
                 name="error_from_here",
-                time=_log_time(record.window.start[at], float(begins[flight])),
-                values={each: record.window.error[row, at] for row, each in enumerate(record.prediction)},
+                time=_log_time(given.window_start[at], flight.begins_s),
+                values={name: given.errors_of(name)[at] for name in given.models},
                 unit="rad/s",
                 frame=BODY,
                 description="mean norm of the error of the body rate over the horizon of a run that begins here",
-                flight=_short(name) if several else "",
+                flight=_short(flight.name) if several else "",
             )
         )
     curves = [
         Curve(
             name=f"error_{signal}",
             over="horizon_s",
-            x=record.horizon_s,
-            values=dict(zip(record.prediction, errors.mae, strict=True)),
+            x=given.horizon_s,
+            values={name: given.of(name, signal).mae for name in given.models},
             description=f"mean error of {signal} by horizon, SI",
         )
-        for signal, errors in record.errors.items()
-        if errors is not None
+        for signal in given.signals
     ]
-    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=record.flight.begins is not None)
+    on_log_clock = bool(np.isfinite(list(begins.values())).any())
+    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=on_log_clock)
 
 
 def _short(name: str) -> str:
@@ -361,8 +361,8 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
 
 _KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
-    PredictionRecord: _of_prediction,
-    ReplayRecord: _of_replay,
+    AlongFlight: _of_prediction,
+    Playback: _of_replay,
     DisagreementRecord: _of_disagreement,
     DiagnosisRecord: _of_diagnosis,
     Responses: _of_response,

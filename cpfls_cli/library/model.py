@@ -127,9 +127,7 @@ class Model:
         Artifact
             Of the format ``cpfls/prediction``, in memory.
         """
-        from cpfls_cli.commands import predict
-
-        return self._made(lambda job: predict.run(job, self._file("predict"), _path_of(flight)))
+        return self._of_stage("predict", model=self._file("predict"), flight=_path_of(flight))
 
     def replay(
         self,
@@ -159,13 +157,13 @@ class Model:
         Artifact
             Of the format ``cpfls/replay``, in memory.
         """
-        from cpfls_cli.commands import replay
-        from cpfls_cli.playback.replay import ReplayOptions
-
         if not flights:
             raise InputError("replay needs at least one flight")
-        paths, options = [_path_of(flight) for flight in flights], ReplayOptions(horizon_s, every, hold, history_s)
-        return self._made(lambda job: replay.run(job, self._path, paths, options))
+        from cpfls_cli.arguments import Between
+
+        given = {"flights": [_path_of(flight) for flight in flights], "horizon": horizon_s, "every": every}
+        between = None if hold is None else Between(hold)
+        return self._of_stage("replay", model=self._path, hold=between, history=history_s, **given)
 
     def state(
         self,
@@ -331,6 +329,18 @@ class Model:
             job = self._job(Path(folder, "artifact.h5"), force=False)
             _warn(cautioned(command(job), job), 4)
             return _read(job.output)
+
+    def _of_stage(self, name: str, **given: Any) -> Artifact:
+        """Run a stage, and keep in memory what it writes."""
+        from tempfile import TemporaryDirectory
+
+        from cpfls_cli.stage import Run, loaded
+
+        with TemporaryDirectory(prefix="cpfls-") as folder:
+            output = Path(folder, "artifact.h5")
+            run = Run(self._study, output, False, dry_run=False, progress=lambda *_: None, reads=lambda _: None)
+            _warn(loaded(name).run(run, **given), 4)
+            return _read(output)
 
     def _job(self, output: Path, force: bool) -> Job:
         from cpfls_cli.artifacts.job import Job

@@ -20,9 +20,7 @@ from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
-from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
-from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
@@ -105,11 +103,11 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
-    _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
+    _of_stage("predict"),
     _of_stage("twin"),
     _of_stage("response"),
     _of_stage("tune"),
-    _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
+    _of_stage("replay"),
     _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
     _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
     _of_each(

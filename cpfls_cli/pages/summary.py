@@ -12,7 +12,6 @@ from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
-from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trend import trend_box
 from cpfls_cli.pages.trust import learned_words
@@ -28,7 +27,6 @@ def summary_section(sources: Sources) -> Section:
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
     blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]

@@ -134,7 +134,7 @@ def test_a_replay_shows_measured_model_and_difference_of_each_flight(cpfls, logg
     exported(cpfls, logged / "replay.h5", tmp_path / f"replay.{form}")
     with h5py.File(logged / "replay.h5") as file:
         first, last = (1e-6 * float(TIME_US[index]) for index in (200, 600))
-        np.testing.assert_allclose(file["flight/begins"], [first, first], atol=1e-6)
+        np.testing.assert_allclose(file["flights/begins_s"], [first, first], atol=1e-6)
         period = float(file["horizon_s"][0])
     if form == "csv":
         columns = columns_of(tmp_path / "replay.csv")

@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.config.load import load_study
@@ -17,6 +17,7 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import record_of, remainder
@@ -203,7 +204,7 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
 def predicted(cpfls, config, model, flown, output):
     result = cpfls("predict", config, model, flown, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), read_record(output, PredictionRecord)
+    return json.loads(result.stdout), store.read(output, AlongFlight)[0]
 
 
 def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):
@@ -220,7 +221,7 @@ def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flig
 def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
     result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
     assert result.exit_code == 0, result.stderr
-    first, *_, last = result.stdout.splitlines()
+    _, first, *_, last = result.stdout.splitlines()
     assert first.endswith(
         "held against what the motion takes with its inertia, noise of the differentiated rates included"
     )
@@ -229,7 +230,7 @@ def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, n
     assert page.exit_code == 0, page.stderr
     text = (tmp_path / "page.md").read_text()
     assert "Force on the body without weight" in text
-    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from." in text
+    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from" in text
 
 
 def without(flown, target, *names):
