@@ -100,7 +100,7 @@ class AlongFlight:
     ) -> AlongFlight:
         """Predict along a flight, whose generalised torque, shape (time, 3), N m, is None where it holds none."""
         torque, inertia = model.torque(motion), model.inertia(motion.attitude)
-        bands: dict[str, Array] = {}
+        bands: dict[str, Any] = {}
         if draws is not None:
             low, high = inertia_band(model, draws, motion.attitude, inertia.value)
             least, most = torque_band(model, draws, motion, torque)

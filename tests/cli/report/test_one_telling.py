@@ -20,12 +20,10 @@ from tests.builders.changed_flights import write_flights
 from tests.builders.drawn_numbers import trend_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
-FROM_COMMANDS = ("trajectory", "flight", "model", "prediction", "replay", "response", "sweep")
+FROM_COMMANDS = ("flight", "model", "sweep")
 FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
 FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "vehicle")
-# What a plan asks of the vehicle between its samples is not in its artifact.
-ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -33,14 +31,11 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 def told(cpfls, study, tmp_path_factory):
     """Every artifact of the tiny study, and what its command said of it."""
     folder = tmp_path_factory.mktemp("told")
-    paths = {name: folder / f"{name}.h5" for name in FROM_COMMANDS}
+    paths = {name: folder / f"{name}.h5" for name in ("trajectory", *FROM_COMMANDS)}
+    assert cpfls("trajectory", study, "-o", paths["trajectory"]).exit_code == 0
     given = {
-        "trajectory": ("trajectory", study),
         "flight": ("simulate", study, paths["trajectory"]),
         "model": ("identify", study, paths["flight"]),
-        "prediction": ("predict", study, paths["model"], paths["flight"]),
-        "replay": ("replay", study, paths["model"], paths["flight"]),
-        "response": ("response", study, paths["flight"]),
         "sweep": ("sweep", study, paths["flight"], "--set", "sweep.seeds=2"),
     }
     artifacts = {}
@@ -107,17 +102,15 @@ def test_every_form_writes_every_sentence_and_number_of_a_block(answered, name):
         assert [phrase for phrase in said if words(phrase) not in words(text)] == [], form
 
 
-@pytest.mark.parametrize("name", ON_PAGES)
-def test_the_report_says_what_the_command_says(told, answered, name):
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_report_says_what_the_command_says(answered, name):
     """Each sentence stands on the page of the same record in every form, and each number of a table."""
     source, given = answered(name)
     blocks = tuple(unfolded(given))
     said = [phrase for block in blocks if not isinstance(block, Table) for phrase in phrases(block)]
     cells = [cell.text for block in blocks if isinstance(block, Table) for row in block.cells for cell in row]
     numbers = [number for cell in cells for number in NUMBER.findall(cell)]
-    # Whether a model has seen the flight stands in the model.
-    beside = [told["model"].source] if name == "prediction" else []
-    for form, text in in_all_forms(source, blocks, beside).items():
+    for form, text in in_all_forms(source, blocks).items():
         warned = [block.text for block in blocks if isinstance(block, Text) and block.tone == "warning"]
         assert [p for p in said if words(p) not in words(text) and (form != "terminal" or p not in warned)] == [], form
         assert [number for number in numbers if number not in text] == [], form
