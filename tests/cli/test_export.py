@@ -248,7 +248,7 @@ def test_an_empty_name_is_shown(refuse, pipeline, tmp_path):
 
 def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
     words = ("export", pipeline.model, "--name", "uav", "-o")
-    (line,) = refuse(*words, tmp_path / "m.py")
+    (line,) = refuse(*words, tmp_path / "m.py", "--format", "jax")
     assert line == "--name uav: a Python module is named after its file; leave --name out, or rename -o"
     assert cpfls(*words, tmp_path / "m.json").exit_code == 0
     assert json.loads((tmp_path / "m.json").read_text())["name"] == "uav"
