@@ -18,7 +18,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
+.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test test-fast decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -30,6 +30,7 @@ help:
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
+	@echo "  make test-fast   the units that fly nothing, in less than a minute"
 	@echo "  make decides     tests of words, names and verdicts once more, as another processor computes"
 	@echo "  make oldest      the same with the oldest packages that are allowed"
 	@echo "  make lint        formatting, lint, types, import contracts"
@@ -350,6 +351,11 @@ docs/notebook.ipynb: FORCE | $(INSTALLED_DEV)
 PYTEST := $(BIN)/python -m pytest
 test: $(INSTALLED_DEV)
 	$(PYTEST) -n 2 --dist worksteal --assert=plain || { $(PYTEST) --last-failed; exit 1; }
+
+# In less than a minute: units alone, but for rooms whose units simulate flights, fit models or start processes.
+FLYING := changes consistency export gap identification look playback response simulation tuning validation workers
+test-fast: $(INSTALLED_DEV)
+	$(PYTEST) -n 2 --dist worksteal --assert=plain tests/unit $(FLYING:%=--ignore=tests/unit/%)
 
 # What decides (words, names, verdicts, choices), with the linear algebra of the plainest processor.
 DECIDES = $$(grep -rl --include='*.py' mark.decides tests) -m decides --assert=plain

@@ -142,7 +142,8 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 
 
 @cache
-def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
+def environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
+    """Make what renders the templates of a folder, with what a stage adds."""
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -172,8 +173,8 @@ def words(
     **more : object
         What it knows of this result.
     """
-    environment = _environment(folder, tuple((added or {}).items()))
-    return environment.get_template(f"{template}.md.j2").render(r=given, **more)
+    own = environment(folder, tuple((added or {}).items()))
+    return own.get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass

@@ -17,7 +17,7 @@ from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
+from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_files, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
@@ -91,6 +91,10 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
+    texts : dict of Path to str
+        Other files that are written with the result.
+    said : list of Text
+        Of this run alone: its file says none of it again.
     """
 
     writes: bool = True
@@ -101,6 +105,8 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
+    texts: dict[Path, str] = field(default_factory=dict)
+    said: list[Text] = field(default_factory=list)
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -114,6 +120,14 @@ class Run(Job):
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
+
+    def say(self, text: str) -> None:
+        """Add to the answer what only this run has to say."""
+        self.said.append(Text(text))
+
+    def note(self, text: str) -> None:
+        """Add a note to the answer of this run."""
+        self.said.append(Text(text, "warning"))
 
     def cautions_of(self, *names: str) -> tuple[str, ...]:
         """List what speaks against results of these names, and against all."""
@@ -162,6 +176,8 @@ class Stage:
         Whether it takes a config.
     several : bool
         Whether options that may be repeated take all values that follow.
+    overrides : callable or None
+        Gives overrides of the config that its options stand for.
     """
 
     function: Callable[..., Any]
@@ -173,6 +189,7 @@ class Stage:
     fills: Filled | None
     study: bool
     several: bool
+    overrides: Callable[..., list[str]] | None
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -237,13 +254,13 @@ class Stage:
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
-        if run.writes:
-            self._write(run, run.output, results)
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+        if run.writes:
+            self._write(run, run.output, results)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -251,6 +268,7 @@ class Stage:
             (
                 *(block for text in texts for block in page.blocks(text)),
                 *([Text(run.last_words)] if run.last_words else []),
+                *run.said,
                 *caution_texts(cautions),
             ),
             run.exit_code,
@@ -347,6 +365,7 @@ class Stage:
             return
         if not self.folder:
             store.write(output, results[""], run.origin(self.name))
+            write_files(run.texts)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
@@ -377,9 +396,12 @@ def stage(
     fills: Filled | None = None,
     study: bool = False,
     several: bool = False,
+    overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
+    return lambda function: Stage(
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides
+    )
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

@@ -58,23 +58,6 @@ from cpfls_cli.cli.options import (
     sheet,
     with_common,
 )
-from cpfls_cli.cli.path_options import (
-    BandOption,
-    BoxOption,
-    DurationOption,
-    ExciteOption,
-    ForOption,
-    HeightOption,
-    HomeOption,
-    HoverOption,
-    MissionOption,
-    PlotOption,
-    RepeatOption,
-    SignalOption,
-    SizeOption,
-    ToTellOption,
-    WaypointsOption,
-)
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import InputError
@@ -124,47 +107,6 @@ def _main(
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
-
-
-@_command()
-def trajectory(
-    config: ConfigArgument,
-    output: OutputOption,
-    waypoints: WaypointsOption = None,
-    to_tell: ToTellOption = None,
-    diagnosis: ForOption = None,
-    box: BoxOption = None,
-    height: HeightOption = None,
-    duration: DurationOption = None,
-    hover: HoverOption = None,
-    repeat: RepeatOption = None,
-    excite: ExciteOption = None,
-    signal: SignalOption = None,
-    band: BandOption = None,
-    size: SizeOption = None,
-    form: MissionOption = None,
-    home: HomeOption = None,
-    plot: PlotOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
-    with messages_for_errors():
-        options = _of("path-options")
-        added = options.Added(repeat, excite, None if signal is None else signal.value, band, size, hover)
-        asked = options.option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
-        asked += added.overrides(waypoints, to_tell is not None or diagnosis is not None, duration)
-        common = replace(common, overrides=[*(common.overrides or []), *asked])
-
-    def call(command: Any, job: Job) -> Any:
-        mission = _of("mission").mission_of(job.study, [each.value for each in form or []], home)
-        if job.study.trajectory.path == "next-flight":
-            return _of("next-flight").run(job, diagnosis, plot)
-        options.require_no_room(box, height)
-        added.require_axes(job.study)
-        return command.run(job, waypoints, plot, mission)
-
-    _run("trajectory", config, output, common, call)
 
 
 @_command()

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.replay import ReplayRecord
     from cpfls_cli.artifacts.response import ResponseRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.reduction.selection import Selection
 
 R = TypeVar("R", default=Any)
@@ -61,7 +61,7 @@ class Sources:
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    trajectories: ClassVar[_OfFormat[TrajectoryRecord]] = _OfFormat("cpfls/trajectory")
+    trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
     flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
