@@ -18,7 +18,15 @@ from typing import Any
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_files, write_text
+from cpfls_cli.artifacts.output import (
+    check_folder,
+    check_output,
+    filled_folder,
+    refuse_inputs,
+    refuse_own,
+    write_files,
+    write_text,
+)
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
@@ -170,6 +178,14 @@ class Run(Job):
         """Name a command that goes on with the config of this run."""
         self.next.append(go_on(self, command, *words, output=output))
 
+    def write_text(self, path: Path, text: str, what: str) -> None:
+        """Have a file of text written behind the result, or alone where none is written; `what` says what it is."""
+        if self.writes:
+            refuse_own(path, self.output)
+        check_output(path, self.force, self.inputs)
+        self.texts[path], self.also["file"] = text, str(path)
+        self.say(f"{path}: {what}")
+
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
@@ -195,8 +211,10 @@ class Stage:
         Whether its output is a folder with a page for each result; left out, the answer is only printed.
     fills : Filled or None
         Whether its output is a folder with one answer.
-    study : bool
-        Whether it takes a config.
+    study : bool or callable
+        Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
+    output : object
+        Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
     overrides : callable or None
@@ -210,7 +228,8 @@ class Stage:
     words: Mapping[str, Any]
     folder: bool
     fills: Filled | None
-    study: bool
+    study: bool | Callable[[Mapping[str, Any]], bool]
+    output: Any
     several: bool
     overrides: Callable[..., list[str]] | None
 
@@ -221,7 +240,7 @@ class Stage:
     @property
     def name(self) -> str:
         """Of the command: that of its module."""
-        return self.function.__module__.rpartition(".")[2].strip("_").replace("_", "-")
+        return Path(str(sys.modules[self.function.__module__].__file__)).stem.strip("_").replace("_", "-")
 
     def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
         """Word a result, or all results by name where the ending says so.
@@ -274,7 +293,7 @@ class Stage:
             where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if self.study else ""
+            config = "the config and " if run.with_config else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         if isinstance(found, Outcome):
             return found
@@ -291,6 +310,8 @@ class Stage:
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
         if run.writes and not streamed:
             self._write(run, run.output, results)
+        else:
+            write_files(run.texts)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -303,7 +324,7 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else None,
+            written=run.output if run.writes else next(iter(run.texts), None),
         )
 
     def info(self, path: Path) -> Outcome:
@@ -434,13 +455,24 @@ def stage(
     words: Mapping[str, Any] | None = None,
     folder: bool = False,
     fills: Filled | None = None,
-    study: bool = False,
+    study: bool | Callable[[Mapping[str, Any]], bool] = False,
+    output: Any = None,
     several: bool = False,
     overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides
+        function,
+        kind,
+        title,
+        figures or {},
+        words or {},
+        folder,
+        fills,
+        study,
+        output,
+        several,
+        overrides,
     )
 
 

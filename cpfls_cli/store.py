@@ -237,7 +237,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
         if held != wanted:
-            made_by = f" (made by {kind.MADE_BY})" if hasattr(kind, "MADE_BY") else ""
+            made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
         if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
             raise old_file(path, file)

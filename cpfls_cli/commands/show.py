@@ -25,8 +25,6 @@ _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/twin": "twin",
-    "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
 }

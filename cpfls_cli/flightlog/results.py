@@ -2,9 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
+from types import MappingProxyType
+from typing import Final
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.result import about, part, result
+
+_DROPPED: Final = MappingProxyType(
+    {
+        "time_not_finite": "time stamp is not a number: rows dropped",
+        "repeated_time": "repeated time: rows dropped",
+        "backward_time": "backward time: rows dropped",
+        "crop": "outside import.crop_s: rows dropped",
+        "incomplete_ends": "before the first or after the last value of a column: rows dropped",
+        "gap": "beyond a gap longer than import.gap_s: rows dropped",
+    }
+)
 
 
 @result
@@ -55,6 +68,20 @@ class ImportReport:
     system: str = about("what wrote the log, and its version; empty where it does not say", default="")
     parameters: Mapping[str, float] = about("of the control law that flew, by the autopilot's own names")
     stated: Mapping[str, str] = about("what the log says of its vehicle, as `stated_vehicle`")
+
+    @property
+    def findings(self) -> dict[str, int]:
+        """What was found and done, with how often: rows by reason, then gaps, then values of all columns together."""
+        rows = {_DROPPED[reason]: count for reason, count in self.dropped.items()}
+        gaps = {f"gaps in the time stamps, up to {self.longest_gap_s:.3g} s: interpolated": self.gaps}
+        values = {
+            "missing: values interpolated": self.missing,
+            "spikes: values interpolated": self.spikes,
+            "suspected spikes: values reported only": self.suspected_spikes,
+            "saturated: values reported only": self.saturated,
+        }
+        counts = rows | gaps | {what: sum(by_column.values()) for what, by_column in values.items()}
+        return {what: count for what, count in counts.items() if count}
 
 
 @result

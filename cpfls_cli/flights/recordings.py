@@ -25,7 +25,7 @@ from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.flight import Imported, read_whole
-from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
+from cpfls_cli.flights.imported import commanded_speed, imported
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
@@ -140,7 +140,7 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         _require_speeds(name, part, study)
     first = parts[0]
     updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
-    done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
+    done = tuple(f"{what} ({count})" for what, count in first.report.findings.items())
     signals = [Imported.of(part).signals for part in parts]
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)

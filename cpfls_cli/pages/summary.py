@@ -8,13 +8,11 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.pages.diagnosis import gap_blocks
-from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words
-from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 from cpfls_cli.stage import stage_named
@@ -27,8 +25,6 @@ def summary_section(sources: Sources) -> Section:
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [twin_box(twin.record) for twin in sources.twins]
-    blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [box for source in sources.all if source.stage for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)

@@ -8,7 +8,6 @@ import numpy as np
 
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.flights.flight import Flight
-from cpfls_cli.flights.imported import log_findings
 from cpfls_cli.report.canvas import Drawn, legend_above, line, stacked, style_of
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.stages._demand import infeasible_sentence
@@ -75,7 +74,6 @@ FIGURES = {
 WORDS = {
     "axes": AXES,
     "infeasible_sentence": infeasible_sentence,
-    "log_findings": log_findings,
     "plain": plain,
     "speed_units": SPEED_UNITS,
 }

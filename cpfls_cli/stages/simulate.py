@@ -22,11 +22,11 @@ from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Trac
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.disturbance import still_air_text
-from cpfls_cli.report.outcome import Outcome, cautioned
+from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
-from cpfls_cli.stage import Run, stage
+from cpfls_cli.stage import Run, stage, stage_named
 from cpfls_cli.stages._demand import infeasible_sentence
 from cpfls_cli.stages._flight import FIGURES, WORDS
 from cpfls_cli.store import read
@@ -129,8 +129,7 @@ def simulate(
     if is_log(trajectory) or format_name(trajectory) == Flight.FORMAT:
         if mode not in (None, "closed-loop"):
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
-        made = import_module("cpfls_cli.commands.twin").run(run, trajectory, model)
-        return replace(cautioned(made, run), written=None if run.dry_run else run.output)
+        return stage_named("twin").run(run, path=trajectory, model=model)
     if model is not None and mode is None:
         run.study = _in_closed_loop(run.study)
     _take_numbers(run, model)

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli.flights.flight import Flight
 from tests.builders.artifacts import edited, seal
 
 

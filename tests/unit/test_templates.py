@@ -8,13 +8,13 @@ from typing import get_args, get_origin, get_type_hints
 import pytest
 from jinja2 import nodes
 
-from cpfls_cli.cli.stages import STAGES, stage_commands
+from cpfls_cli.cli.stages import PARTS, STAGES, stage_commands
 from cpfls_cli.page import TEMPLATES, environment
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import described_fields
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import loaded, stage_named
 
-NAMES = sorted(file.stem for file in STAGES.glob("[a-z]*.py"))
+NAMES = sorted(file.stem.strip("_") for file in STAGES.glob("[a-z]*.py"))
 GIVEN = {"r", "source", "loop", "caller"}
 SAME_ROWS = {"first", "last", "list", "sort", "selectattr", "rejectattr"}
 CONTEXTS = ("load", "store", "param")
@@ -104,13 +104,13 @@ def templates(name):
 
 
 def test_each_stage_has_a_template_and_each_template_a_stage():
-    assert sorted(name.replace("-", "_") for name in stage_commands()) == NAMES
+    assert sorted([*PARTS, *(name.replace("-", "_") for name in stage_commands())]) == NAMES
     assert [name for name in NAMES if f"{name}.md.j2" not in templates(name)] == []
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_templates_name_exists(name):
-    stage = loaded(name)
+    stage = stage_named(name)
     own = environment(TEMPLATES, tuple(stage.words.items()))
     for template in templates(name):
         text, _, _ = own.loader.get_source(own, template)

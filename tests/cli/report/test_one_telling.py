@@ -10,19 +10,17 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import diagnosis, disagreement, gains, model, twin
+from cpfls_cli.pages import diagnosis, disagreement, model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
-from tests.builders.autopilots import gains_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
-from tests.builders.twins import twin_record
 
 FROM_COMMANDS = ("flight", "model", "sweep")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "twin", "vehicle", "gains")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -53,14 +51,8 @@ def source_of(record, label, sha256="f" * 64):
     return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
 
 
-@pytest.fixture(scope="session")
-def tuned():
-    """Gains, once for all."""
-    return source_of(gains_record(), "gains.h5")
-
-
 @pytest.fixture
-def answered(told, tuned):
+def answered(told):
     """A record by its format, and the blocks that its command says."""
 
     def of(name):
@@ -69,11 +61,6 @@ def answered(told, tuned):
         if name == "vehicle":
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
             return source, tuple(model.answer(source))
-        if name == "twin":
-            source = source_of(twin_record(), f"{name}.h5")
-            return source, tuple(twin.answer(source))
-        if name == "gains":
-            return tuned, tuple(gains.answer(tuned))
         made = getattr(gap_artifacts, name)()
         source = source_of(
             record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
