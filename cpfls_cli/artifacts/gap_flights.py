@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Self
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.audit import by_reason
-from cpfls_cli.artifacts.flight import BEGINS, known_begins
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, columns_of, dataset, group, record, rows_of
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Recording
@@ -23,6 +22,14 @@ _ASKED = "setpoint_"
 
 TRAINING, HELD_OUT = "training", "held-out"
 """Roles of the flights of a diagnosis."""
+
+BEGINS = "stamp of the log's own clock at time 0 of the flight; not finite where there is none"
+
+
+def known_begins(begins: Iterable[float]) -> Array | None:
+    """Arrange where flights begin on the clocks of their logs, s; None where none has a log."""
+    stamps = np.fromiter(begins, float)
+    return stamps if np.isfinite(stamps).any() else None
 
 
 @record
