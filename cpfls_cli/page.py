@@ -7,7 +7,8 @@ Beside what Markdown has, a template knows
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
-- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page.
+- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page; an answer
+  that begins with a verdict, ``# NO CHANGE: nothing moved {good}``, is a box with the paragraphs behind it.
 
 Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 """
@@ -34,7 +35,7 @@ from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
@@ -48,6 +49,7 @@ TONES = ("good", "note", "warning", "unsure")
 _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
+_VERDICT = re.compile(r"([A-Z][A-Z -]+): (.+)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _LONG = 36
@@ -261,7 +263,7 @@ def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str
     prefix : str
         Before their names and those of tables on the page.
     """
-    made = list(_blocks(tree(text), pictures or {}, prefix, count(1)))
+    made = list(_boxed(_blocks(tree(text), pictures or {}, prefix, count(1))))
     empty = (Heading, Folded, type(None))
     return [
         block
@@ -270,12 +272,28 @@ def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str
     ]
 
 
+def _boxed(given: Iterable[Block]) -> Iterator[Block]:
+    """Put paragraphs behind a verdict into its box."""
+    box: Box | None = None
+    for block in given:
+        if box and isinstance(block, Text) and block.tone == "plain":
+            box = replace(box, sentences=(*box.sentences, block.text))
+            continue
+        yield from [box] if box else []
+        box = block if isinstance(block, Box) else None
+        yield from [] if box else [block]
+    yield from [box] if box else []
+
+
 def _blocks(
     nodes: Iterable[Node], pictures: Mapping[str, Picture], prefix: str, numbers: Iterator[int]
 ) -> Iterator[Block]:
     for node in nodes:
         if node.kind == "heading":
-            yield Heading(_plain_line(node.text))
+            text = _plain_line(node.text)
+            verdict = _VERDICT.fullmatch(text) if node.level == 1 else None
+            tone = cast(Tone, next((mark for mark in node.marks if mark in TONES), "note"))
+            yield Box(verdict[1], verdict[2], (), tone) if verdict else Heading(text)
         elif node.kind == "fold":
             inner = list(_blocks(node.inner, pictures, prefix, numbers))
             yield Folded(_plain_line(node.text), inner, "open" in node.marks)

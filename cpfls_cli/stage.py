@@ -9,26 +9,28 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.job import Job, go_on, take_inputs
+from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
-from cpfls_cli.report.content import Facts, Folded, Heading, Section, Table, Text
+from cpfls_cli.report.content import Box, Facts, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import datasets, plain
 
+PAGE = "report.html"
+"""File of the page of a folder with one answer."""
 _INDEX = "index"
 """File of the page over several results, and the end of the name of its template."""
 
@@ -41,6 +43,30 @@ class _Taken:
     inputs: list[Path]
     files: dict[str, InputFile] = field(default_factory=dict)
     cautions: dict[str, None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A folder with one answer: files of results, ``report.html`` with all of them, the answer as JSON, what runs keep.
+
+    Attributes
+    ----------
+    parts : mapping from str to (str, str)
+        Parts of the result that lie in files of their own, in the order in which they follow from each other: of each
+        the stage that it is a result of, and the part that is an input of it, or nothing. A part that is None has no
+        file. Without parts the result itself lies in a file, named as the stage is.
+    texts : mapping from str to callable
+        Further files: text that is made of the result.
+    kept : str
+        Folder in it that runs of the stage keep files in for each other.
+    grows : bool
+        Whether a folder that the stage filled can be filled again without ``--force``.
+    """
+
+    parts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    kept: str = ""
+    grows: bool = False
 
 
 @dataclass
@@ -59,6 +85,12 @@ class Run(Job):
         Whether the stage takes a config, which its results hold.
     files : dict of str to InputFile
         Inputs of all results, by role.
+    outputs : list of Path
+        Files that will be written, as far as they are known before: no input is one of them.
+    also : dict of str to object
+        What ``--json`` says of this run beside its result.
+    last_words : str
+        Behind the answer.
     """
 
     writes: bool = True
@@ -66,14 +98,17 @@ class Run(Job):
     exit_code: int = 0
     with_config: bool = True
     files: dict[str, InputFile] = field(default_factory=dict)
+    outputs: list[Path] = field(default_factory=list)
+    also: dict[str, Any] = field(default_factory=dict)
+    last_words: str = ""
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
         """Check inputs, and take note of what they hold: those of all results, or of the one of this name."""
         own = self._of(of)
         own.files.update(take_inputs(own, roles))
-        if self.writes:
-            refuse_inputs(self.output, self.inputs)
+        for path in self.outputs:
+            refuse_inputs(path, self.inputs)
         return own.files
 
     def caution(self, text: str, of: str = "") -> None:
@@ -120,7 +155,9 @@ class Stage:
     words : mapping from str to object
         What the template uses beside what all templates know: functions, also as filters and tests, and constants.
     folder : bool
-        Whether its output is a folder, and may be left out: the answer is only printed then.
+        Whether its output is a folder with a page for each result; left out, the answer is only printed.
+    fills : Filled or None
+        Whether its output is a folder with one answer.
     study : bool
         Whether it takes a config.
     several : bool
@@ -133,6 +170,7 @@ class Stage:
     figures: Mapping[str, Callable[[Any], str]]
     words: Mapping[str, Any]
     folder: bool
+    fills: Filled | None
     study: bool
     several: bool
 
@@ -168,8 +206,15 @@ class Stage:
         figures = {name: partial(html, name) for name in self.figures}
         return page.html(title, self.text(given, about=about), figures)
 
+    def verdict(self, about: Source) -> list[Box]:
+        """Give the verdict on a result, where its template begins with one, for the summary of a report."""
+        return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
+
     def section(self, about: Source, number: int) -> Section:
-        """Make the section of a report that shows a result, the first, second, ... of this stage."""
+        """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
+
+        That stands in the summary.
+        """
         pictures = {
             name: picture
             for name, draw in self.figures.items()
@@ -177,7 +222,8 @@ class Stage:
         }
         anchor = self.name if number == 1 else f"{self.name}-{number}"
         blocks = page.blocks(self.text(about.record, about=about), pictures, f"{self.name}-{number}-")
-        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *blocks])
+        shown = (block for block in blocks if not isinstance(block, Box))
+        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *shown])
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
@@ -185,21 +231,28 @@ class Stage:
             self._check(run, run.output)
         found = self.function(run, **given)
         if found is None:
-            where = f"{run.output}: would be {'filled' if self.folder else 'written'}; " if run.writes else ""
+            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
+            where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
         if run.writes:
             self._write(run, run.output, results)
+        if self.fills and run.writes:
+            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        cautions = run.cautions_of(*results)
+        cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
-            {**summary, **({"cautions": list(cautions)} if cautions else {})},
-            (*(block for text in texts for block in page.blocks(text)), *caution_texts(cautions)),
+            {**summary, **run.also, **({"cautions": list(cautions)} if cautions else {})},
+            (
+                *(block for text in texts for block in page.blocks(text)),
+                *([Text(run.last_words)] if run.last_words else []),
+                *caution_texts(cautions),
+            ),
             run.exit_code,
             next=tuple(run.next),
             written=run.output if run.writes else None,
@@ -240,10 +293,18 @@ class Stage:
 
     def _source(self, run: Run, name: str, given: Any) -> Source:
         """Name a result of this run as its file will be."""
-        label = f"{name}.h5" if self.folder else run.output.name
+        label = f"{name or self.name}.h5" if self.folder or self.fills else run.output.name
         return source_of_result(given, run.origin(self.name, name), run.output, label, "", run.study)
 
     def _check(self, run: Run, output: Path) -> None:
+        if self.fills:
+            names = self._names(self.fills)
+            run.outputs = [output / name for name in names]
+            first = next(iter(self.fills.parts.values()), (self.name, ""))[0]
+            again = self.fills.grows and store.stage_of(output / names[0]) == first
+            check_folder(output, run.force or again, names, kept=self.fills.kept)
+            return
+        run.outputs = [output]
         if not self.folder:
             check_output(output, run.force, run.inputs)
             return
@@ -253,7 +314,37 @@ class Stage:
             )
         check_folder(output, run.force, ())
 
+    def _names(self, fills: Filled) -> list[str]:
+        results = (f"{name}.h5" for name in fills.parts or (self.name,))
+        return [*results, PAGE, f"{self.name}.json", *fills.texts]
+
+    def _fill(self, run: Run, output: Path, given: Any, fills: Filled) -> None:
+        """Write what one answer fills a folder with."""
+        parts = fills.parts or {self.name: (self.name, "")}
+        results = {name: getattr(given, name) if fills.parts else given for name in parts}
+        held = {name: each for name, each in results.items() if each is not None}
+        for name, each in held.items():
+            store.require_sound(output / f"{name}.h5", each)
+        with filled_folder(output, self._names(fills)) as folder:
+            for name, each in held.items():
+                stage, before = parts[name]
+                origin = run.origin(stage, name)
+                made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
+                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+            cautions = run.cautions_of(*parts)
+            summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
+            write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
+            for name, text in fills.texts.items():
+                write_text(folder / name, text(given))
+            # Above this module: a report shows results of all stages. Without a bar of its own: that is of the whole.
+            report = import_module("cpfls_cli.commands.report")
+            quiet = replace(run, output=folder / PAGE, progress=lambda *_: None, reads=lambda _: None)
+            report.run(quiet, [folder / f"{name}.h5" for name in held])
+
     def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
+        if self.fills:
+            self._fill(run, output, results[""], self.fills)
+            return
         if not self.folder:
             store.write(output, results[""], run.origin(self.name))
             return
@@ -283,11 +374,12 @@ def stage(
     figures: Mapping[str, Callable[[Any], str]] | None = None,
     words: Mapping[str, Any] | None = None,
     folder: bool = False,
+    fills: Filled | None = None,
     study: bool = False,
     several: bool = False,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, study, several)
+    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

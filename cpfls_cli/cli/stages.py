@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from cpfls_cli.arguments import FolderOption
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, repeated, with_common
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
@@ -154,7 +155,8 @@ def command_of(own: Stage) -> Callable[..., None]:
 
     keyword = inspect.Parameter.KEYWORD_ONLY
     added = {"config": ConfigArgument} if own.study else {}
-    output = inspect.Parameter("output", keyword, annotation=FilledOption if own.folder else OutputOption)
+    option = FilledOption if own.folder else FolderOption if own.fills else OutputOption
+    output = inspect.Parameter("output", keyword, annotation=option)
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
         *(each.replace(kind=keyword) for each in parameters),

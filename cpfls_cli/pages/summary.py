@@ -21,6 +21,7 @@ from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
+from cpfls_cli.stage import loaded
 
 
 def summary_section(sources: Sources) -> Section:
@@ -36,6 +37,7 @@ def summary_section(sources: Sources) -> Section:
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
+    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
