@@ -401,7 +401,7 @@ wheel: $(INSTALLED_RELEASE)
 TIMED := evaluation whole_run workers long_flights reduction reduction_streamed gap replay vehicle_search \
 	time_to_quality trajectory_planning excitation full_circle attitude_inertia export_speed simulators fuzzy_fitting
 UNTIMED := evolution_hypervolume judging quality_elsewhere full_circle_limit full_circle_noise unseen_path seam \
-	band_coverage tracking
+	band_coverage
 STUDY := data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
 ON_reduction_streamed := --samples 100000
 ON_judging := configs/paper-gentle.yaml $(STUDY)

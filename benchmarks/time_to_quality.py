@@ -22,13 +22,11 @@ from benchmarks.shared.measure import pin_threads, table
 pin_threads()
 
 import numpy as np
-from cpfls_cli.artifacts.selection import SelectionRecord
 from pymoo.indicators.hv import HV
 
 from benchmarks.shared.quality_plot import draw
 from benchmarks.shared.searches import Search, searches, spent
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution.ranking import pareto_front
 from cpfls_cli.flights.training import read_training
@@ -36,6 +34,8 @@ from cpfls_cli.identification.evaluator import Evaluator, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.search import choose
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.store import read
 
 DEFAULT = IdentificationSettings()
 PLOT = Path(__file__).resolve().parents[1] / "docs" / "time-to-quality.svg"
@@ -117,7 +117,7 @@ def print_start(evaluator: Evaluator, selection: Path) -> None:
     uniform = uniform_chromosome(evaluator.structure)
     before = evaluator.objectives(uniform, evaluator.fit(uniform))[0]
     after = evaluator(uniform[None]).objectives[0, 0]
-    chosen = read_record(selection, SelectionRecord)
+    chosen, _ = read(selection, Selection)
     print(
         f"Equidistant partitions, {len(chosen.indices)} samples by {chosen.criterion}: mean squared error "
         f"{before:.4g} N^2 m^2, {after:.4g} after local search"

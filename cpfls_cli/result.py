@@ -115,6 +115,11 @@ class Described(NamedTuple):
     optional: bool
 
     @property
+    def required(self) -> bool:
+        """Whether every file holds it."""
+        return self.default is MISSING
+
+    @property
     def named(self) -> bool:
         """Whether it maps names to results."""
         return self.about is None and maps(self.kind)
@@ -232,13 +237,16 @@ def column(rows: Iterable[Any], name: str) -> list[Any]:
     return [getattr(row, name) for row in rows]
 
 
-def datasets(cls: Any, prefix: str = "") -> Iterator[tuple[str, Described]]:
-    """List the values of a result by path, for documentation."""
+def datasets(cls: Any, prefix: str = "", row: str = "", required: bool = True) -> Iterator[tuple[str, Described]]:
+    """List the values of a result by path, for documentation; those of tables have an axis of their rows first."""
     for own in described_fields(cls):
+        needed = required and own.required
         if own.about:
-            yield f"{prefix}{own.name}", own
+            about = own.about._replace(axes=(row, *own.about.axes) if row else own.about.axes)
+            yield f"{prefix}{own.name}", own._replace(about=about, default=MISSING if needed else None)
         else:
-            yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}")
+            inner = own.name if row or own.table else ""
+            yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}", inner, needed)
 
 
 class _NumberByName(NamedTuple):

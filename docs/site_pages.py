@@ -13,6 +13,7 @@ import typer
 from mkdocs.structure.files import File, Files
 
 from cpfls_cli.cli.app import app
+from cpfls_cli.commands import formats
 from cpfls_cli.config.keys import commented_default
 
 ROOT = Path(__file__).parents[1]
@@ -39,8 +40,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Lead the links of a page of docs/ to where the files are on the site."""
-    return markdown if page.file.generated_by else _relinked(markdown, "docs")
+    """Lead the links of a page of docs/ to where the files are on the site; that on files gets its tables."""
+    if page.file.generated_by:
+        return markdown
+    return _relinked(markdown, "docs") + (_formats() if page.file.src_uri == "format.md" else "")
 
 
 def on_post_page(output: str, **_: Any) -> str:
@@ -92,6 +95,15 @@ def _configuration() -> str:
         if section.strip():
             lines += ["```yaml", section.rstrip(), "```", ""]
     return "\n".join(lines)
+
+
+def _formats() -> str:
+    lines = []
+    for each in formats.formats():
+        lines += ["", f"### `{each.name}`{f', kind `{each.kind}`' if each.kind else ''}", "", formats.origin(each), ""]
+        lines += ["| dataset | dimensions | units | frame | required | description |", "|---|---|---|---|---|---|"]
+        lines += [f"| `/{path}` | {' | '.join(rest)} |" for path, *rest in formats.rows(each)]
+    return "\n".join(lines) + "\n"
 
 
 def _notebook(file: Path) -> str:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from cpfls_cli.artifacts.selection import SelectionRecord
 
 from benchmarks.paper.printed import (
     PRINTED_CONTRIBUTION,
@@ -27,6 +26,7 @@ from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import joined_sweeps
+from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
 from cpfls_cli.words import joined
 
@@ -306,13 +306,13 @@ _FEWEST = TABLE_4[-1]
 _REDUCE = "cpfls reduce CONFIG flight.h5 -o selection.h5"
 
 
-def _share(selection: SelectionRecord) -> float:
+def _share(selection: Selection) -> float:
     return len(selection.indices) / selection.candidates
 
 
-def _kept(selection: SelectionRecord) -> float:
+def _kept(selection: Selection) -> float:
     """Divide the condition number of all samples by that of the chosen ones; 0 where rank is lost."""
-    return 0.0 if selection.deficient else selection.condition_number_full / selection.condition_number
+    return 0.0 if selection.stalled else selection.condition_number_full / selection.condition_number
 
 
 def _chosen(found: Searches) -> Iterator[tuple[float, float]]:
@@ -332,7 +332,7 @@ def _contribution(sources: Sources) -> Measurement:
         return _not_reduced()
     selection = max(few, key=lambda source: _share(source.record))
     record = selection.record
-    random = record.condition_number_full / record.random_median
+    random = record.condition_number_full / record.condition_number_random
     why = f"{selection.label}: {_first_enough(record)}A random choice of equal size keeps {percent(random)}"
     weak = " too, so the claim says more about the path than about the choice" if random > PRINTED_CONTRIBUTION else ""
     return _contributes(_share(record), _kept(record), f"{why}{weak}.")
@@ -351,9 +351,9 @@ def _contributes(share: float, kept: float, why: str) -> Measurement:
     return decided(kept > PRINTED_CONTRIBUTION, f"{percent(kept)} with {percent(share)} of the samples", why)
 
 
-def _first_enough(selection: SelectionRecord) -> str:
+def _first_enough(selection: Selection) -> str:
     """Count the samples from which on, in the order of the choice, 80 % is kept."""
-    enough = selection.trace.condition_number * PRINTED_CONTRIBUTION < selection.condition_number_full
+    enough = selection.condition_number_trace * PRINTED_CONTRIBUTION < selection.condition_number_full
     if not len(enough) or not enough[-1]:
         return ""
     first = len(enough) - int(np.argmin(enough[::-1])) + 1 if not enough.all() else 1

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, paired, record
-from cpfls_cli.dynamics.rigid_body import not_positive_definite
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, paired, record
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.regressor.motion import Motion
 
 if TYPE_CHECKING:
-    from cpfls_cli.control.controllers import Plan
-    from cpfls_cli.control.track import Scores
-    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.flightlog.results import ImportedFlight
     from cpfls_cli.simulation.model import SimulatedEffects
 
@@ -196,89 +192,6 @@ def _effect_values(effects: SimulatedEffects) -> Iterator[tuple[str, float]]:
 
 
 @record
-class TrackingGroup:
-    """Attitude controllers that were compared on a flight."""
-
-    controller: tuple[str, ...] = dataset("model, rigid-body, pd, vehicle: the model flies", "controller")
-    time: Array = dataset("samples of the plan; the flight ends where it was lost", "tracked", units="s")
-    error: Array = dataset(
-        "planned less flown angles", "controller", "tracked", "axis", units="rad", frame=EULER, gaps=True
-    )
-    settled_from: float = dataset("when the initial error has died down, from the first sample", units="s")
-    rms: Array = dataset(
-        "root mean square error; not finite where lost", "controller", "axis", units="rad", frame=EULER, gaps=True
-    )
-    settled_rms: Array = dataset(
-        "the same of the samples after that time", "controller", "axis", units="rad", frame=EULER, gaps=True
-    )
-    max_error: Array = dataset("largest error", "controller", "axis", units="rad", frame=EULER, gaps=True)
-    settled_max: Array = dataset(
-        "largest error after that time", "controller", "axis", units="rad", frame=EULER, gaps=True
-    )
-    torque_rms: Array = dataset(
-        "root mean square of the torque", "controller", "axis", units="N m", frame=BODY, gaps=True
-    )
-    clipped: Array = dataset("share of the commands clipped to the largest torque", "controller")
-    lost_at: Array = dataset("time of a loss; not finite where none", "controller", units="s", gaps=True)
-    control_rate: float = dataset("commands in a second", units="1/s")
-    outside: BoolArray = dataset("1 where the flight leaves what the model's training visited", "time")
-    not_positive_definite: int = dataset("samples of the flight where D(q) is not that of any body")
-
-    @classmethod
-    def of(
-        cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: InertiaFunctions, attitude: Array
-    ) -> Self:
-        """Arrange a comparison; the attitude, shape (time, 3), rad, is the one under the model's controller."""
-        return group_of(
-            cls,
-            scores,
-            controller=tuple(controllers),
-            time=plan.time[:: plan.parts],
-            control_rate=1 / plan.period,
-            outside=model.outside(attitude),
-            not_positive_definite=int(np.sum(not_positive_definite(model.inertia(attitude).value, attitude))),
-        )
-
-    @property
-    def outside_count(self) -> int:
-        """Samples of the flight outside the attitudes that training visited."""
-        return int(np.sum(self.outside))
-
-    def lost(self, controller: str) -> bool:
-        """Tell whether a controller lost the vehicle."""
-        return bool(np.isfinite(self.lost_at[self.controller.index(controller)]))
-
-    def ratio(self, other: str) -> Array | None:
-        """Divide the settled error of the model's controller by another one's, shape (3,).
-
-        None where the model's lost the vehicle, or the other one leaves no error to divide by.
-        """
-        model, reference = (self.settled_rms[self.controller.index(name)] for name in ("model", other))
-        return model / reference if np.isfinite(model).all() and np.all(reference > 0) else None
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The comparison for machines."""
-        return {
-            "outside": self.outside_count,
-            "not_positive_definite": self.not_positive_definite,
-            "controllers": [self._of_controller(index) for index in range(len(self.controller))],
-        }
-
-    def _of_controller(self, index: int) -> dict[str, Any]:
-        values = {
-            "rms_rad": self.rms,
-            "settled_rms_rad": self.settled_rms,
-            "max_rad": self.max_error,
-            "settled_max_rad": self.settled_max,
-            "torque_rms_n_m": self.torque_rms,
-            "clipped": self.clipped,
-            "lost_at_s": self.lost_at,
-        }
-        return {"name": self.controller[index], **{key: value[index].tolist() for key, value in values.items()}}
-
-
-@record
 class FlightRecord(Record):
     """The artifact `cpfls/flight`."""
 
@@ -366,7 +279,6 @@ class FlightRecord(Record):
     stated: StatedGroup | None = group(default=None)
     noise: NoiseGroup | None = group(default=None)
     effects: FlownEffectsGroup | None = group(default=None)
-    tracking: TrackingGroup | None = group(default=None)
 
     @classmethod
     def of_simulation(
@@ -374,7 +286,6 @@ class FlightRecord(Record):
         signals: Mapping[str, Array],
         noise_std: Mapping[str, Array],
         effects: SimulatedEffects | None = None,
-        tracking: TrackingGroup | None = None,
     ) -> Self:
         """Arrange a simulated flight: signals by the names of the fields, and standard deviations of their noise."""
         named: Mapping[str, Any] = signals
@@ -382,7 +293,6 @@ class FlightRecord(Record):
             **named,
             noise=NoiseGroup.of(noise_std),
             effects=None if effects is None else FlownEffectsGroup.of(effects),
-            tracking=tracking,
         )
 
     @classmethod
@@ -472,13 +382,5 @@ class FlightRecord(Record):
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The flight, and the controllers that were compared on it, for machines."""
-        summary = {"samples": len(self.time), "max_torque": self.largest_torque}
-        if self.tracking is None:
-            return summary
-        return summary | {
-            "control_rate_hz": self.tracking.control_rate,
-            "settled_from_s": self.tracking.settled_from,
-            "rotor_speed": self.rotor_speed is not None,
-            **self.tracking.summary,
-        }
+        """The flight for machines."""
+        return {"samples": len(self.time), "max_torque": self.largest_torque}

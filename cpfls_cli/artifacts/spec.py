@@ -1,6 +1,6 @@
 """What an artifact is made of: its format, and the records whose fields are its datasets.
 
-A format is a class: ``@record class SelectionRecord(Record)``, with one field for each dataset (`dataset`) or group of
+A format is a class: ``@record class TrajectoryRecord(Record)``, with one field for each dataset (`dataset`) or group of
 datasets (`group`). A path is the name of its field where it does not say another; specification, writing, reading, the
 check and the tables of docs/format.md follow from the fields.
 """

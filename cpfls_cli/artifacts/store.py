@@ -268,12 +268,6 @@ def format_name(path: Path) -> str | None:
     return known.spec.name if known else result.format if result else None
 
 
-def kind_name(path: Path) -> str | None:
-    """Tell the kind that a file is of its format without reading it whole; None where it is no artifact."""
-    known = _known(path, _origin_of)
-    return None if known is None else known.spec.kind
-
-
 def holds(path: Path, wanted: type[Record]) -> bool:
     """Tell whether a file is an artifact of one format, and of its kind, without reading it whole."""
     known = _known(path, _origin_of)

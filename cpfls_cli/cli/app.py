@@ -178,10 +178,8 @@ def simulate(
         typer.Option(
             "--model",
             metavar="MODEL",
-            help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
-            "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
-            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top. Along "
-            "a FLIGHT: fly it beside the vehicle of the config.",
+            help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
+            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
         ),
     ] = None,
     mode: Annotated[
@@ -189,8 +187,8 @@ def simulate(
         typer.Option(
             "--mode",
             metavar="MODE",
-            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it; "
-            "computed-torque: attitude control by --model. Overrides simulation.mode.",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
+            "Overrides simulation.mode.",
         ),
     ] = None,
     effect: Annotated[
@@ -713,10 +711,25 @@ def verify_export(
 
 
 @_command()
-def info(file: FileArgument, *, common: Common) -> None:
-    """Show what the command that wrote an artifact answered, what it holds and where it comes from."""
+def info(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Any artifact.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--format", metavar="NAME", help="Describe the datasets of a format, such as flight.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Show what the command that wrote an artifact answered, what it holds and where it comes from.
+
+    Without FILE, list all formats, or describe one.
+    """
     with messages_for_errors():
-        tell(_of("show").info(file), common)
+        if file is None:
+            tell(_of("formats").run(name), common)
+        elif name is None:
+            tell(_of("show").info(file), common)
+        else:
+            raise InputError("--format describes files of a format in general: leave out FILE or --format")
 
 
 @_command()

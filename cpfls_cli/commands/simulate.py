@@ -1,4 +1,4 @@
-"""Command `simulate`: fly a trajectory, with the exact vehicle, in closed loop, or with a model that controls it."""
+"""Command `simulate`: fly a trajectory, with the exact vehicle or in closed loop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on, require_numbers
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds, kind_name, read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
@@ -30,13 +30,10 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
-from cpfls_cli.simulation.settings import Mode
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel
 
-_WHOLE = "vehicle"
-"""Kind of a model of a whole vehicle."""
 _MOVED = ("position", "velocity", "acceleration")
 _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfls effects NAME`"
 
@@ -48,19 +45,11 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
         return import_module("cpfls_cli.commands.twin").run(job, trajectory, model)  # type: ignore[no-any-return]
     if model is not None and mode is None:
-        whole = kind_name(model) == _WHOLE
-        job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
+        job = replace(job, study=_in_closed_loop(job.study))
     job = _with_numbers(job, model)
-    if job.study.simulation.mode == "computed-torque":
-        if model is None:
-            raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
-        return import_module("cpfls_cli.commands.tracking").run(job, trajectory, model)  # type: ignore[no-any-return]
     closed = job.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
-        raise InputError(
-            f"{model}: no model is flown in mode inverse; leave the mode out to control the vehicle with it, or add "
-            "--mode closed-loop to fly it"
-        )
+        raise InputError(f"{model}: no model is flown in mode inverse; leave the mode out, or add --mode closed-loop")
     inputs = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
     flown = None if model is None else import_module("cpfls_cli.flights.models").read_model(model, job.study)
@@ -82,12 +71,10 @@ def _with_numbers(job: Job, model: Path | None) -> Job:
     return import_module("cpfls_cli.commands.numbers").with_numbers(job, "simulate", model)  # type: ignore[no-any-return]
 
 
-def _with_mode(study: Study, usual: Mode) -> Study:
-    """Take the mode that is usual for a model, where nothing else is said."""
-    if study.simulation.mode != "inverse":
-        return study
+def _in_closed_loop(study: Study) -> Study:
+    """Take the mode in which a model is flown, where nothing else is said."""
     with settings_of("simulation", study):
-        return study.model_copy(update={"simulation": replace(study.simulation, mode=usual)})
+        return study.model_copy(update={"simulation": replace(study.simulation, mode="closed-loop")})
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:

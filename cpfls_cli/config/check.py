@@ -22,8 +22,14 @@ from cpfls_cli.vehicle.rotors import figures_of_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle
 
-_GONE = {("report", "paper"), ("report", "evaluation_times")}
-"""Sections and keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
+_PAPER = "remove it; `make reproduce` writes the page that compares a study with the paper"
+_CONTROL = "a model is flown by `simulate --model` in closed loop; examples/computed_torque.py controls with one"
+_GONE = {
+    ("report", "evaluation_times"): _PAPER,
+    ("report", "paper"): _PAPER,
+    ("simulation", "computed_torque"): f"remove it; {_CONTROL}",
+}
+"""What to do about keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
 
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
@@ -81,9 +87,11 @@ def _known(section: str, values: Any) -> Any:
 def gone_lines(data: dict[str, Any], source: str) -> list[str]:
     """Say of the keys of a file that are gone what to do."""
     sections = {section: values for section, values in data.items() if isinstance(values, dict)}
-    held = [f"{section}.{key}" for section, key in sorted(_GONE) if key in sections.get(section, ())]
-    why = "is no longer a key: remove it; `make reproduce` writes the page that compares a study with the paper"
-    return [f"{source}: {key}: {why}" for key in held]
+    return [
+        f"{source}: {section}.{key}: is no longer a key: {remedy}"
+        for (section, key), remedy in _GONE.items()
+        if key in sections.get(section, ())
+    ]
 
 
 def _no_body(study: Study) -> Iterator[str]:
@@ -239,6 +247,8 @@ def _reason(detail: ErrorDetails, location: Location, data: dict[str, Any]) -> s
         return f"needs {int(detail['loc'][-1]) + 1} entries"
     if detail["type"] in _LENGTH:
         return _length(detail, _value(data, location)[1])
+    if location == ("simulation", "mode") and _value(data, location)[1] == "computed-torque":
+        return f"is no longer a mode: leave it out; {_CONTROL}"
     message = detail["msg"].removeprefix("Value error, ")
     message = message.replace("Input should be ", "must be ", 1) if message.startswith("Input should be ") else message
     return _PLAIN_WORDS.get(message, message)

@@ -1,22 +1,19 @@
 """Equations of rotation: of models in Euler coordinates, ``J(q) qdd + C(q, qd) qd = tau``, and of rigid bodies.
 
-What turns, whether flown with effects, controlled or replayed, turns by one law (`turning_law`), which keeps inertia
+What turns, whether flown with effects or replayed, turns by one law (`turning_law`), which keeps inertia
 and torque apart; a noisy flight is balanced without differentiating its rates (`momentum_form`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
 
 # Below this |cos(pitch)| half of all digits are lost to the singularity of the Euler angles.
@@ -37,30 +34,6 @@ class InertiaModel(Protocol):
     def outside(self, attitude: Array) -> BoolArray:
         """Flag attitudes that it was not found at, shape (samples,)."""
         ...
-
-
-class TorqueModel(Protocol):
-    """A model that knows the generalised torque of a motion, ``D(q) qdd + C(q, qd) qd``."""
-
-    def torque(self, motion: Motion) -> Array:
-        """Evaluate the generalised torque, shape (samples, 3), N m."""
-        ...
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """A rigid body as a torque model.
-
-    Attributes
-    ----------
-    inertia : array, shape (3, 3), kg m^2, body frame
-    """
-
-    inertia: Array
-
-    def torque(self, motion: Motion) -> Array:
-        """Compute the generalised torque, shape (samples, 3), N m."""
-        return newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, self.inertia)
 
 
 def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:

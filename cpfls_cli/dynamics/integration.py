@@ -1,4 +1,4 @@
-"""Rotation integrated in time: one step of Runge and Kutta's method, and the two kinds of runs that take it."""
+"""Rotation integrated in time: one step of Runge and Kutta's method, and the runs that take it."""
 
 from __future__ import annotations
 
@@ -47,37 +47,6 @@ def runge_kutta_step(
     third = slope(state + 0.5 * step * second, middle)
     fourth = slope(state + step * third, end)
     return np.asarray(state + step / 6 * (first + 2 * (second + third) + fourth))
-
-
-def advance(law: TurningLaw, state: Array, torque: Callable[[float], Array], period: float, steps: int) -> Array:
-    """Integrate attitude and body rate over one period of control.
-
-    Parameters
-    ----------
-    state : array, shape (vehicle, 6)
-        Attitude in rad, body rate in rad/s.
-    torque : callable
-        Body torque, shape (vehicle, 3), by the time since the command in s.
-    period : float, s
-    steps : int
-        Of the integration.
-
-    Returns
-    -------
-    array, shape (vehicle, 6)
-    """
-
-    def slope(state: Array, torque: Array) -> Array:
-        attitude, body_rate = state[:, :3], state[:, 3:]
-        turned = law(attitude, body_rate).acceleration(torque)
-        return np.concatenate([rotations.attitude_rate(attitude, body_rate), turned], axis=1)
-
-    step = period / steps
-    for number in range(steps):
-        begin = number * step
-        acting = torque(begin), torque(begin + 0.5 * step), torque(begin + step)
-        state = runge_kutta_step(slope, state, acting, step)
-    return state
 
 
 class RotationState(NamedTuple):

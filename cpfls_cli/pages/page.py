@@ -30,7 +30,6 @@ from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.tracking import tracking_blocks
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
@@ -122,14 +121,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
         "What each flight tells",
         lambda given: given.of_kind(FlightNumbersRecord),
         flight_numbers_blocks,
-    ),
-    _of_each(
-        "tracking",
-        "Control with the model",
-        attrgetter("flights"),
-        tracking_blocks,
-        holds=attrgetter("tracking"),
-        among=True,
     ),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,

@@ -29,15 +29,9 @@ NoisySignal = Literal[
     "voltage",
 ]
 
-Mode = Literal["inverse", "closed-loop", "computed-torque"]
-
-# Inverse dynamics has body rates that follow from the attitude, and nothing is commanded; of a vehicle whose attitude
-# alone is controlled nothing is known but how it turns.
-_NO_SENSOR: dict[Mode, frozenset[str]] = {
-    "inverse": frozenset({"body_rate", "rotor_command", "voltage"}),
-    "closed-loop": frozenset(),
-    "computed-torque": frozenset({"position", "velocity", "acceleration", "rotor_command", "voltage"}),
-}
+# Inverse dynamics has body rates that follow from the attitude, and nothing is commanded.
+_NO_SENSOR = frozenset({"body_rate", "rotor_command", "voltage"})
+"""What a flight in mode inverse lacks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,56 +99,13 @@ class ClosedLoopSettings(Settings):
         return None if self.autopilot == "cpfls" else AUTOPILOTS[self.autopilot].law(self.autopilot_parameters)
 
 
-_Positive = Annotated[float, Gt(0)]
-_Three = tuple[float, float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComputedTorqueSettings(Settings):
-    """The attitude controllers that are compared, their actuators and sensors, and what they control."""
-
-    plant: Annotated[
-        Literal["vehicle", "model"],
-        Doc("what is controlled: vehicle, the exact rigid body of the config; model, the identified model itself"),
-    ] = "vehicle"
-    natural_frequency_hz: Annotated[
-        tuple[_Positive, _Positive, _Positive], Doc("natural frequency of the error in roll, pitch and yaw, Hz")
-    ] = (1.2, 1.2, 0.5)
-    damping: Annotated[float, Gt(0), Doc("damping of the error, 1 is critical")] = 1.0
-    control_rate_hz: Annotated[
-        float, Gt(0), Doc("commands in a second, held in between; not fewer than samples of the trajectory")
-    ] = 100.0
-    integration_rate_hz: Annotated[
-        float, Gt(0), Le(1e5), Doc("steps of the integration in a second, at least one for each command")
-    ] = 100.0
-    initial_error_rad: Annotated[
-        _Three, Doc("planned less flown roll, pitch and yaw at the start, rad, so that a transient is seen")
-    ] = (0.1, -0.1, 0.1)
-    rotor_time_constant_s: Annotated[
-        float, Ge(0), Doc("time in which the torque reaches 63 % of a step, s; 0 for a torque that follows at once")
-    ] = 0.0
-    torque_max_n_m: Annotated[
-        tuple[_Positive, _Positive, _Positive] | None,
-        Doc("largest torque about the body axes, N m, to which commands are clipped; null for no limit"),
-    ] = None
-    attitude_noise_rad: Annotated[
-        float, Ge(0), Doc("standard deviation of white noise on each angle that the controllers measure, rad")
-    ] = 0.0
-    body_rate_noise_rad_s: Annotated[
-        float, Ge(0), Doc("standard deviation of white noise on each body rate that they measure, rad/s")
-    ] = 0.0
-
-
 @dataclass(frozen=True, kw_only=True)
 class SimulationSettings(Settings):
     """How a flight is simulated, and what it gets beside the vehicle's exact dynamics."""
 
     mode: Annotated[
-        Mode,
-        Doc(
-            "inverse: the torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it; "
-            "computed-torque: attitude control by a model, which `--model` gives"
-        ),
+        Literal["inverse", "closed-loop"],
+        Doc("inverse: the torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it"),
     ] = "inverse"
     noise: Annotated[
         dict[NoisySignal, Annotated[float, Ge(0)]],
@@ -171,7 +122,6 @@ class SimulationSettings(Settings):
         ),
     ] = "stop"
     closed_loop: Annotated[ClosedLoopSettings, Doc("for mode closed-loop")] = ClosedLoopSettings()
-    computed_torque: Annotated[ComputedTorqueSettings, Doc("for mode computed-torque")] = ComputedTorqueSettings()
 
     def __post_init__(self) -> None:
         """Refuse what a mode cannot do.
@@ -194,8 +144,6 @@ class SimulationSettings(Settings):
             raise SettingError(key, "body_torque: torque has noise too, and one follows from the other; remove one")
         if self.mode != "inverse" and "body_torque" in signals:
             raise SettingError(key, f"body_torque: in mode {self.mode} it follows from torque; give torque the noise")
-        extra = ", ".join(sorted(_NO_SENSOR[self.mode] & signals))
+        extra = ", ".join(sorted(_NO_SENSOR & signals))
         if extra and self.mode == "inverse":
             raise SettingError(key, f"{extra}: only a flight in mode closed-loop has this sensor")
-        if extra:
-            raise SettingError(key, f"{extra}: a vehicle with only attitude control does not log it; leave it out")

@@ -161,7 +161,12 @@ def test_effects_without_closed_loop_are_refused(short, refuse, tmp_path):
 
 def test_unknown_mode_is_refused(short, refuse, tmp_path):
     (line,) = refuse("simulate", *short, "--mode", "open", "-o", tmp_path / "flight.h5")
-    assert "'inverse', 'closed-loop' or 'computed-torque'" in line
+    assert "'inverse' or 'closed-loop'" in line
+
+
+def test_control_by_a_model_is_refused_with_what_to_use_instead(short, refuse, tmp_path):
+    (line,) = refuse("simulate", *short, "--mode", "computed-torque", "-o", tmp_path / "flight.h5")
+    assert "is no longer a mode: leave it out; a model is flown by `simulate --model` in closed loop" in line
 
 
 def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):

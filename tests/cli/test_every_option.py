@@ -87,6 +87,7 @@ LINES = (
     "spread vehicle.h5 -o 18.json --count 3 --seed 2 --anyway",
     "verify-export vehicle.h5 flight.h5 --format px4 --horizon 0.1 --windows 3 --hold linear",
     "info flight.h5",
+    "info --format flight",
     "check flight.h5",
     "config study.yaml --section vehicle",
     "effects com_offset",

@@ -7,7 +7,7 @@ from pkgutil import iter_modules
 
 import pytest
 
-from cpfls_cli import commands, pages
+from cpfls_cli import commands, pages, stages
 
 HEAVY = {"h5py", "jinja2", "matplotlib", "numba", "numpy", "pydantic", "scipy", "yaml"}
 LOADS = """
@@ -39,8 +39,7 @@ def after(pipeline, study, tmp_path_factory):
     short = "trajectory={legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}"
     groups = {
         "nothing": [("--version",), ("--help",)],
-        "telling": [("info", pipeline.flight), ("check", pipeline.selection), ("check", pipeline.model)],
-        "reading": [("check", pipeline.model), ("check", pipeline.flight), ("config", study), ("config",)],
+        "reading": [("check", pipeline.flight), ("config", study), ("config",)],
         "reduce": [("reduce", study, pipeline.flight, "-o", folder / "selection.h5")],
         "identify": [
             ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", folder / "model.h5")
@@ -63,12 +62,6 @@ def of_gap(names):
     return [name for name in names if name.startswith("cpfls_cli.gap.") and name != "cpfls_cli.gap.settings"]
 
 
-def of_trust(name):
-    """Tell whether a module holds the words of trust, or is the front page of the room that they are in."""
-    rooms = {"cpfls_cli.validation", "cpfls_cli.pages"}
-    return name in rooms or name in {f"{room}.trust" for room in rooms}
-
-
 def test_the_version_and_the_help_load_nothing_heavy(after):
     assert HEAVY & after["nothing"] == set()
 
@@ -84,12 +77,14 @@ def test_what_is_printed_loads_no_plotting(after):
 @pytest.fixture(scope="module")
 def imported():
     """Modules after imports, one after the other."""
-    names = [module.name for room in (commands, pages) for module in iter_modules(room.__path__, f"{room.__name__}.")]
+    names = [
+        module.name for room in (commands, pages, stages) for module in iter_modules(room.__path__, f"{room.__name__}.")
+    ]
     assert len(names) > 20
     codes = {
         "the package": "import cpfls_cli",
         "flying": "from cpfls_cli.commands import simulate, trajectory",
-        "searches": "from cpfls_cli.commands import identify, reduce, sweep",
+        "searches": "from cpfls_cli.commands import identify, sweep; from cpfls_cli.stages import reduce",
         "report": "import cpfls_cli.commands.report",
         "all commands and pages": f"import {', '.join(names)}",
     }
@@ -127,10 +122,3 @@ def test_commands_load_no_room_that_they_do_not_work_in(after):
     assert of_gap(after["reduce"]) == []
     assert "cpfls_cli.playback.model" not in after["reduce"]
     assert of_gap(after["identify"]) == []
-
-
-def test_what_a_file_holds_is_told_without_the_numerics_that_made_it(after):
-    # How far to trust a model is told in a word, and words of trust stand in a module of their own. What a command
-    # answered is worded by the pages, which `info` loads where there is an answer.
-    rooms = {name.split(".")[1] for name in after["telling"] if name.startswith("cpfls_cli.") and not of_trust(name)}
-    assert rooms.isdisjoint({"gap", "effects", "identification", "validation", "reduction", "weak_form", "pages"})

@@ -30,9 +30,7 @@ from tests.builders.vehicle_models import record_of
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
-SLOWLY = {"computed_torque.control_rate_hz": 20, "computed_torque.integration_rate_hz": 20}
-SLOWLY |= {"closed_loop.integration_rate_hz": 100}
-COARSE = [word for key, rate in SLOWLY.items() for word in ("--set", f"simulation.{key}={rate}")]
+COARSE = ("--set", "simulation.closed_loop.integration_rate_hz=100")
 """What a screen says hangs on no step of an integration."""
 WHOLE = ("config",)
 """Prints a file, to be written into one."""
@@ -87,7 +85,6 @@ def _of_torque(show):
     excited = ("--hover", "20", "--excite", "roll,pitch", "--repeat", "2")
     show("mission", "trajectory", "tiny.yaml", *excited, *quick, output="mission.h5")
     show("simulate", "simulate", "tiny.yaml", "path.h5", output="other.h5")
-    show("tracking", "simulate", "tiny.yaml", "path.h5", "--model", "model.h5", *COARSE, output="tracked.h5")
     show("reduce", "reduce", "tiny.yaml", "flight.h5", output="few.h5")
     show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
     show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
@@ -169,7 +166,7 @@ def _of_open_numbers(show, folder):
 
 
 NAMES = (
-    *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
+    *("trajectory", "mission", "simulate", "reduce", "identify", "sweep", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
     *("changed", "not changed", "trend", "tune"),

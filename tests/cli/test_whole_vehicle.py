@@ -173,7 +173,6 @@ def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     ("options", "message"),
     [
         (("--mode", "inverse"), "{model}: no model is flown in mode inverse; "),
-        (("--mode", "computed-torque"), "{model}: a model with effects is flown in closed loop only; "),
         (("--set", "vehicle.mass_kg=0.9"), "{model}: was made with another vehicle; these differ: vehicle.mass_kg"),
         (
             ("--mode", "closed-loop", "--effect", "rotor_drag=1e-4"),

@@ -191,7 +191,6 @@ def test_tests_import_from_shared_builders_alone():
 ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
 SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
-    "cli/stages.py": "commands of stages; those of `cli/app.py` become some, one after the other",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "pages/flight_numbers.py": "the page of an artifact",

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
 from scipy import stats
 
 from benchmarks.paper.claims import (
@@ -32,10 +31,12 @@ from benchmarks.paper.search_claims import (
     TYPICAL_ERRORS_CLAIM,
     paired_ratio,
 )
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Source
+from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
@@ -52,7 +53,8 @@ def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
 
 def sources(*records, times=()):
     """A report about records."""
-    given = [Source("s.h5", "", record.with_header(Header("1", 0, "")), {}, None, 0) for record in records]
+    named = [record.with_header(Header("1", 0, "")) if isinstance(record, Record) else record for record in records]
+    given = [Source("s.h5", "", record, {}, None, 0, found=Origin(stage="reduce")) for record in named]
     return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 
@@ -193,9 +195,12 @@ def test_time_in_proportion_to_the_decomposition():
 
 def selection(kept, condition, trace, rank=9):
     values = np.array(trace, dtype=float)
-    return SelectionRecord(
+    return Selection(
         indices=np.arange(kept),
-        trace=TraceGroup(condition_number=values, singular_value_min=values, singular_value_max=values),
+        condition_number_trace=values,
+        singular_value_min_trace=values,
+        singular_value_max_trace=values,
+        rank_trace=np.full(len(values), rank),
         rank=rank,
         rank_full=9,
         condition_number=condition,
@@ -203,7 +208,7 @@ def selection(kept, condition, trace, rank=9):
         candidates=100,
         criterion="D",
         stop_reason="size",
-        random_condition_number=np.array([400.0]),
+        random=np.array([400.0]),
     )
 
 

@@ -22,7 +22,7 @@ from tests.builders.drawn_numbers import trend_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 from tests.builders.twins import twin_record
 
-FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "response", "sweep")
+FROM_COMMANDS = ("trajectory", "flight", "model", "prediction", "replay", "response", "sweep")
 FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
 FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "twin", "vehicle", "gains")
@@ -39,8 +39,7 @@ def told(cpfls, study, tmp_path_factory):
     given = {
         "trajectory": ("trajectory", study),
         "flight": ("simulate", study, paths["trajectory"]),
-        "selection": ("reduce", study, paths["flight"]),
-        "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
+        "model": ("identify", study, paths["flight"]),
         "prediction": ("predict", study, paths["model"], paths["flight"]),
         "replay": ("replay", study, paths["model"], paths["flight"]),
         "response": ("response", study, paths["flight"]),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.flight import FlightRecord, NoiseGroup, QualityGroup, TrackingGroup
+from cpfls_cli.artifacts.flight import FlightRecord, NoiseGroup, QualityGroup
 
 TIME = np.arange(3.0)
 THREE = np.zeros((3, 3))
@@ -47,33 +47,3 @@ def test_noise_is_kept_of_signals_with_three_axes():
     noise = NoiseGroup.of({"torque": np.full(3, 0.1), "rotor_speed": np.full(4, 1.0)})
     assert noise.signal == ("torque",)
     assert NoiseGroup.of({"rotor_speed": np.full(4, 1.0)}) is None
-
-
-def tracking(model, other):
-    """Two controllers, with settled errors the same about all axes."""
-    size = np.array([[model] * 3, [other] * 3])
-    return TrackingGroup(
-        controller=("model", "pd"),
-        time=TIME,
-        error=np.zeros((2, 3, 3)),
-        settled_from=1.0,
-        rms=size,
-        settled_rms=size,
-        max_error=size,
-        settled_max=size,
-        torque_rms=size,
-        clipped=np.zeros(2),
-        lost_at=np.where(np.isfinite(size[:, 0]), np.nan, 2.0),
-        control_rate=100.0,
-        outside=np.array([True, False, True]),
-        not_positive_definite=0,
-    )
-
-
-def test_controllers_are_compared_where_neither_lost_the_vehicle():
-    np.testing.assert_allclose(tracking(1.0, 4.0).ratio("pd"), [0.25] * 3)
-    assert tracking(np.nan, 4.0).ratio("pd") is None
-    assert tracking(1.0, np.nan).ratio("pd") is None
-    assert tracking(1.0, 0.0).ratio("pd") is None
-    assert [tracking(np.nan, 4.0).lost(name) for name in ("model", "pd")] == [True, False]
-    assert tracking(1.0, 4.0).outside_count == 2

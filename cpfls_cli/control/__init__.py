@@ -1,1 +1,0 @@
-"""Attitude control by a model of the vehicle, and how well a motion is tracked with it."""
