@@ -111,6 +111,10 @@ class Run(Job):
             refuse_inputs(path, self.inputs)
         return own.files
 
+    def take_also(self, files: Mapping[str, InputFile], of: str = "") -> None:
+        """Take note of files that an input was made from: inputs of all results, or of the one of this name."""
+        self._of(of).files.update(files)
+
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
