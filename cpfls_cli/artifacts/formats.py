@@ -21,8 +21,6 @@ _RECORDS = {
     ("cpfls/response", ""): "response.ResponseRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/gains", ""): "gains.GainsRecord",
-    ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
-    ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
     ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
     ("cpfls/flight-numbers", ""): "flight_numbers.FlightNumbersRecord",

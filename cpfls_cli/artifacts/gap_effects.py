@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.replay import FADING, PlaybackGroup, played_row, rival_row, row_of
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, paired, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.gap.settings import CLEAR, OFF
 from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED

@@ -31,8 +31,6 @@ _PAGES = {
     "cpfls/response": "response",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
-    "cpfls/disagreement": "disagreement",
-    "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",
     "cpfls/changed": "changed",
     "cpfls/trend": "trend",

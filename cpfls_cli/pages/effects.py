@@ -12,7 +12,7 @@ from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import Drawn
 from cpfls_cli.report.content import Table
 from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
-from cpfls_cli.words import capitalised, joined
+from cpfls_cli.words import capitalised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
