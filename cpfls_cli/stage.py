@@ -17,7 +17,14 @@ from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
+from cpfls_cli.artifacts.output import (
+    check_folder,
+    check_output,
+    filled_folder,
+    refuse_inputs,
+    refuse_own,
+    write_text,
+)
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.study import resolved_yaml
@@ -92,6 +99,8 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
+    text : tuple of (Path, str) or None
+        A file of text that is written behind the result.
     """
 
     writes: bool = True
@@ -102,6 +111,7 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
+    text: tuple[Path, str] | None = None
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -137,6 +147,14 @@ class Run(Job):
     def go_on(self, command: str, *words: str | Path, output: Path) -> None:
         """Name a command that goes on with the config of this run."""
         self.next.append(go_on(self, command, *words, output=output))
+
+    def write_text(self, path: Path, text: str, what: str) -> None:
+        """Have a file of text written behind the result, or alone where none is written; `what` says what it is."""
+        if self.writes:
+            refuse_own(path, self.output)
+        check_output(path, self.force, self.inputs)
+        self.text = path, text
+        self.also["file"], self.last_words = str(path), f"{path}: {what}"
 
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
@@ -244,6 +262,8 @@ class Stage:
         results = dict(found) if self.folder else {"": found}
         if run.writes:
             self._write(run, run.output, results)
+        if run.text:
+            write_text(*run.text)
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
@@ -260,7 +280,7 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else None,
+            written=run.output if run.writes else run.text and run.text[0],
         )
 
     def info(self, path: Path) -> Outcome:

@@ -9,12 +9,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
-from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.before_after import FreeRuns, ResidualChange, WhitenessChange, WorstWindows
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
 from cpfls_cli.gap.naming.results import Conclusion, GapSize
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import ComesAgain
@@ -50,12 +49,12 @@ class Diagnosis(Conclusion):
     """Which physical effect a model misses, judged on flights that the fit did not see."""
 
     FORMAT: ClassVar = "cpfls/diagnosis"
-    SHOWN: ClassVar = ("where", "gap_before", "gap_after", "comes_again", "disturbance", "playback", "parameters")
+    SHOWN: ClassVar = ("where", "gap_before", "gap_after", "comes_again", "disturbance", "parameters")
 
     again_before: ComesAgain | None = part(None, brief=False)
     again_after: ComesAgain | None = part(None, brief=False)
     air: DisturbanceGroup | None = part(None, brief=False)
-    replayed: PlaybackChangeGroup | None = part(None, brief=False)
+    playback: PlaybackChange | None = part(None)
     worst: tuple[GapStretch, ...] = part((), brief=False)
     residual: ResidualChange = part(brief=False)
     whiteness: WhitenessChange | None = part(None)
@@ -89,7 +88,7 @@ class Diagnosis(Conclusion):
             again_before=change.again_before,
             again_after=change.again_after,
             air=None if air is None else DisturbanceGroup.of(air.found, air.told),
-            replayed=PlaybackChangeGroup.of_pairs(change.played, change.playback),
+            playback=change.playback,
             worst=change.stretches,
             residual=change.residual,
             whiteness=change.whiteness,
@@ -153,11 +152,6 @@ class Diagnosis(Conclusion):
         if self.again_before is None or self.again_after is None:
             return None
         return {"before": self.again_before, "after": self.again_after}
-
-    @property
-    def playback(self) -> dict[str, Any] | None:
-        """The model played back, for machines."""
-        return self.replayed and self.replayed.summary
 
     @property
     def disturbance(self) -> dict[str, Any] | None:

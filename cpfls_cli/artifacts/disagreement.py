@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from cpfls_cli.artifacts.learned import LearnedGroup
-from cpfls_cli.artifacts.replay import PlaybackGroup
-from cpfls_cli.gap.compare import Compared, Comparison
+from cpfls_cli.gap.compare import Comparison
 from cpfls_cli.gap.recorded import GIVEN, RecordedFlight, names_of, recorded
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import STATED
 from cpfls_cli.result import about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
@@ -21,9 +19,8 @@ class Disagreement(Comparison):
     """Where a model and flights disagree, with the flights."""
 
     FORMAT: ClassVar = "cpfls/disagreement"
-    SHOWN: ClassVar = ("flights", "gap", "stretches", "playback")
+    SHOWN: ClassVar = ("flights", "gap", "stretches")
 
-    replayed: PlaybackGroup | None = part(None, brief=False)
     warnings: tuple[str, ...] = about("what to know about the flights", "warning")
     base: VehicleModel = part(brief=False)
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
@@ -31,14 +28,12 @@ class Disagreement(Comparison):
 
     @classmethod
     def of(
-        cls, found: Compared, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
+        cls, found: Comparison, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
     ) -> Disagreement:
         """Put a comparison together with the model and the flights."""
-        names = {name: name for name in found.playback.predictions if name != STATED}
         return cls(
-            **vars(found.comparison),
-            replayed=PlaybackGroup.of(found.played, found.playback, names),
-            warnings=(*found.comparison.audit.filtered, *warnings),
+            **vars(found),
+            warnings=(*found.audit.filtered, *warnings),
             base=base,
             recorded=recorded(recordings, [GIVEN] * len(recordings)),
         )
@@ -47,11 +42,6 @@ class Disagreement(Comparison):
     def flights(self) -> list[str]:
         """Names of the flights."""
         return names_of(self.recorded)
-
-    @property
-    def playback(self) -> dict[str, Any] | None:
-        """The model played back, for machines."""
-        return self.replayed and self.replayed.summary
 
     @property
     def stretches(self) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -13,12 +13,12 @@ from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
-from cpfls_cli.artifacts.replay import FADING, HeldOutGroup, trust_by_playback
-from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
+from cpfls_cli.artifacts.playback import HeldOutGroup
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import EXPLAINED
-from cpfls_cli.response.mismatch import ROTATION, THRUST
-from cpfls_cli.validation.trust import GOOD, Trust, capped
+from cpfls_cli.playback.errors import FADING
+from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, THRUST, response_word
+from cpfls_cli.validation.trust import GOOD, Trust, capped, trust_by_playback
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
@@ -222,16 +222,16 @@ class ResponsesGroup:
     high: Array = dataset("to this one", "response", units="Hz", gaps=True)
 
     @classmethod
-    def of(cls, responses: Sequence[VehicleResponse], *, instrumented: bool) -> Self:
+    def of(cls, responses: Mapping[str, VehicleResponse], *, instrumented: bool) -> Self:
         """Arrange those about the body axes and of thrust; only those that instruments move, where they have to."""
-        own = [
-            each
-            for each in responses
-            if each.name in (*ROTATION, THRUST) and (each.estimate.instrumented or not instrumented)
-        ]
-        ends = np.array([each.mismatch.band or (np.nan, np.nan) for each in own]).reshape(-1, 2)
-        costs = np.array([each.mismatch.cost for each in own])
-        return cls(name=tuple(each.name for each in own), cost=costs, low=ends[:, 0], high=ends[:, 1])
+        own = {
+            name: each
+            for name, each in responses.items()
+            if name in (*ROTATION, THRUST) and (each.instrumented or not instrumented)
+        }
+        ends = np.array([each.band or (np.nan, np.nan) for each in own.values()]).reshape(-1, 2)
+        costs = np.array([each.cost for each in own.values()])
+        return cls(name=tuple(own), cost=costs, low=ends[:, 0], high=ends[:, 1])
 
     @property
     def _turning(self) -> list[str]:
@@ -340,7 +340,7 @@ class VehicleRecord(ModelRecord):
         warnings: Sequence[str],
         contradictions: Sequence[str] | None = None,
         learned: LearnedGroup | None = None,
-        responses: Sequence[VehicleResponse] = (),
+        responses: Mapping[str, VehicleResponse] | None = None,
         *,
         fading_s: float | None = None,
         rotors_told: float | None = None,
@@ -463,7 +463,7 @@ class VehicleRecord(ModelRecord):
 
     @property
     def _by_playback(self) -> Trust:
-        return capped(trust_by_playback(self.held_out), self.contradiction or ())
+        return capped(trust_by_playback(self.held_out and self.held_out.by_horizon), self.contradiction or ())
 
     @property
     def forecast_verdict(self) -> Trust:

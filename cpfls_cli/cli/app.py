@@ -16,7 +16,6 @@ from cpfls_cli.arguments import (
     AutopilotChoice,
     ChooseOnOption,
     DiagnosisArgument,
-    EveryOption,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
@@ -27,15 +26,12 @@ from cpfls_cli.arguments import (
     FlownArgument,
     FolderOption,
     HeldOutOption,
-    HistoryOption,
     HoldOption,
     HorizonOption,
-    JudgedOption,
     LogArgument,
     LogsArgument,
     ModelArgument,
     ModelOption,
-    PlayedArgument,
     ResumeOption,
     ResumeSweepOption,
     SchedulerOption,
@@ -363,44 +359,6 @@ def predict(
 ) -> None:
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
     _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def replay(
-    config: ConfigArgument,
-    model: PlayedArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    horizon: HorizonOption = None,
-    every: EveryOption = 1,
-    hold: HoldOption = None,
-    history: HistoryOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
-        )
-        return command.run(job, model, flights, options)
-
-    _run("replay", config, output, common, call)
-
-
-@_command()
-def response(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    model: JudgedOption = None,
-    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
-    *,
-    common: Common,
-) -> None:
-    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
-    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
 
 
 @_command()

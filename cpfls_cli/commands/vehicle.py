@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.job import Job, check_outputs, finish
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
-from cpfls_cli.artifacts.replay import HeldOutGroup, contradictions_of
+from cpfls_cli.artifacts.playback import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.stopped import stopped, without_model
@@ -27,7 +27,7 @@ from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.sensors import NOTHING_COMES, contradicted, tell_before_search
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import slow_words, too_slow
-from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.loop import shows_loop_anyhow
 from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
@@ -96,7 +96,7 @@ def run(
             vehicle,
             judged,
             warnings,
-            contradictions_of(read),
+            contradictions_of(read) or None,
             parts,
             _responses(vehicle, training),
             fading_s=fading_s,
@@ -157,7 +157,7 @@ def _what_can_come(
     tuple of str
         What to say beside the answer.
     """
-    settings, wrong = job.study.playback, contradictions_of(flights) or ()
+    settings, wrong = job.study.playback, contradictions_of(flights)
     if wrong and not settings.anyway:
         raise InputError("\n".join(map(contradicted, wrong)) + f"\n{NOTHING_COMES}")
     tell_before_search(wrong)
@@ -220,16 +220,16 @@ def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job, fa
     return HeldOutGroup.judged(pairs, errors)
 
 
-def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> tuple[VehicleResponse, ...]:
+def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> dict[str, VehicleResponse]:
     """Estimate frequency responses beside those of the model; none where the flights tell of the loop alone."""
     own = [flight for flight in flights if not flight.group]
     if vehicle.constants is None and vehicle.loop.unexplained:
-        return ()
+        return {}
     try:
         return vehicle_responses(vehicle.model, own, vehicle.instruments.beside)
     except InputError:
         # Stretches that are too short for a window; the flights' inputs were checked before.
-        return ()
+        return {}
 
 
 def _grouped(

@@ -10,7 +10,6 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.rebuilt import observer, vehicle_model
-from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
@@ -18,6 +17,7 @@ from cpfls_cli.errors import InputError, about
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.settings import VEHICLE
 
 
 def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleModel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -18,10 +18,11 @@ from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
+from cpfls_cli.playback.errors import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED, AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
-from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, fading, replay
+from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
 from cpfls_cli.result import about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
@@ -237,6 +238,46 @@ class WhitenessChange:
         )
 
 
+@result
+class EndError:
+    """How far off a signal is at the longest horizon."""
+
+    SHOWN: ClassVar = ("worse",)
+
+    before: float = about("mean error of the model as given")
+    after: float = about("mean error of the model with the effects")
+    rival: str = about("what knows no model and is best over all horizons: nothing-moves, rate-stays or rate-fades")
+    without_model: float = about("its mean error")
+
+    @property
+    def worse(self) -> bool:
+        """Whether the model with the effects is no better than none."""
+        return self.after >= self.without_model
+
+
+@result
+class PlaybackChange(AlongFlights):
+    """Held-out flights played back with the model as given and with the effects."""
+
+    SHOWN: ClassVar = ("at_end",)
+
+    @classmethod
+    def of_pairs(cls, flights: Sequence[PlayedPair], replayed: Replay) -> Self:
+        """Sum up a replay without its windows."""
+        names = {MODEL: AFTER, STATED: BEFORE}
+        return cls(**vars(replayed.along(flights, {name: names.get(name, name) for name in replayed.models})))
+
+    @property
+    def at_end(self) -> dict[str, EndError]:
+        """Errors at the longest horizon by signal, of those that move."""
+        ends = {}
+        for signal in (name for name in self.signals if self.of(NOTHING_MOVES, name).sum > 0):
+            rival = self.rival(signal)
+            before, after, other = (float(self.of(each, signal).mae[-1]) for each in (BEFORE, AFTER, rival))
+            ends[signal] = EndError(before=before, after=after, rival=rival, without_model=other)
+        return ends
+
+
 @dataclass(frozen=True)
 class BeforeAfter:
     """Errors of the model as given and of the model with effects on held-out flights.
@@ -249,8 +290,7 @@ class BeforeAfter:
         What of the gap comes again, of training flights too; None where no flight repeats another.
     """
 
-    played: list[PlayedPair]
-    playback: Replay
+    playback: PlaybackChange
     residual: ResidualChange
     stretches: tuple[GapStretch, ...]
     whiteness: WhitenessChange
@@ -294,8 +334,7 @@ def before_after(
     known = {name: np.where(unseen.known, rows, np.nan) for name, rows in left.items()}
     white = (whiteness(rows * unseen.known, index, stride) for rows in (unseen.before, unseen.after))
     return BeforeAfter(
-        played,
-        errors_by_horizon(played, settings.horizon_s),
+        PlaybackChange.of_pairs(played, errors_by_horizon(played, settings.horizon_s)),
         ResidualChange(time=np.concatenate(centres), flight=index, **known),
         found,
         WhitenessChange.of(*white, stride * windows.hop * windows.period),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
-from cpfls_cli.gap.before_after import PlayedPair, errors_by_horizon, played_pairs
+from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
@@ -22,8 +22,8 @@ from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
+from cpfls_cli.playback.errors import STATED, AlongFlights
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import Replay
 from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
@@ -83,6 +83,7 @@ class Comparison:
     audit: Audit = part()
     residual: ResidualWindows = part(brief=False)
     states: States = part(brief=False)
+    playback: AlongFlights | None = part(None)
 
     @property
     def floors(self) -> Array:
@@ -105,14 +106,6 @@ class Comparison:
         return [CHANNELS[index] for index in self.sizes.above_noise if CHANNELS[index] in judged]
 
 
-class Compared(NamedTuple):
-    """A comparison, with the model alone played back along the flights."""
-
-    comparison: Comparison
-    played: list[PlayedPair]
-    playback: Replay
-
-
 def compare(
     recordings: Sequence[Recording],
     model: VehicleModel,
@@ -121,7 +114,7 @@ def compare(
     progress: Callable[[float, str], None] = lambda _done, _note: None,
     *,
     whole: Sequence[Recording] = (),
-) -> Compared:
+) -> Comparison:
     """Compare a model with flights.
 
     Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
@@ -167,7 +160,8 @@ def compare(
     repairing = replace(model, repairs=audited)
     played = played_pairs(recordings, repairing, repairing)
     repeated = RepeatedRuns.of(recordings)
-    comparison = Comparison(
+    replayed = errors_by_horizon(played, settings.horizon_s)
+    return Comparison(
         sizes=ChannelGaps(
             rms=rms,
             floor=np.where(known.any(axis=0), floor, np.nan),
@@ -182,8 +176,8 @@ def compare(
         audit=audited,
         residual=ResidualWindows(time=centres, flight=index, value=np.where(known, residual, np.nan)),
         states=States(name=tuple(states), value=np.column_stack(list(states.values()))),
+        playback=replayed.along(played, {name: name for name in replayed.models if name != STATED}),
     )
-    return Compared(comparison, played, errors_by_horizon(played, settings.horizon_s))
 
 
 def _activity(hypothesis: System, known: BoolArray) -> Array:

@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, intervals_drawn, named_sentences, parameters_table, titles
 from cpfls_cli.pages.gap import gap_table, sizes_drawn
-from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
+from cpfls_cli.pages.playback import against_rivals, playback_figure, trust_sentences
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.canvas import Drawn, picture_of
@@ -21,7 +21,7 @@ from cpfls_cli.words import joined
 
 def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what the gap of an extended model becomes, and about which axes it gets worse."""
-    rest: list[Block] = [_gap_table(extended, 1), *playback_text(extended.record.playback)]
+    rest: list[Block] = [_gap_table(extended, 1), *_played(extended.record)]
     yield Folded("the gap and the playback before and after", rest)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
@@ -33,9 +33,18 @@ def title(record: ExtendedRecord) -> str:
 
 def grounds(record: ExtendedRecord) -> Iterator[str]:
     """Say how far to trust an extended model, what it was extended by, and how its largest gap changes."""
-    yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+    yield from _trusted(record)
     yield from named_sentences(record.effects.named)
     yield _shrunk(record)
+
+
+def _trusted(record: ExtendedRecord) -> list[str]:
+    held = record.playback and record.playback.by_horizon
+    return trust_sentences(record.trust, held, None, record.audit.contradiction)
+
+
+def _played(record: ExtendedRecord) -> Iterator[Text]:
+    yield from map(Text, against_rivals(record.playback and record.playback.by_horizon))
 
 
 def _shrunk(record: ExtendedRecord) -> str:
@@ -46,7 +55,7 @@ def _shrunk(record: ExtendedRecord) -> str:
 def worth(record: ExtendedRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
     if trust_words(record.trust).tone != "warning":
-        yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
+        yield _trusted(record)[0]
     yield _shrunk(record)
     yield from (
         f"Not in the model, to be repaired in the signals that it is given: {fault}"
@@ -57,7 +66,7 @@ def worth(record: ExtendedRecord) -> Iterator[str]:
 def cautions(record: ExtendedRecord) -> Iterator[str]:
     """Say what speaks against an extended model, wherever it is taken."""
     if trust_words(record.trust).tone == "warning":
-        yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+        yield from _trusted(record)
     yield from map(sentence, warnings(record))
 
 
@@ -130,8 +139,10 @@ def _plotted(name: str, caption: str, drawn: Drawn, record: ExtendedRecord) -> I
 
 def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
     yield from _plotted(f"extended-gap-sizes-{index}", _SIZES, sizes_drawn(lambda r: r.gap), record)
-    yield from playback_text(record.playback)
-    drawn = record.playback and playback_figure(f"extended-prediction-error-{index}", record.playback)
+    yield from _played(record)
+    drawn = record.playback and playback_figure(
+        f"extended-prediction-error-{index}", record.playback.by_horizon, "the model with the effects"
+    )
     yield from [drawn] if drawn else []
     intervals = intervals_drawn(lambda r: r.effects.listed)
     yield from _plotted(f"extended-intervals-{index}", _INTERVALS, intervals, record)

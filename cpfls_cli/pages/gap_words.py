@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.repeated import OPEN
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages import effects, gap
+from cpfls_cli.pages.playback import ERRORS, against_rivals, draw_errors, errors_height
 from cpfls_cli.pages.repeats import NOT_SPLIT
-from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.canvas import Drawn
 from cpfls_cli.report.numbers import plain, probability
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from cpfls_cli.artifacts.replay import PlaybackGroup
 
 
 def channel_words(channel: int | str) -> str:
@@ -40,25 +35,19 @@ def measured(number: Any, factor: float = 1.0) -> list[str]:
     return effects.measured(*(factor * each for each in (number.value, number.low, number.high)))
 
 
-def playback_drawn(playback: Callable[[Any], PlaybackGroup | None]) -> Drawn:
-    """Make the figure of a playback that a result holds."""
-
-    def drawn(r: Any) -> Any:
-        held = playback(r)
-        made = None if held is None else playback_figure("playback", held)
-        return None if made is None else made.picture
-
-    def fill(r: Any, figure: Figure) -> None:
-        drawn(r).draw(figure)
-
+def playback_drawn() -> Drawn:
+    """Make the figure of the playback of a result; none of a single horizon, or of flights that show no motion."""
     return Drawn(
-        "Mean error by horizon, of the model and of what it has to beat", lambda r: drawn(r).height, fill, drawn
+        ERRORS,
+        lambda r: errors_height(r.playback),
+        lambda r, figure: draw_errors(r.playback, figure),
+        lambda r: r.playback and len(r.playback.horizon_s) > 1 and any(map(r.playback.moves, r.playback.signals)),
     )
 
 
 GAP_WORDS: Mapping[str, Any] = {
     "again_open": OPEN,
-    "beside_rivals": beside_rivals,
+    "against_rivals": against_rivals,
     "by_reason": by_reason,
     "channel_name": gap.channel_name,
     "channel_unit": gap.channel_unit,

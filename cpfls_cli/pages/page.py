@@ -23,9 +23,7 @@ from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
-from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.response import response_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
@@ -111,9 +109,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
-    _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
+    _of_stage("response"),
     _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
-    _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
+    _of_stage("replay"),
     _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
     _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
     _of_each(

@@ -29,8 +29,8 @@ from cpfls_cli.artifacts.parameters import (
     too_heavy,
     vehicle_section,
 )
+from cpfls_cli.artifacts.playback import HeldOutGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.replay import HeldOutGroup, better_to, played_row
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -38,15 +38,15 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
-from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
-from cpfls_cli.pages.replay import (
-    beside_past,
-    beside_rivals,
+from cpfls_cli.pages.playback import (
+    against_rivals,
     errors_table,
-    horizon_figure,
     lost_words,
-    playback_words,
+    playback_figure,
+    trust_sentences,
+    with_past_words,
 )
+from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.source import Source
 from cpfls_cli.pages.trust import model_words
 from cpfls_cli.playback.loop import ANY
@@ -123,7 +123,7 @@ def _as_forecast(record: VehicleRecord) -> str:
     if word is Trust.DO_NOT_USE:
         return "predicts no better than a baseline without a model"
     signals = ("body_rate", "velocity") if word is Trust.SIMULATION else ("body_rate",)
-    far = min(better_to(held, name) for name in signals)
+    far = min(map(held.by_horizon.better_to, signals))
     what = "motion" if word is Trust.SIMULATION else "body rates"
     against = f", but {_against_control(record, held)}" if word is Trust.NOT_CONTROL else ""
     return f"predicts {what} {number(far, 2)} s ahead{against}"
@@ -131,7 +131,7 @@ def _as_forecast(record: VehicleRecord) -> str:
 
 def _against_control(record: VehicleRecord, held: HeldOutGroup) -> str:
     """Say why no control may rest on its forecast."""
-    said = lost_words(held)
+    said = lost_words(held.by_horizon)
     if record.unreal:
         limit = set(record.unreal) <= set(record.on_bound)
         said.append(f"rests on {joined(map(name_of, record.unreal))} {ON_BOUND if limit else 'that no such body has'}")
@@ -176,7 +176,7 @@ def _headline(record: VehicleRecord) -> str:
 
 def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
-        yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
+        yield from trust_sentences(Trust.DO_NOT_USE, None, None, record.contradiction)
         return
     if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED, Trust.DO_NOT_USE):
         yield from slow_words(record)
@@ -210,7 +210,7 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
     if held is not None and word is Trust.NOT_CONTROL:
         yield f"Not for control: it {_against_control(record, held)}."
     elif not record.contradiction:
-        yield from playback_words(word, held, None)
+        yield from trust_sentences(word, held and held.by_horizon, held and held.region, None)
     if record.instruments is None and record.responses is not None:
         yield from response_words(record.responses)
     if record.forecast is not None:
@@ -220,8 +220,9 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
             "of the forecast."
         )
     if record.held_out is not None:
-        yield from beside_rivals(record.held_out)
-        yield from () if record.history is None else beside_past(record.held_out, record.history.past)
+        own = record.held_out.by_horizon
+        yield from against_rivals(own)
+        yield from () if record.history is None else with_past_words(own, record.history.past)
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     alone = "the constants" if _guessed(record) else "the stated vehicle"
     yield (
@@ -251,7 +252,8 @@ def details(vehicle: Source[VehicleRecord], index: int = 1) -> Iterator[Block]:
 def _forecast_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
     yield from map(Text, _grounds_of_forecast(record))
     if record.held_out is not None:
-        yield errors_table(record.held_out, index)
+        held = record.held_out
+        yield from errors_table(f"replay-{index}", held.by_horizon, "the vehicle found", held.windows, held.flown)
 
 
 def _number_blocks(vehicle: Source[VehicleRecord], index: int) -> Iterator[Block]:
@@ -276,7 +278,7 @@ def worth(record: VehicleRecord) -> Iterator[str]:
     if record.forecast is not None:
         yield "These are its constants; its forecast, loop included, stays in the file, and the errors are those of it."
     elif held is not None:
-        last = {name: group.mae[played_row(held), -1] for name, group in held.errors.items() if group is not None}
+        last = {signal: own.mae[-1] for signal, own in held.by_horizon.model.signals.items()}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         after = f"{held.horizon_s[-1]:.3g} s"
         yield f"On held-out flights it ends {ends} off the measured motion after {after}, on average."
@@ -598,7 +600,8 @@ def found_vehicle_blocks(found: Source[VehicleRecord], index: int) -> Iterator[B
     )
     yield from details(found, index)
     if record.held_out is not None:
-        yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
+        drawn = playback_figure(f"vehicle-errors-{index}", record.held_out.by_horizon, "the vehicle found")
+        yield from [drawn] if drawn else []
     yield _structures_table(record, index)
     yield _structures_figure(record, index)
     yield _shares_table(record, index)

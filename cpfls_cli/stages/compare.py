@@ -191,7 +191,7 @@ FIGURES = {
         _draw_heat_map,
         lambda r: r.followed_channels and r.heat_map is not None,
     ),
-    "playback": playback_drawn(lambda r: r.replayed),
+    "playback": playback_drawn(),
 }
 
 

@@ -15,7 +15,6 @@ from cpfls_cli.arguments import DisagreementArgument, HeldOutOption
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.job import Job, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs, learned_in
 from cpfls_cli.artifacts.spec import InputFile
@@ -27,7 +26,7 @@ from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.before_after import FreeRuns, before_after
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
@@ -46,8 +45,8 @@ from cpfls_cli.pages.gap import (
     sizes_drawn,
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
+from cpfls_cli.pages.playback import SIGNALS, WHO
 from cpfls_cli.pages.repeats import again_drawn
-from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
@@ -170,18 +169,18 @@ def _wrong(r: Diagnosis, source: Source) -> _Wrong:
     return _Wrong(len(found), [f"{joined(words)} against {place}" for place, words in by_place.items()])
 
 
-def _farther_off(playback: PlaybackChangeGroup) -> list[str]:
+def _farther_off(playback: PlaybackChange) -> list[str]:
     """List the signals that the model with the effects plays back visibly worse than the model as given."""
     return [
-        signal_scale(signal)[0]
+        SIGNALS[signal][0]
         for signal, end in playback.at_end.items()
         if less(end.before + _VISIBLE * end.without_model, end.after)
     ]
 
 
-def _unplayed(playback: PlaybackChangeGroup) -> list[str]:
+def _unplayed(playback: PlaybackChange) -> list[str]:
     """List the signals that cannot be played back."""
-    return [signal_scale(name)[0] for name, found in playback.errors.items() if found is None]
+    return [words for name, (words, _, _) in SIGNALS.items() if name not in playback.signals]
 
 
 def _finite(value: Any) -> bool:
@@ -203,7 +202,7 @@ FIGURES = {
         lambda r: r.picture is not None,
     ),
     "gap-sizes": sizes_drawn(lambda r: r.gap),
-    "playback": playback_drawn(lambda r: r.replayed),
+    "playback": playback_drawn(),
     "whiteness": Drawn(
         "Autocorrelation of the gap before and after, by channel",
         lambda r: 0.9 + 1.6 * _rows(r),
@@ -221,9 +220,9 @@ WORDS = {
     "hidden_gaps": hidden_gaps,
     "leaving": _leaving,
     "of_guesses": is_of_guesses,
-    "prediction_words": prediction_words,
-    "signal_scale": signal_scale,
+    "signals": SIGNALS,
     "unplayed": _unplayed,
+    "who": WHO,
     "wrong_numbers": _wrong,
 }
 
