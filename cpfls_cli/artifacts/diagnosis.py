@@ -81,7 +81,7 @@ class Diagnosis(Conclusion):
         warnings: Sequence[str],
         base: VehicleModel,
     ) -> Diagnosis:
-        """Put a diagnosis together; `split` says why these flights trained, `base` is the model that misses something."""
+        """Put it together: `split` says why these flights trained, `base` is the model that misses something."""
         air = diagnosed.air
         return cls(
             **vars(diagnosed.diagnosis),
@@ -156,7 +156,7 @@ class Diagnosis(Conclusion):
     @property
     def disturbance(self) -> dict[str, Any] | None:
         """Gusts, for machines."""
-        return self.air and self.air.summary(self.inertia, self.base.vehicle.mass_kg)
+        return None if self.air is None else self.air.summary(self.inertia, self.base.vehicle.mass_kg)
 
     @property
     def inertia(self) -> Array:

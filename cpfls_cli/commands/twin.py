@@ -17,7 +17,6 @@ from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.twin import GainsGroup, TwinRecord, WindowsGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -58,6 +57,7 @@ from cpfls_cli.simulation.twin import (
     root_mean_square,
     windows,
 )
+from cpfls_cli.stages.compare import to_gap
 
 CPFLS = "cpfls"
 

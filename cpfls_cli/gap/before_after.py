@@ -332,12 +332,12 @@ def before_after(
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
     left = {"before": unseen.before, "parameters": unseen.parameters, "after": unseen.after}
     known = {name: np.where(unseen.known, rows, np.nan) for name, rows in left.items()}
-    white = (whiteness(rows * unseen.known, index, stride) for rows in (unseen.before, unseen.after))
+    white = [whiteness(rows * unseen.known, index, stride) for rows in (unseen.before, unseen.after)]
     return BeforeAfter(
         PlaybackChange.of_pairs(played, errors_by_horizon(played, settings.horizon_s)),
         ResidualChange(time=np.concatenate(centres), flight=index, **known),
         found,
-        WhitenessChange.of(*white, stride * windows.hop * windows.period),
+        WhitenessChange.of(white[0], white[1], stride * windows.hop * windows.period),
         _picture(held, found[0], windows, model, settings),
         worst_stretch(played, held, settings.horizon_s, settings.block_s),
         *_again(training, held, model, settings),

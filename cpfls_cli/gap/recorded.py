@@ -112,4 +112,3 @@ def in_roles(flights: Mapping[str, RecordedFlight], *roles: str) -> Sequence[Rec
 def names_of(flights: Mapping[str, RecordedFlight], *roles: str) -> list[str]:
     """List the names of the flights in these roles; of all if none is named."""
     return [each.name for each in in_roles(flights, *roles)]
-

@@ -199,16 +199,16 @@ def intervals_drawn(effects: Callable[[Any], Sequence[NamedEffect]]) -> Drawn:
 
 def _draw_intervals(shown: Sequence[tuple[NamedEffect, Estimate]], figure: Figure) -> None:
     axes = figure.subplots()
-    for row, (_, number) in enumerate(shown):
-        low, high = number.plausible
+    for row, (_, own) in enumerate(shown):
+        low, high = own.plausible
         with np.errstate(divide="ignore", invalid="ignore"):
-            placed = (np.array([number.value, number.low, number.high]) - low) / (high - low)
+            placed = (np.array([own.value, own.low, own.high]) - low) / (high - low)
         _draw_row(axes, row, placed)
-    axes.set_yticks(range(len(shown)), [f"{effect.name}  {number.name}" for effect, number in shown])
+    axes.set_yticks(range(len(shown)), [f"{effect.name}  {own.name}" for effect, own in shown])
     right = axes.twinx()
     axes.set_ylim(-0.6, len(shown) - 0.4)
     right.set_ylim(axes.get_ylim())
-    right.set_yticks(range(len(shown)), [f"{possible(number)} {unit_words(number.unit)}" for _, number in shown])
+    right.set_yticks(range(len(shown)), [f"{possible(own)} {unit_words(own.unit)}" for _, own in shown])
     right.tick_params(length=0)
     right.grid(visible=False)
     axes.set_xlim(-0.03, 1.03)

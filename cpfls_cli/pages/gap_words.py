@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
@@ -21,8 +21,8 @@ def channel_words(channel: int | str) -> str:
     return gap.channel_words(channel if isinstance(channel, str) else CHANNELS[channel])
 
 
-def by_reason(given: Mapping[str, str] | Iterable[Any]) -> dict[str, list[str]]:
-    """Gather names by the reason that they have in common."""
+def by_reason(given: Any) -> dict[str, list[str]]:
+    """Gather names by the reason that they have in common: of a mapping from names, or of rows with both."""
     pairs = given.items() if isinstance(given, Mapping) else ((each.name, each.reason) for each in given)
     reasons: dict[str, list[str]] = {}
     for name, reason in pairs:

@@ -11,8 +11,6 @@ from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
-from cpfls_cli.pages.diagnosis import diagnosis_blocks
-from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.flight import flight_blocks, vehicle_section
@@ -24,7 +22,6 @@ from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
@@ -82,13 +79,11 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     comparison_section,
     models_section,
     _of_each("model", "What the model is", lambda given: given.of_kind(ModelRecord), model_blocks, among=True),
-    _of_each("diagnosis", "Before and after", attrgetter("diagnoses"), diagnosis_blocks),
+    _of_stage("diagnose"),
     _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
     _of_each("found-vehicle", "The vehicle found in flights", attrgetter("vehicles"), found_vehicle_blocks),
-    _of_each("disagreement", "Where they disagree", attrgetter("disagreements"), disagreement_blocks),
-    sensors_section,
-    unseen_section,
+    _of_stage("compare"),
     vehicle_section,
     _of_each("path", "Training path", attrgetter("trajectories"), path_blocks),
     _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),

@@ -48,9 +48,10 @@ def again_drawn(groups: Callable[[Any], tuple[ComesAgain | None, ComesAgain | No
     def height(r: Any) -> float:
         return 1.0 + 1.9 * -(-len(held(r)[0].known) // _COLUMNS)
 
-    return Drawn(
-        "What comes again of torque and force, by channel and band", height, lambda r, figure: _draw(held(r), figure), held
-    )
+    def draw(r: Any, figure: Figure) -> None:
+        _draw(held(r), figure)
+
+    return Drawn("What comes again of torque and force, by channel and band", height, draw, held)
 
 
 def _draw(groups: Sequence[ComesAgain], figure: Figure) -> None:

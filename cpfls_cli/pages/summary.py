@@ -8,7 +8,6 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.changed import changed_box
-from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
@@ -27,7 +26,11 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = list(_cautions(sources))
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
-    blocks += gap_blocks(sources)
+    blocks += [
+        trust_box(extended)
+        for extended in sources.extensions
+        if sources.by_hash(extended.made_from("diagnosis")) is None
+    ]
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [twin_box(twin.record) for twin in sources.twins]
     blocks += [gains_box(gains.record) for gains in sources.gains]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def _mark_stretches(axes: Axes, r: Disagreement, channel: str, offset: Array) ->
         first = each.start_s + offset[each.flight]
         length = each.end_s - each.start_s
         axes.axvspan(first, first + length, color=_SHADE, zorder=0)
-        place = {"ha": "center", "va": "top", "fontsize": 8.5, "zorder": 5, "bbox": _LABEL}
+        place: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 8.5, "zorder": 5, "bbox": _LABEL}
         axes.text(first + length / 2, 0.97, str(rank), transform=axes.get_xaxis_transform(), **place)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import product
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -151,22 +151,15 @@ def _draw_whiteness(r: Diagnosis, figure: Figure) -> None:
     legend_over(figure, panels[0])
 
 
-class _Wrong(NamedTuple):
-    """Wrong numbers of the vehicle: how many there are, and how far they are off, against what."""
-
-    count: int
-    words: list[str]
-
-
-def _wrong(r: Diagnosis, source: Source) -> _Wrong:
-    """Say of wrong numbers how far they are off, and from what: from what was taken where the config has null."""
+def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
+    """Count wrong numbers, and say how far they are off, and from what: what was taken where the config has null."""
     guessed = any(map(is_of_guesses, source.header.cautions))
     taken = "the guess" if guessed else "the vehicle that was found"
     found, by_place = wrong_numbers(r.effects), dict[str, list[str]]()
     for name, words in found.items():
         quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
         by_place.setdefault(taken if quantity in source.vehicle.unknown else "the config", []).append(words)
-    return _Wrong(len(found), [f"{joined(words)} against {place}" for place, words in by_place.items()])
+    return len(found), [f"{joined(words)} against {place}" for place, words in by_place.items()]
 
 
 def _farther_off(playback: PlaybackChange) -> list[str]:

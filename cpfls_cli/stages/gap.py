@@ -131,8 +131,8 @@ def _flights(
 
 
 def _next(run: Run, found: Gap, flights: Sequence[Path], model: Path | None) -> Command:
-    folder = run.output
-    to_replay: Command = ("cpfls", "replay", run.config, folder / "extended.h5", *flights, "-o", run.beside("replay.h5"))
+    folder, output = run.output, run.beside("replay.h5")
+    to_replay: Command = ("cpfls", "replay", run.config, folder / "extended.h5", *flights, "-o", output)
     given = () if model is None else ("--model", model)
     to_answer = go_on(run, "response", *flights, *given, output=run.beside("response.h5"))
     named = to_answer if found.extended is None else to_replay

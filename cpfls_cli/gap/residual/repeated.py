@@ -179,7 +179,8 @@ class ComesAgain:
     @property
     def largest(self) -> tuple[float, int, Part] | None:
         """Largest share of a gap that comes again in a part, with its channel; None where none surely does."""
-        found = [(self.share_in(channel, part), channel, part) for channel in self.repeating for part in self.parts(channel)]
+        pairs = [(channel, part) for channel in self.repeating for part in self.parts(channel)]
+        found = [(self.share_in(*pair), *pair) for pair in pairs]
         return max(found, key=lambda each: each[0], default=None)
 
     def explained_in(self, channel: int, part: Part) -> tuple[float, float] | None:
@@ -193,7 +194,7 @@ class ComesAgain:
         return float(np.clip(left / came, 0.0, 1.0))
 
     def left_of(self, before: ComesAgain) -> dict[int, float]:
-        """Give by channel the largest share that is left of what came again before effects; infinite where none came."""
+        """Give by channel the largest share that is left of what came again before; infinite where none came."""
         shares = {}
         for channel in self.repeating:
             bands = [part.bands for part in self.parts(channel)]
