@@ -62,9 +62,9 @@ class Diagnosis(Conclusion):
     run: FreeRuns | None = part(None, brief=False)
     audit: Audit = part()
     split: str = about("which flights were for training and which were held out, and why")
-    warnings: tuple[str, ...] = about("what to know about the flights", "warning")
+    warnings: tuple[str, ...] = about("what to know about the flights", "flight_note")
     seen: tuple[str, ...] = about(
-        "flights that are given twice, and flights that judge a model that learned from them", "flight", default=()
+        "flights that are given twice, and flights that judge a model that learned from them", "seen", default=()
     )
     base: VehicleModel = part(brief=False)
     recorded: Mapping[str, RecordedFlight] = part(brief=False)

@@ -21,7 +21,7 @@ class Disagreement(Comparison):
     FORMAT: ClassVar = "cpfls/disagreement"
     SHOWN: ClassVar = ("flights", "gap", "stretches")
 
-    warnings: tuple[str, ...] = about("what to know about the flights", "warning")
+    warnings: tuple[str, ...] = about("what to know about the flights", "flight_note")
     base: VehicleModel = part(brief=False)
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
     learned: LearnedGroup | None = part(None, brief=False)

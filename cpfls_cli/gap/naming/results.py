@@ -225,7 +225,7 @@ class Conclusion:
 
     verdict: str = about("NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, CONTRADICTED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
     contradictions: tuple[str, ...] = about(
-        "contradictions within the log or with its vehicle, including numbers that no vehicle has", "contradiction"
+        "contradictions within the log or with its vehicle, including numbers that no vehicle has", "contradicted"
     )
     share: float = about("part of the held-out gap above the floor that the effects take off: the least by kind")
     share_by_kind: ByKind = part()
@@ -239,7 +239,7 @@ class Conclusion:
     vehicle_numbers: tuple[Estimate, ...] = part(brief=False)
     gap: GapChange = part(brief=False)
     torque_alone: tuple[TorqueAlone, ...] = part()
-    notes: tuple[str, ...] = about("what a reader should know", "note")
+    notes: tuple[str, ...] = about("what a reader should know", "remark")
 
     @property
     def parameters(self) -> dict[str, Estimate]:
