@@ -94,10 +94,10 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     given = with_seen(given, model, learned, known_by(trained, inputs))
     if run.dry_run:
         return None
-    study, warnings = run.study, given.warnings
+    study = run.study
     disagreement = compared(study, given, base, progress_of(run.progress, 0.0, 0.15), split.whole)
     disagreement = learned_from(run, disagreement, learned, "disagreement")
-    found = of_diagnosis.diagnosed(study, split, warnings, base, progress_of(run.progress, 0.15, 0.85))
+    found = of_diagnosis.diagnosed(study, split, disagreement.warnings, base, progress_of(run.progress, 0.15, 0.85))
     trained_on = {role: inputs[role] for role in trained}
     found = of_diagnosis.learned_from(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
