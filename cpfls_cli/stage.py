@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -75,6 +75,28 @@ class Filled:
     texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     kept: str = ""
     grows: bool = False
+
+
+@dataclass
+class Parts:
+    """A result in parts along its axis ``STREAMED``, of which no more than one is in memory.
+
+    What does not lie along it is that of the last part, which stands for the whole in what is said.
+
+    Attributes
+    ----------
+    rows : int
+        In all parts together.
+    """
+
+    parts: Iterator[Any]
+    rows: int
+    last: Any = None
+
+    def __iter__(self) -> Iterator[Any]:
+        for part in self.parts:
+            self.last = part
+            yield part
 
 
 @dataclass
@@ -167,8 +189,8 @@ class Stage:
     Attributes
     ----------
     function : callable
-        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder, results by
-        name, with a page each; or None in a dry run.
+        Takes a `Run` and what its command line says. It gives a result, or its `Parts`; or, of a stage that fills a
+        folder, results by name, with a page each; or None in a dry run.
     kind : type
         Class of the result.
     title : str
@@ -262,6 +284,7 @@ class Stage:
         results = dict(found) if self.folder else {"": found}
         if run.writes:
             self._write(run, run.output, results)
+        results = {name: each.last if isinstance(each, Parts) else each for name, each in results.items()}
         if run.text:
             write_text(*run.text)
         if self.fills and run.writes:
@@ -372,7 +395,11 @@ class Stage:
             self._fill(run, output, results[""], self.fills)
             return
         if not self.folder:
-            store.write(output, results[""], run.origin(self.name))
+            given, origin = results[""], run.origin(self.name)
+            if isinstance(given, Parts):
+                store.write_parts(output, given, given.rows, origin)
+            else:
+                store.write(output, given, origin)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]

@@ -16,7 +16,6 @@ _RECORDS = {
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
-    ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
-from cpfls_cli.artifacts.playback import HeldOutGroup
+from cpfls_cli.artifacts.playback import HeldOutGroup, by_horizon
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.errors import FADING
@@ -463,7 +463,7 @@ class VehicleRecord(ModelRecord):
 
     @property
     def _by_playback(self) -> Trust:
-        return capped(trust_by_playback(self.held_out and self.held_out.by_horizon), self.contradiction or ())
+        return capped(trust_by_playback(by_horizon(self.held_out)), self.contradiction or ())
 
     @property
     def forecast_verdict(self) -> Trust:

@@ -20,7 +20,6 @@ from cpfls_cli.arguments import (
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightArgument,
     FlightsArgument,
     Flown,
     FlownArgument,
@@ -351,14 +350,6 @@ def vehicle(
         return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)
-
-
-@_command()
-def predict(
-    config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
-) -> None:
-    """Predict torque, inertia and Coriolis matrices of a model along a flight."""
-    _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
 
 
 @_command()

@@ -26,7 +26,6 @@ _PAGES = {
     "cpfls/trajectory": "trajectory",
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/prediction": "prediction",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
     "cpfls/flight-numbers": "flight_numbers",

@@ -12,7 +12,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec
 from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
@@ -40,6 +39,7 @@ from cpfls_cli.result import described_fields
 from cpfls_cli.simulation.twin import FRAMES, UNITS
 from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
+from cpfls_cli.validation.prediction import AlongFlight
 
 _ASKED = "setpoint_"
 _FRAMES = {"body": BODY, "angles": EULER, "world": WORLD}
@@ -138,9 +138,8 @@ def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
     )
 
 
-def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
-    begins = np.nan if record.clock is None else record.clock.begins
-    time = _log_time(record.time, begins)
+def _of_prediction(title: str, record: AlongFlight, study: Study) -> View:
+    time = _log_time(record.time, record.begins_s)
     force = None if record.force is None or record.measured_force is None else record.measured_force - record.force
     held: dict[str, dict[str, Array | None]] = {
         "torque": {
@@ -153,17 +152,20 @@ def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
         "body_torque": {MODEL: record.body_torque},
         "force": {MEASURED: record.measured_force, MODEL: record.force, DIFFERENCE: force},
         "attitude": {MEASURED: record.attitude},
-        "outside": {MODEL: record.outside.astype(float)},
+        "extrapolates": {MODEL: record.extrapolates.astype(float)},
     }
+    abouts = {own.name: own.about for own in described_fields(AlongFlight)}
     tracks = []
     for name, values in held.items():
         known = {what: own for what, own in values.items() if own is not None}
-        spec = record.spec().dataset(name)
-        if known and spec is not None:
+        own = abouts[name]
+        if known and own is not None:
+            spec = DatasetSpec(name, own.axes, own.unit, own.frame, own.text)
             axes = _axes(spec, next(iter(known.values())))
-            about = {"unit": spec.units, "frame": spec.frame, "description": spec.description}
-            tracks.append(Track(name=name, time=time, values=known, axes=axes, **about))
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.clock is not None)
+            words = {"unit": own.unit, "frame": own.frame, "description": own.text}
+            name = "outside" if name == "extrapolates" else name
+            tracks.append(Track(name=name, time=time, values=known, axes=axes, **words))
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=bool(np.isfinite(record.begins_s)))
 
 
 def _of_replay(title: str, given: Playback, study: Study) -> View:
@@ -359,7 +361,7 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
 
 _KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
-    PredictionRecord: _of_prediction,
+    AlongFlight: _of_prediction,
     Playback: _of_replay,
     Disagreement: _of_disagreement,
     Diagnosis: _of_diagnosis,

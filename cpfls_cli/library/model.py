@@ -127,9 +127,7 @@ class Model:
         Artifact
             Of the format ``cpfls/prediction``, in memory.
         """
-        from cpfls_cli.commands import predict
-
-        return self._made(lambda job: predict.run(job, self._file("predict"), _path_of(flight)))
+        return self._of_stage("predict", model=self._file("predict"), flight=_path_of(flight))
 
     def replay(
         self,

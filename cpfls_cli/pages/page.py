@@ -19,7 +19,6 @@ from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
-from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
@@ -102,7 +101,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
-    _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
+    _of_stage("predict"),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
     _of_stage("response"),
     _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),

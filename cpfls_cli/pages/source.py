@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.flight import FlightRecord
     from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
-    from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
+    from cpfls_cli.validation.prediction import AlongFlight
 
 R = TypeVar("R", default=Any)
 
@@ -66,7 +66,7 @@ class Sources:
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
     sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
-    predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
+    predictions: ClassVar[_OfFormat[AlongFlight]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
     twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
@@ -146,4 +146,4 @@ def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:
         return
     source: Source[Any] = Source(path.name, "", record, resolved(study), study.vehicle, 0)
     answer = import_module(f"cpfls_cli.pages.{page}").answer
-    yield from answer(source.record.findings if record.FORMAT.name == "cpfls/prediction" else source)
+    yield from answer(source)

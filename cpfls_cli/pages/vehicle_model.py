@@ -29,7 +29,7 @@ from cpfls_cli.artifacts.parameters import (
     too_heavy,
     vehicle_section,
 )
-from cpfls_cli.artifacts.playback import HeldOutGroup
+from cpfls_cli.artifacts.playback import HeldOutGroup, by_horizon
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
@@ -210,7 +210,7 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
     if held is not None and word is Trust.NOT_CONTROL:
         yield f"Not for control: it {_against_control(record, held)}."
     elif not record.contradiction:
-        yield from trust_sentences(word, held and held.by_horizon, held and held.region, None)
+        yield from trust_sentences(word, by_horizon(held), None if held is None else held.region, None)
     if record.instruments is None and record.responses is not None:
         yield from response_words(record.responses)
     if record.forecast is not None:

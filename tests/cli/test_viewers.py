@@ -134,7 +134,7 @@ def test_a_replay_shows_measured_model_and_difference_of_each_flight(cpfls, logg
     exported(cpfls, logged / "replay.h5", tmp_path / f"replay.{form}")
     with h5py.File(logged / "replay.h5") as file:
         first, last = (1e-6 * float(TIME_US[index]) for index in (200, 600))
-        np.testing.assert_allclose(file["flight/begins"], [first, first], atol=1e-6)
+        np.testing.assert_allclose(file["flights/begins_s"], [first, first], atol=1e-6)
         period = float(file["horizon_s"][0])
     if form == "csv":
         columns = columns_of(tmp_path / "replay.csv")
@@ -188,7 +188,7 @@ def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path)
 
 def test_a_model_that_is_called_as_the_vehicle_is_told_from_it():
     record = replace(twin_record(), vehicle=("vehicle", "vehicle.h5"))
-    view = view_of(Path("twin.h5"), record)
+    view = view_of(Path("twin.h5"), record, record.origin.config)
     (roll,) = (track for track in view.tracks if track.name == "roll")
     assert list(roll.values) == ["measured", "setpoint", "vehicle", "vehicle_model", "difference"]
     assert [pose.child for pose in view.poses] == ["body", "vehicle", "vehicle_model"]

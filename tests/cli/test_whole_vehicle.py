@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.commands import verify_export
@@ -18,6 +18,7 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import record_of, remainder
@@ -204,7 +205,7 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
 def predicted(cpfls, config, model, flown, output):
     result = cpfls("predict", config, model, flown, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), read_record(output, PredictionRecord)
+    return json.loads(result.stdout), store.read(output, AlongFlight)[0]
 
 
 def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):

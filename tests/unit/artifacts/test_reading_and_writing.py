@@ -10,9 +10,9 @@ import pytest
 from cpfls_cli.artifacts.selection import SelectionRecord
 
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, read_header, write_artifact
+from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.files import text_sha256
@@ -140,8 +140,8 @@ def test_files_get_the_permissions_of_any_new_file(tmp_path):
 
 def test_wrong_format_names_both(tmp_path):
     write_artifact(tmp_path / "s.h5", selection())
-    with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/trajectory .* or cpfls/prediction"):
-        read_artifact(tmp_path / "s.h5", TrajectoryRecord.spec(), PredictionRecord.spec())
+    with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/trajectory .* or cpfls/sweep"):
+        read_artifact(tmp_path / "s.h5", TrajectoryRecord.spec(), SweepRecord.spec())
 
 
 def test_pipe_is_not_waited_for(tmp_path):

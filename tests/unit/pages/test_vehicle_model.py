@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
-from cpfls_cli.artifacts.replay import HeldOutGroup, SignalErrorGroup
+from cpfls_cli.artifacts.playback import HeldOutGroup, SignalErrorGroup
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
