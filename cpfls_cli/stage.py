@@ -23,6 +23,7 @@ from cpfls_cli.artifacts.output import (
     filled_folder,
     refuse_inputs,
     refuse_own,
+    write_files,
     write_text,
 )
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
@@ -123,6 +124,10 @@ class Run(Job):
         Behind the answer.
     text : tuple of (Path, str) or None
         A file of text that is written behind the result.
+    texts : dict of Path to str
+        Other files that are written with the result.
+    said : list of Text
+        Of this run alone: its file says none of it again.
     """
 
     writes: bool = True
@@ -134,6 +139,8 @@ class Run(Job):
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
     text: tuple[Path, str] | None = None
+    texts: dict[Path, str] = field(default_factory=dict)
+    said: list[Text] = field(default_factory=list)
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -151,6 +158,14 @@ class Run(Job):
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
+
+    def say(self, text: str) -> None:
+        """Add to the answer what only this run has to say."""
+        self.said.append(Text(text))
+
+    def note(self, text: str) -> None:
+        """Add a note to the answer of this run."""
+        self.said.append(Text(text, "warning"))
 
     def cautions_of(self, *names: str) -> tuple[str, ...]:
         """List what speaks against results of these names, and against all."""
@@ -207,6 +222,8 @@ class Stage:
         Whether it takes a config.
     several : bool
         Whether options that may be repeated take all values that follow.
+    overrides : callable or None
+        Gives overrides of the config that its options stand for.
     """
 
     function: Callable[..., Any]
@@ -218,6 +235,7 @@ class Stage:
     fills: Filled | None
     study: bool
     several: bool
+    overrides: Callable[..., list[str]] | None
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -282,16 +300,19 @@ class Stage:
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
         results = dict(found) if self.folder else {"": found}
-        if run.writes:
+        streamed = any(isinstance(each, Parts) for each in results.values())
+        if run.writes and streamed:
             self._write(run, run.output, results)
         results = {name: each.last if isinstance(each, Parts) else each for name, each in results.items()}
-        if run.text:
-            write_text(*run.text)
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+        if run.writes and not streamed:
+            self._write(run, run.output, results)
+        if run.text:
+            write_text(*run.text)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -299,6 +320,7 @@ class Stage:
             (
                 *(block for text in texts for block in page.blocks(text)),
                 *([Text(run.last_words)] if run.last_words else []),
+                *run.said,
                 *caution_texts(cautions),
             ),
             run.exit_code,
@@ -400,6 +422,7 @@ class Stage:
                 store.write_parts(output, given, given.rows, origin)
             else:
                 store.write(output, given, origin)
+            write_files(run.texts)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
@@ -439,9 +462,12 @@ def stage(
     fills: Filled | None = None,
     study: bool = False,
     several: bool = False,
+    overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
+    return lambda function: Stage(
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides
+    )
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

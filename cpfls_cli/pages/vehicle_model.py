@@ -35,7 +35,7 @@ from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.playback import (
