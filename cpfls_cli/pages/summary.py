@@ -36,7 +36,10 @@ def summary_section(sources: Sources) -> Section:
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
-    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
+    # A comparison that was diagnosed has its answer there.
+    answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
+    told = [source for source in sources.all if source.stage and source.sha256 not in answered]
+    blocks += [box for source in told for box in loaded(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
