@@ -244,7 +244,7 @@ class Stage:
     @property
     def name(self) -> str:
         """Of the command: that of its module."""
-        return self.function.__module__.rpartition(".")[2].replace("_", "-")
+        return self.function.__module__.rpartition(".")[2].strip("_").replace("_", "-")
 
     def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
         """Word a result, or all results by name where the ending says so.

@@ -22,7 +22,6 @@ from cpfls_cli.arguments import (
     FileArgument,
     FlightsArgument,
     FlownArgument,
-    FolderOption,
     HeldOutOption,
     LogArgument,
     LogsArgument,
@@ -32,7 +31,6 @@ from cpfls_cli.arguments import (
     SchedulerOption,
     SweepTimeLimitOption,
     TimeLimitOption,
-    TimeOrder,
     TrainingArgument,
     ValidateOption,
     WorkersOption,
@@ -44,7 +42,6 @@ from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
-    SeveralAfterOption,
     refuse_overrides,
     sheet,
     with_common,
@@ -52,7 +49,6 @@ from cpfls_cli.cli.options import (
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
 
@@ -393,95 +389,6 @@ def extend(
 ) -> None:
     """Put the named effects into the model, and show that the gap shrinks."""
     _run("extend", config, output, common, lambda command, job: command.run(job, diagnosis, model))
-
-
-OtherVehicleOption = Annotated[
-    bool,
-    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
-]
-
-
-@_command(kind=SeveralAfterOption)
-def changed(
-    config: ConfigArgument,
-    today: Annotated[
-        list[Path],
-        typer.Argument(metavar="TODAY...", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
-    ],
-    output: FolderOption,
-    since: Annotated[
-        list[Path],
-        typer.Option(
-            "--reference",
-            "--since",
-            metavar="FLIGHT...",
-            help="Flights or logs of the same vehicle from before, three or more, one after another.",
-            show_default=False,
-        ),
-    ],
-    fail_on_change: Annotated[
-        bool,
-        typer.Option(
-            "--fail-on-change",
-            help="End with exit code 1 where something has changed, for scripts; with two reference flights 0 "
-            "says only that nothing is beyond what is usual of vehicles. Where that is unknown the exit code is 3, "
-            "with or without this.",
-        ),
-    ] = False,
-    anyway: OtherVehicleOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Say what has changed about a vehicle since reference flights: a rotor, its weight, its battery, or nothing."""
-    _run(
-        "changed",
-        config,
-        output,
-        common,
-        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change, anyway=anyway),
-    )
-
-
-@_command()
-def trend(
-    config: ConfigArgument,
-    flights: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FLIGHT...", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill, or to add to.", show_default=False),
-    ],
-    reference: Annotated[
-        int | None,
-        typer.Option(
-            "--reference",
-            metavar="N",
-            min=1,
-            help="The first N flights are those of the unchanged vehicle; default: half of them, as far as they do not "
-            "change, and three at least.",
-        ),
-    ] = None,
-    order: Annotated[
-        TimeOrder | None,
-        typer.Option("--order", help="What orders flights; default: their dates where all logs have one, or names."),
-    ] = None,
-    anyway: OtherVehicleOption = False,
-    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that read logs.")] = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Say since which of many flights what is changed about a vehicle; a second call reads only new ones."""
-
-    def call(command: Any, job: Job) -> Any:
-        chosen = command.Options(reference, order and order.value, anyway, workers, scheduler)
-        return command.run(job, flights, chosen)
-
-    _run("trend", config, output, common, call)
 
 
 @_command()

@@ -27,9 +27,6 @@ _PAGES = {
     "cpfls/sweep": "sweep",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
-    "cpfls/flight-numbers": "flight_numbers",
-    "cpfls/changed": "changed",
-    "cpfls/trend": "trend",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 

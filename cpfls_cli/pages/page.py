@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.flight import flight_blocks, vehicle_section
-from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
@@ -24,7 +21,6 @@ from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
@@ -105,14 +101,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("response"),
     _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
     _of_stage("replay"),
-    _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
-    _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
-    _of_each(
-        "flight-numbers",
-        "What each flight tells",
-        lambda given: given.of_kind(FlightNumbersRecord),
-        flight_numbers_blocks,
-    ),
+    _of_stage("trend"),
+    _of_stage("changed"),
+    _of_stage("_flight_numbers"),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )

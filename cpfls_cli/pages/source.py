@@ -23,7 +23,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.changed import ChangedRecord
     from cpfls_cli.artifacts.diagnosis import Diagnosis
     from cpfls_cli.artifacts.disagreement import Disagreement
     from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -31,9 +30,9 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
@@ -74,8 +73,8 @@ class Sources:
     disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
-    trends: ClassVar[_OfFormat[TrendRecord]] = _OfFormat("cpfls/trend")
-    changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
+    trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
+    changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property

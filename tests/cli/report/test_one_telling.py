@@ -10,22 +10,19 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, gains, model, trend, twin
+from cpfls_cli.pages import diagnosis, disagreement, gains, model, twin
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.autopilots import gains_record
-from tests.builders.changed_flights import write_flights
-from tests.builders.drawn_numbers import trend_record
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 from tests.builders.twins import twin_record
 
 FROM_COMMANDS = ("trajectory", "flight", "model", "prediction", "replay", "response", "sweep")
-FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "trend", "twin", "vehicle", "gains")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "twin", "vehicle", "gains")
 # What a plan asks of the vehicle between its samples is not in its artifact.
 ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
@@ -62,27 +59,13 @@ def source_of(record, label, sha256="f" * 64):
 
 
 @pytest.fixture(scope="session")
-def of_flights(cpfls, tmp_path_factory):
-    """What is kept of one flight, and what has changed between two and one with a weak rotor."""
-    folder = write_flights(tmp_path_factory.mktemp("flights"))
-    before = [folder / f"before{number}.csv" for number in (1, 2)]
-    result = cpfls(
-        "changed", folder / "study.yaml", folder / "weak1.csv", "--since", *before, "-o", folder / "out", "--json"
-    )
-    assert result.exit_code == 0, result.stderr
-    (kept,) = (folder / "out" / "flights").glob("weak1*.h5")
-    paths = {"flight-numbers": kept, "changed": folder / "out" / "changed.h5"}
-    return {name: source_of(read_any(path), path.name, file_sha256(path)) for name, path in paths.items()}
-
-
-@pytest.fixture(scope="session")
 def tuned():
     """Gains, once for all."""
     return source_of(gains_record(), "gains.h5")
 
 
 @pytest.fixture
-def answered(told, of_flights, tuned):
+def answered(told, tuned):
     """A record by its format, and the blocks that its command says."""
 
     def of(name):
@@ -94,14 +77,8 @@ def answered(told, of_flights, tuned):
         if name == "twin":
             source = source_of(twin_record(), f"{name}.h5")
             return source, tuple(twin.answer(source))
-        if name == "trend":
-            source = source_of(trend_record(), f"{name}.h5")
-            return source, tuple(trend.answer(source))
         if name == "gains":
             return tuned, tuple(gains.answer(tuned))
-        if name in of_flights:
-            page = {"flight-numbers": flight_numbers, "changed": changed}[name]
-            return of_flights[name], tuple(page.answer(of_flights[name]))
         made = getattr(gap_artifacts, name)()
         source = source_of(
             record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
