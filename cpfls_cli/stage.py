@@ -122,8 +122,6 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
-    text : tuple of (Path, str) or None
-        A file of text that is written behind the result.
     texts : dict of Path to str
         Other files that are written with the result.
     said : list of Text
@@ -138,7 +136,6 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
-    text: tuple[Path, str] | None = None
     texts: dict[Path, str] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
     _taken: dict[str, _Taken] = field(default_factory=dict)
@@ -190,8 +187,8 @@ class Run(Job):
         if self.writes:
             refuse_own(path, self.output)
         check_output(path, self.force, self.inputs)
-        self.text = path, text
-        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+        self.texts[path], self.also["file"] = text, str(path)
+        self.say(f"{path}: {what}")
 
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
@@ -218,8 +215,10 @@ class Stage:
         Whether its output is a folder with a page for each result; left out, the answer is only printed.
     fills : Filled or None
         Whether its output is a folder with one answer.
-    study : bool
-        Whether it takes a config.
+    study : bool or callable
+        Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
+    output : object
+        Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
     overrides : callable or None
@@ -233,7 +232,8 @@ class Stage:
     words: Mapping[str, Any]
     folder: bool
     fills: Filled | None
-    study: bool
+    study: bool | Callable[[Mapping[str, Any]], bool]
+    output: Any
     several: bool
     overrides: Callable[..., list[str]] | None
 
@@ -244,7 +244,7 @@ class Stage:
     @property
     def name(self) -> str:
         """Of the command: that of its module."""
-        return self.function.__module__.rpartition(".")[2].strip("_").replace("_", "-")
+        return Path(str(sys.modules[self.function.__module__].__file__)).stem.strip("_").replace("_", "-")
 
     def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
         """Word a result, or all results by name where the ending says so.
@@ -297,13 +297,14 @@ class Stage:
             where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if self.study else ""
+            config = "the config and " if run.with_config else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+        streamed = isinstance(found, Parts)
+        if isinstance(found, Parts):
+            # What there is to say is known behind the last part.
+            store.write_parts(run.output, found, found.rows, run.origin(self.name))
+            found = found.last
         results = dict(found) if self.folder else {"": found}
-        streamed = any(isinstance(each, Parts) for each in results.values())
-        if run.writes and streamed:
-            self._write(run, run.output, results)
-        results = {name: each.last if isinstance(each, Parts) else each for name, each in results.items()}
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
@@ -311,8 +312,8 @@ class Stage:
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
         if run.writes and not streamed:
             self._write(run, run.output, results)
-        if run.text:
-            write_text(*run.text)
+        else:
+            write_files(run.texts)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -325,7 +326,7 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else run.text and run.text[0],
+            written=run.output if run.writes else next(iter(run.texts), None),
         )
 
     def info(self, path: Path) -> Outcome:
@@ -417,11 +418,7 @@ class Stage:
             self._fill(run, output, results[""], self.fills)
             return
         if not self.folder:
-            given, origin = results[""], run.origin(self.name)
-            if isinstance(given, Parts):
-                store.write_parts(output, given, given.rows, origin)
-            else:
-                store.write(output, given, origin)
+            store.write(output, results[""], run.origin(self.name))
             write_files(run.texts)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
@@ -460,13 +457,24 @@ def stage(
     words: Mapping[str, Any] | None = None,
     folder: bool = False,
     fills: Filled | None = None,
-    study: bool = False,
+    study: bool | Callable[[Mapping[str, Any]], bool] = False,
+    output: Any = None,
     several: bool = False,
     overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides
+        function,
+        kind,
+        title,
+        figures or {},
+        words or {},
+        folder,
+        fills,
+        study,
+        output,
+        several,
+        overrides,
     )
 
 

@@ -13,7 +13,6 @@ import typer
 from cpfls_cli.arguments import (
     AnywayOption,
     ArtifactsArgument,
-    AutopilotChoice,
     ChooseOnOption,
     DiagnosisArgument,
     ExportAnywayOption,
@@ -42,7 +41,6 @@ from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
-    refuse_overrides,
     sheet,
     with_common,
 )
@@ -284,82 +282,6 @@ def vehicle(
         return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)
-
-
-@_command()
-def tune(
-    config: Annotated[
-        Path, typer.Argument(metavar="CONFIG|LOG", help="Study config (YAML); or a log, alone.", show_default=False)
-    ],
-    model: Annotated[
-        Path | None,
-        typer.Argument(metavar="VEHICLE", help="With CONFIG: vehicle, made by `cpfls vehicle`.", show_default=False),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="File to write; of a LOG parameters that change.", show_default=False
-        ),
-    ] = None,
-    autopilot: Annotated[
-        AutopilotChoice | None,
-        typer.Option("--autopilot", help="With CONFIG: whose control law and parameters; a LOG says it."),
-    ] = None,
-    flights: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--flight", metavar="LOG", help="Log with today's parameters and the gyroscope's noise; any number."
-        ),
-    ] = None,
-    gain_margin: Annotated[
-        float, typer.Option("--gain-margin", metavar="DB", min=0.5, max=30.0, help="At least.")
-    ] = 6.0,
-    phase_margin: Annotated[
-        float, typer.Option("--phase-margin", metavar="DEG", min=5.0, max=85.0, help="At least.")
-    ] = 45.0,
-    disk_margin: Annotated[
-        float,
-        typer.Option("--disk-margin", metavar="DEG", min=5.0, max=85.0, help="Phase, with gain off too; at least."),
-    ] = 35.0,
-    *,
-    common: Common,
-) -> None:
-    """Find gains for an autopilot that keep their margins with every vehicle that flights, or a log, leave possible."""
-    asked = (gain_margin, phase_margin, disk_margin)
-    if model is None:
-        _tune_log(config, output, autopilot, flights, asked, common)
-        return
-    if output is None or autopilot is None:
-        raise typer.BadParameter("with a config and a vehicle, -o FILE and --autopilot are needed, too")
-    whose = autopilot.value
-    _run(
-        "tune",
-        config,
-        output,
-        common,
-        lambda command, job: command.run(job, model, whose, flights or (), command.AskedMargins(*asked)),
-    )
-
-
-def _tune_log(
-    log: Path,
-    output: Path | None,
-    autopilot: AutopilotChoice | None,
-    flights: list[Path] | None,
-    asked: tuple[float, float, float],
-    common: Common,
-) -> None:
-    """Find gains from a log alone."""
-    with messages_for_errors():
-        refuse_overrides(common)
-        if autopilot is not None or flights:
-            raise InputError(f"{log}: with a log alone leave --autopilot and --flight out; the log says both")
-        from cpfls_cli.cli.misplaced import refuse_misplaced_log
-
-        refuse_misplaced_log(log, "a config needs the vehicle that `cpfls vehicle` found, too")
-        command = _of("tune")
-        margins = command.AskedMargins(*asked)
-        tell(command.run_log(log, output, margins, force=common.force, dry_run=common.dry_run), common)
 
 
 @_command()

@@ -13,7 +13,6 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec
-from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -36,7 +35,8 @@ from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.response.flown import Responses
 from cpfls_cli.result import described_fields
-from cpfls_cli.simulation.twin import FRAMES, UNITS
+from cpfls_cli.simulation.twin import Twin
+from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
 from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
 from cpfls_cli.validation.prediction import AlongFlight
@@ -320,33 +320,33 @@ def _of_response(title: str, given: Responses, study: Study) -> View:
     return View(title, (), curves)
 
 
-def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
-    begins = np.nan if record.clock is None else record.clock.begins
-    time, last = _log_time(record.time, begins), len(record.vehicle) - 1
-    tracks, names = [], _vehicle_names(record.vehicle)
-    for index, channel in enumerate(record.channel):
-        simulated = {name: record.simulated[each, :, index] for each, name in enumerate(names)}
-        difference = record.measured[:, index] - record.simulated[last, :, index]
-        own = {MEASURED: record.measured[:, index], SETPOINT: record.setpoint[:, index], **simulated}
-        if record.in_gusts is not None and index in record.held:
-            own |= {"gusts_low": record.in_gusts.low[:, index], "gusts_high": record.in_gusts.high[:, index]}
+def _of_twin(title: str, given: Twin, study: Study) -> View:
+    time, names = _log_time(given.time, given.begins), _vehicle_names(list(given.vehicles))
+    vehicles = dict(zip(names, given.vehicles.values(), strict=True))
+    tracks = []
+    for index, channel in enumerate(given.channel):
+        measured = given.measured[:, index]
+        own = {MEASURED: measured, SETPOINT: given.setpoint[:, index]}
+        own |= {name: each.simulated[:, index] for name, each in vehicles.items()}
+        if given.in_gusts is not None and channel in given.in_gusts.channels:
+            gusty = given.in_gusts.channels[channel]
+            own |= {"gusts_low": gusty.low, "gusts_high": gusty.high}
         tracks.append(
             Track(
                 name=channel.replace(" ", "_"),
                 time=time,
-                values={**own, DIFFERENCE: difference},
+                values={**own, DIFFERENCE: measured - given.judged.simulated[:, index]},
                 unit=UNITS[channel],
                 frame=_FRAMES[FRAMES[channel]],
                 description=f"{channel} of the flight, and of vehicles simulated along its setpoints",
             )
         )
     poses = [
-        pose
-        for each, name in enumerate(names)
-        for pose in _pose(name, time, record.simulated[each, :, 3:6], record.position[each])
+        pose for name, each in vehicles.items() for pose in _pose(name, time, each.simulated[:, 3:6], each.position)
     ]
-    measured = _pose(BODY_FRAME, time, record.measured[:, 3:6], record.measured_position)
-    return View(title, tracks, poses=[*measured, *poses], stamps=_stamps(study), on_log_clock=record.clock is not None)
+    measured_pose = _pose(BODY_FRAME, time, given.measured[:, 3:6], given.measured_position)
+    on_clock = bool(np.isfinite(given.begins))
+    return View(title, tracks, poses=[*measured_pose, *poses], stamps=_stamps(study), on_log_clock=on_clock)
 
 
 def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
@@ -366,5 +366,5 @@ _KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     Disagreement: _of_disagreement,
     Diagnosis: _of_diagnosis,
     Responses: _of_response,
-    TwinRecord: _of_twin,
+    Twin: _of_twin,
 }

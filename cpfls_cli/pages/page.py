@@ -13,7 +13,6 @@ from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.flight import flight_blocks, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
-from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
@@ -21,7 +20,6 @@ from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
@@ -97,9 +95,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_stage("predict"),
-    _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
+    _of_stage("twin"),
     _of_stage("response"),
-    _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
+    _of_stage("tune"),
     _of_stage("replay"),
     _of_stage("trend"),
     _of_stage("changed"),

@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.disagreement import Disagreement
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
-    from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
     from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
+    from cpfls_cli.simulation.twin import Twin
+    from cpfls_cli.tuning.vehicle import Gains
     from cpfls_cli.validation.prediction import AlongFlight
 
 R = TypeVar("R", default=Any)
@@ -68,8 +68,8 @@ class Sources:
     predictions: ClassVar[_OfFormat[AlongFlight]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
-    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
-    gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
+    twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
+    gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")

@@ -7,13 +7,11 @@ from collections.abc import Iterator, Sequence
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
-from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words
-from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 from cpfls_cli.stage import loaded
@@ -30,8 +28,6 @@ def summary_section(sources: Sources) -> Section:
         if sources.by_hash(extended.made_from("diagnosis")) is None
     ]
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [twin_box(twin.record) for twin in sources.twins]
-    blocks += [gains_box(gains.record) for gains in sources.gains]
     # A comparison that was diagnosed has its answer there.
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
     told = [source for source in sources.all if source.stage and source.sha256 not in answered]

@@ -35,7 +35,7 @@ from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_bala
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import NOT_SEEN, seen_words
+from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, stacked, style_of
@@ -139,7 +139,7 @@ FIGURES = {
     AlongFlight,
     title="Torque along a flight",
     figures=FIGURES,
-    words={"contradicted": contradicted, "not_seen": NOT_SEEN},
+    words={"contradicted": contradicted},
     study=True,
 )
 def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | None:

@@ -100,7 +100,7 @@ class AlongFlight:
     ) -> AlongFlight:
         """Predict along a flight, whose generalised torque, shape (time, 3), N m, is None where it holds none."""
         torque, inertia = model.torque(motion), model.inertia(motion.attitude)
-        bands: dict[str, Array] = {}
+        bands: dict[str, Any] = {}
         if draws is not None:
             low, high = inertia_band(model, draws, motion.attitude, inertia.value)
             least, most = torque_band(model, draws, motion, torque)
@@ -152,19 +152,20 @@ class Totals:
             self._body_torque.add(body_torque(part.attitude[~steep], part.error[~steep]))
         if part.force is not None and part.measured_force is not None:
             self._force.add(part.measured_force - part.force)
-        score = self._score.score() if self._judged else None
+        found: dict[str, Any] = {}
+        if self._judged:
+            score = self._score.score()
+            found = {"mse": float(np.mean(score.mse)), "relative_error": score.worst_relative_error}
+            found |= {"r2": score.r2, "r2_body": score.r2_body}
         return replace(
             part,
             samples=self.samples,
             outside=self.outside,
             vertical=self.vertical,
             not_positive_definite=self.not_positive_definite,
-            mse=score and float(np.mean(score.mse)),
-            relative_error=score and score.worst_relative_error,
-            r2=score and score.r2,
-            r2_body=score and score.r2_body,
             body_torque_rms=self._body_torque.root_mean,
             force_rms=self._force.root_mean,
+            **found,
         )
 
 

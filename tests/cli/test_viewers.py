@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from cpfls_cli.export.viewed import view_of
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
-from tests.builders.twins import twin_record
+from tests.builders.twins import twin_found
 
 BEGIN_US = 1_700_000_000_123_456
 TIME_US = BEGIN_US + 5_000 * np.arange(800)
@@ -187,8 +187,9 @@ def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path)
 
 
 def test_a_model_that_is_called_as_the_vehicle_is_told_from_it():
-    record = replace(twin_record(), vehicle=("vehicle", "vehicle.h5"))
-    view = view_of(Path("twin.h5"), record, record.origin.config)
+    found = twin_found()
+    first, second = found.vehicles.values()
+    view = view_of(Path("twin.h5"), replace(found, vehicles={"vehicle": first, "vehicle.h5": second}), VEHICLE)
     (roll,) = (track for track in view.tracks if track.name == "roll")
     assert list(roll.values) == ["measured", "setpoint", "vehicle", "vehicle_model", "difference"]
     assert [pose.child for pose in view.poses] == ["body", "vehicle", "vehicle_model"]

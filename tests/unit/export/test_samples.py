@@ -7,11 +7,12 @@ import pytest
 
 from cpfls_cli.artifacts.rebuilt import estimates, vehicle_model
 from cpfls_cli.export.registry import exported
-from cpfls_cli.export.source import executed, jax_parameters, python_source
+from cpfls_cli.export.source import jax_parameters, python_source
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.spread import drawn
 from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import executed
 from tests.builders.playback_flights import flown, truth
 from tests.builders.spread_vehicles import found_record
 
