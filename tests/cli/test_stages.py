@@ -128,7 +128,7 @@ def test_common_options(house, capsys, tmp_path):
     assert (code, err) == (2, "cpfls: error: w.h5: exists already; --force replaces it\n")
     assert called(house, capsys, "craft.txt", "-o", "w.h5", "--force", "-q") == (0, "", "")
     code, out, _ = called(house, capsys, "craft.txt", "-o", "x.h5", "--dry-run")
-    config = "the config and " if study else ""
+    config = "the config and " if house[1] else ""
     assert (code, out) == (0, f"x.h5: would be written; {config}all inputs are good\n")
     assert not (tmp_path / "x.h5").exists()
     code, _, err = called(house, capsys, "craft.txt", "-o", "x.h5", "--set", "seed=9")
