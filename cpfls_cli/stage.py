@@ -27,7 +27,8 @@ from cpfls_cli.artifacts.output import (
     write_files,
     write_text,
 )
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.spec import Header, InputFile, Record
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
@@ -147,6 +148,10 @@ class Run(Job):
         for path in self.outputs:
             refuse_inputs(path, self.inputs)
         return own.files
+
+    def take_also(self, files: Mapping[str, InputFile], of: str = "") -> None:
+        """Take note of files that an input was made from: inputs of all results, or of the one of this name."""
+        self._of(of).files.update(files)
 
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
@@ -398,13 +403,14 @@ class Stage:
         results = {name: getattr(given, name) if fills.parts else given for name in parts}
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
-            store.require_sound(output / f"{name}.h5", each)
+            if not isinstance(each, Record):
+                store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, self._names(fills)) as folder:
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)
                 made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
-                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+                _write_any(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
             cautions = run.cautions_of(*parts)
             summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -435,6 +441,15 @@ class Stage:
                 write_text(folder / f"{name}.html", self.page(name, each, self._source(run, name, each)))
             for name, every in several.items():
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
+
+
+def _write_any(path: Path, given: Any, origin: store.Origin) -> None:
+    """Write a result, or a record that is none yet."""
+    if not isinstance(given, Record):
+        store.write(path, given, origin)
+        return
+    header = Header(origin.version, origin.seed or 0, origin.config, origin.inputs, origin.cautions)
+    write_record(path, given.with_header(header))
 
 
 def loaded(module: str) -> Stage:

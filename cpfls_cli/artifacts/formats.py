@@ -15,8 +15,6 @@ _RECORDS = {
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
-    ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
-    ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
     ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",

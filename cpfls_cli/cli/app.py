@@ -15,13 +15,11 @@ from cpfls_cli.arguments import (
     ArtifactsArgument,
     ChooseOnOption,
     DiagnosisArgument,
-    DisagreementArgument,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
     FlightsArgument,
-    FolderOption,
     HeldOutOption,
     LogsArgument,
     ModelOption,
@@ -235,27 +233,6 @@ def report(
 
 
 @_command()
-def compare(
-    config: ConfigArgument, flights: FlightsArgument, output: OutputOption, model: ModelOption = None, *, common: Common
-) -> None:
-    """Find where a model and flights disagree."""
-    _run("compare", config, output, common, lambda command, job: command.run(job, flights, model))
-
-
-@_command()
-def diagnose(
-    config: ConfigArgument,
-    disagreement: DisagreementArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Name the physical effect that a model misses."""
-    _run("diagnose", config, output, common, lambda command, job: command.run(job, disagreement, held_out or []))
-
-
-@_command()
 def extend(
     config: ConfigArgument,
     diagnosis: DiagnosisArgument,
@@ -266,20 +243,6 @@ def extend(
 ) -> None:
     """Put the named effects into the model, and show that the gap shrinks."""
     _run("extend", config, output, common, lambda command, job: command.run(job, diagnosis, model))
-
-
-@_command()
-def gap(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: FolderOption,
-    held_out: HeldOutOption = None,
-    model: ModelOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Compare, diagnose and extend in one go, with a report."""
-    _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
 
 
 @_command()

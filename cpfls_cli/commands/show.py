@@ -25,8 +25,6 @@ _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/disagreement": "disagreement",
-    "cpfls/diagnosis": "diagnosis",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 

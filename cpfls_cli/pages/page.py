@@ -9,8 +9,6 @@ from typing import Any
 
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
-from cpfls_cli.pages.diagnosis import diagnosis_blocks
-from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
@@ -18,7 +16,6 @@ from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
@@ -73,13 +70,11 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     comparison_section,
     models_section,
     _of_each("model", "What the model is", lambda given: given.of_kind(ModelRecord), model_blocks, among=True),
-    _of_each("diagnosis", "Before and after", attrgetter("diagnoses"), diagnosis_blocks),
+    _of_stage("diagnose"),
     _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
     _of_each("found-vehicle", "The vehicle found in flights", attrgetter("vehicles"), found_vehicle_blocks),
-    _of_each("disagreement", "Where they disagree", attrgetter("disagreements"), disagreement_blocks),
-    sensors_section,
-    unseen_section,
+    _of_stage("compare"),
     vehicle_section,
     _of_stage("trajectory"),
     _of_stage("simulate"),

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.flights.flight import Flight
@@ -75,11 +75,11 @@ _LACKS: tuple[_Lack, ...] = (
 )
 _GAP_LACKS: tuple[_Lack, ...] = (
     (
-        DisagreementRecord,
+        Disagreement,
         "where and when model and flights disagree",
         "cpfls compare CONFIG FLIGHT... -o disagreement.h5",
     ),
-    (DiagnosisRecord, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
+    (Diagnosis, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
     (ExtendedRecord, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
 )
 _SHOWN = {"extended": "extended model"}
@@ -107,7 +107,7 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
         yield from _LACKS
     if sources.gap:
         yield from _GAP_LACKS[:2]
-        if any(diagnosis.record.effects.names() for diagnosis in sources.diagnoses):
+        if any(diagnosis.record.effects for diagnosis in sources.diagnoses):
             yield _GAP_LACKS[2]
 
 

@@ -23,8 +23,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-    from cpfls_cli.artifacts.disagreement import DisagreementRecord
+    from cpfls_cli.artifacts.diagnosis import Diagnosis
+    from cpfls_cli.artifacts.disagreement import Disagreement
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
@@ -70,8 +70,8 @@ class Sources:
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
     twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
     gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
-    disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
-    diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
+    disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
+    diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
     trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")

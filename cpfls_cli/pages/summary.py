@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.flights.flight import Flight, Imported
-from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
@@ -23,9 +22,16 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = list(_cautions(sources))
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
-    blocks += gap_blocks(sources)
+    blocks += [
+        trust_box(extended)
+        for extended in sources.extensions
+        if sources.by_hash(extended.made_from("diagnosis")) is None
+    ]
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [box for source in sources.all if source.stage for box in stage_named(source.stage).verdict(source)]
+    # A comparison that was diagnosed has its answer there.
+    answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
+    told = [source for source in sources.all if source.stage and source.sha256 not in answered]
+    blocks += [box for source in told for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

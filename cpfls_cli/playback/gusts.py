@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.filters import recursion
+from cpfls_cli.result import About
 
 GUST_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 """Torque about the body axes, then force along them."""
 
 
 class Gusts(NamedTuple):
-    """A Gauss-Markov process on each body axis: ``x' = -x / memory + white noise``, of standard deviation `size`.
+    """A Gauss-Markov process on each body axis: ``x' = -x / memory + white noise``, of standard deviation `size`."""
 
-    Attributes
-    ----------
-    size : array, shape (6,), N m and N, body frame
-        0 where there are none.
-    memory : array, shape (6,), s
-        Time in which a gust falls to 37 %.
-    white : array, shape (6,), N m s^0.5 and N s^0.5, body frame
-        White noise beside it, which over a step of h s has the standard deviation ``white / sqrt(h)``.
-    """
-
-    size: Array
-    memory: Array
-    white: Array = np.zeros(len(GUST_AXES))
+    size: Annotated[
+        Array, About("standard deviation of torque (N m), then force (N); 0 for none", ("6",), "SI", "body (FLU)")
+    ]
+    memory: Annotated[Array, About("time in which a gust falls to 37 %", ("6",), "s", "body (FLU)")]
+    white: Annotated[
+        Array,
+        About(
+            "white noise with it, N m s^0.5 and N s^0.5: over a step of h s its standard deviation is white / sqrt(h)",
+            ("6",),
+            "SI",
+            "body (FLU)",
+        ),
+    ] = np.zeros(len(GUST_AXES))
 
     @classmethod
     def known(cls, size: Array, memory: Array, white: Array | None = None) -> Self:

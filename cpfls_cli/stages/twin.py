@@ -15,7 +15,6 @@ from cpfls_cli.artifacts.rebuilt import estimates
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -60,6 +59,7 @@ from cpfls_cli.simulation.twin_flight import (
     measured_channels,
 )
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages.compare import to_gap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -111,7 +111,7 @@ def test_each_stage_has_a_template_and_each_template_a_stage():
 @pytest.mark.parametrize("name", NAMES)
 def test_what_templates_name_exists(name):
     stage = stage_named(name)
-    own = environment(TEMPLATES, tuple(stage.words.items()))
+    own = environment(TEMPLATES, stage.words)
     for template in templates(name):
         text, _, _ = own.loader.get_source(own, template)
         # Filters and tests that do not exist are refused here.
@@ -128,7 +128,7 @@ def test_what_templates_name_exists(name):
 
 def test_a_name_that_does_not_exist_is_found():
     kind = loaded("reduce").kind
-    own = environment(TEMPLATES, ())
+    own = environment(TEMPLATES, {})
     with pytest.raises(AssertionError, match="has no selektion"):
         Walk(kind)(own.parse("{{ r.selektion }}"))
     look = loaded("look").kind
