@@ -333,8 +333,9 @@ def _read(flight: Path, study: Study) -> _Log:
     nothing = (np.zeros(0), np.zeros((0, 3)), "")
     if format_name(flight) == Flight.FORMAT:
         kept, _ = read_whole(flight)
-        known = (kept.system, kept.parameters) if isinstance(kept, Imported) and kept.parameters else ("", {})
-        return _Log(flight.name, *known, *nothing)
+        if not isinstance(kept, Imported) or not kept.parameters:
+            return _Log(flight.name, "", {}, *nothing)
+        return _Log(flight.name, kept.system, kept.parameters, *nothing)
     contents = log_contents(flight, ())
     rates = _rates(flight, study) if _maps_rates(study) else nothing
     return _Log(flight.name, contents.system, contents.parameters, *rates)
