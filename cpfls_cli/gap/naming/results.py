@@ -16,8 +16,6 @@ from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 from cpfls_cli.result import about, part, result
 
 BODY = "body (FLU)"
-_GROWN = 1.05
-"""Ratio of the gaps after and before from which on a channel is marked; two digits show no less."""
 _EVALUATED = ("wrench", "actuator")
 """Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
 
@@ -202,7 +200,7 @@ class GapChange:
     @property
     def grown(self) -> BoolArray:
         """Channels whose gap is above noise and larger with the effects than without, shape (6,)."""
-        return np.asarray((self.after_floors > CLEAR) & (self.after_floors > _GROWN * self.before_floors))
+        return np.asarray((self.after_floors > CLEAR) & (self.after_floors > (1 + COUNTS) * self.before_floors))
 
     @property
     def worse_axes(self) -> list[int]:

@@ -12,12 +12,11 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.settings import CHANCE
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
-_SIGNIFICANT = 0.05
-"""Probability of chance below which a gap follows a signal."""
 _DEGREE = 4
 """Of curves, and of waves around a circle: what formulas leave out is hardly more crooked."""
 
@@ -45,7 +44,7 @@ class Dependence(NamedTuple):
     @property
     def sure(self) -> bool:
         """Whether it is no chance."""
-        return self.p_value < _SIGNIFICANT and self.r2 > 0
+        return self.p_value < CHANCE and self.r2 > 0
 
 
 def rank_dependence(

@@ -29,9 +29,6 @@ OPEN = 0.5
 _TOLD = 0.2
 """Standard error of an explained share above which it says nothing: hardly any motion comes again there."""
 
-_EXPLAINS = 0.05
-"""Share of a motion that a model has to explain for that to be said."""
-
 
 class Band(NamedTuple):
     """Windows, and the frequencies that they pass, about.
@@ -186,7 +183,7 @@ class ComesAgain:
     def explained_in(self, channel: int, part: Part) -> tuple[float, float] | None:
         """Give the least and largest share of the motion in a part that the model explains, where it explains some."""
         explained = self.explained[channel, part.bands]
-        return (float(explained.min()), float(explained.max())) if (explained > _EXPLAINS).all() else None
+        return (float(explained.min()), float(explained.max())) if (explained > COUNTS).all() else None
 
     def kept_of(self, before: ComesAgain, channel: int, part: Part) -> float:
         """Compute the share that is left of what came again in a part before effects."""
