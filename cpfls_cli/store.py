@@ -356,7 +356,7 @@ def _read(kind: Any, group: h5py.Group, missing: list[str], rows: int | None = N
         elif own.rows:
             given[own.name] = _of_rows(own, _read_table(own.rows, group[own.name], missing))
         elif own.about:
-            few = slice(rows) if own.about.axes[:1] == (streamed,) else ()
+            few = slice(rows) if rows is not None and own.about.axes[:1] == (streamed,) else ()
             given[own.name] = _value(own, _values(group, own.name, own, few))
         elif own.table:
             given[own.name] = _read_table(own.inner, group[own.name], missing)
@@ -415,9 +415,10 @@ def _read_lines(own: Described, group: h5py.Group, rows: int, missing: list[str]
 
 
 def _values(group: h5py.Group, name: str, own: Described, rows: Any = ()) -> np.ndarray[Any, Any]:
-    dataset = dataset_of(group.file, f"{group.name}/{name}".lstrip("/"))
+    path = f"{group.name}/{name}".lstrip("/")
+    dataset = dataset_of(group.file, path)
     if dataset is None or dataset.dtype.kind not in _HELD[own.scalar]:
-        raise ValueError(f"{group.name}/{name} holds no {own.scalar.__name__}")
+        raise ValueError(f"{path} holds no {own.scalar.__name__}")
     array = np.asarray(dataset[rows])
     return np.char.decode(array, "utf-8") if array.dtype.kind == "S" else _as(own, array)
 
