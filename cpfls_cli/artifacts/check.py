@@ -268,10 +268,16 @@ def dataset_of(file: h5py.File, path: str) -> h5py.Dataset | None:
     return h5py.Dataset(found, readonly=True)
 
 
-def _identify(path: Path, file: h5py.File) -> Format:
+def held_format(path: Path, file: h5py.File) -> str:
+    """Name the format of an open file; one that cpfls did not make is refused."""
     name = _text_attribute(file, "format")
     if name is None or not name.startswith("cpfls/"):
         raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
+    return name
+
+
+def _identify(path: Path, file: h5py.File) -> Format:
+    name = held_format(path, file)
     version = file.attrs.get("schema_version")
     if not isinstance(version, int | np.integer):
         raise InputError(f"{path}: the root attribute 'schema_version' is missing or not a number")
