@@ -191,11 +191,13 @@ def opened_file(path: Path) -> Iterator[h5py.File]:
 @contextmanager
 def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
     """Open an artifact of one of these formats, or of any."""
+    asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
     with opened_file(path) as file:
+        if wanted and stage_module(file.attrs):
+            raise InputError(f"{path}: is a {held_format(path, file)}; this command needs a {asked}")
         with patient(path):
             stored = stored_of(path, file)
         if wanted and not any(each.includes(stored.spec) for each in wanted):
-            asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
             made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
             raise InputError(f"{path}: is a {stored.spec.name}{made}; this command needs a {asked}")
         yield stored
