@@ -203,7 +203,7 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
     told = json.loads(cpfls("info", compared, "--json").stdout)
     assert told["cautions"] == list(header.cautions)
-    assert HEADLINE in " ".join(cpfls("info", compared).stdout.split())
+    assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     with undrawn():
         assert cpfls("report", config, compared, "-o", tmp_path / "page.md").exit_code == 0
     summary = (tmp_path / "page.md").read_text().split("## ")[1]
