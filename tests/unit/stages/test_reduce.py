@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cpfls_cli.commands.reduce import _naming
 
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.stages.reduce import _naming
 
 
 def test_numbers_that_overflow_are_an_error_that_names_the_flight():
