@@ -10,11 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import cpfls_cli
+from cpfls_cli import store
 from cpfls_cli.artifacts.formats import records
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
 from cpfls_cli.errors import InputError
 from tests.builders.artifacts import edited
+from tests.builders.results import craft
 
 
 def made_up(spec):
@@ -48,6 +50,15 @@ def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record
         assert plain == list(dataset.dimensions)
         assert values.attrs == {"units": dataset.units, "frame": dataset.frame, "long_name": dataset.description}
         assert artifact.about(dataset.path) == dataset
+
+
+def test_a_dimension_of_another_length_in_each_group_is_named_with_its_group(tmp_path):
+    store.write(tmp_path / "a.h5", craft(), store.Origin(stage="look"))
+    held = store.flat(tmp_path / "a.h5")
+    data, specs = ({name: pair[place] for name, pair in held.items()} for place in (1, 0))
+    named = cpfls_cli.Artifact(craft(), store.Origin(stage="look"), data, specs).to_xarray()
+    for axis, length in {"yaw": 2, "roll": 4}.items():
+        assert dict(named[f"curves/{axis}/gain"].sizes) == {f"curves/{axis}/frequency": length, "axis": 3}
 
 
 def artifact_data(artifact):
