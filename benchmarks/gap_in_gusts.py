@@ -111,7 +111,7 @@ def _names(hidden: Hidden, runs: Sequence[DiagnosisRun]) -> Iterator[str]:
         for run in runs
         for effect in run.diagnosis.effects
         if effect.name == hidden.name
-        for number in effect.coefficients
+        for number in effect.numbers
         if number.name in hidden.numbers
     ]
     yield f"{sum(numbers)} of {len(numbers)}" if numbers else "—"

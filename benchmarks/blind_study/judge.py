@@ -73,7 +73,7 @@ def _air(air):
 def _effect(effect):
     numbers = {
         c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit, "possible": list(c.plausible)}
-        for c in effect.coefficients
+        for c in effect.numbers
     }
     told = {"name": effect.name, "coefficients": numbers, "p_value": effect.p_value, "share": effect.share}
     return told | {"selection_frequency": effect.selection_frequency}
