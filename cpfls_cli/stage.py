@@ -299,7 +299,11 @@ class Stage:
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if run.with_config else ""
-            return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+            cautions = run.cautions_of(*(self.fills.parts if self.fills else ()))
+            return Outcome(
+                {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
+                (Text(f"{where}{config}all inputs are good"), *caution_texts(cautions)),
+            )
         if isinstance(found, Outcome):
             return found
         streamed = isinstance(found, Parts)
@@ -346,9 +350,10 @@ class Stage:
         rows = [(path, own.about.unit, own.about.text) for path, own in datasets(self.kind) if own.about]
         table = Table("datasets", "", ("Dataset", "Unit", "What it holds"), rows, frozenset({0, 1, 2}), frozenset({2}))
         inputs = {role: vars(own) for role, own in origin.inputs.items()}
-        summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "inputs": inputs}
+        summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "seed": origin.seed}
+        summary |= {"inputs": inputs, "cautions": list(origin.cautions)}
         return Outcome(
-            {**summary, "cautions": list(origin.cautions), **({} if long else {"result": plain(given)})},
+            summary if long else summary | {"result": plain(given)},
             (
                 *page.blocks(answer),
                 *caution_texts(origin.cautions),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
+from contextlib import nullcontext
 from dataclasses import MISSING, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +20,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.check import Origin as Origin
-from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_of
+from cpfls_cli.artifacts.check import dataset_of, held_format, old_file, opened_file, origin_of
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
@@ -79,7 +80,7 @@ def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> 
             output.require_written()
         streamed = _streamed(part) if rows else []
         # What lies along the axis is checked in the file, all of it.
-        wrong = list(_wrong_rows(file, type(part), streamed)) if rows else []
+        wrong = list(_wrong_rows(file, None, type(part), streamed)) if rows else []
         wrong = wrong or [each for each in findings(part) if each.partition(":")[0] not in streamed]
         if wrong:
             raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
@@ -221,8 +222,8 @@ def findings_in(path: Path, kind: Any) -> list[str]:
     if not is_long(path, kind):
         return examine(path, kind)[2]
     names = held_rows(path, kind)
-    with opened_file(path) as file, patient(path):
-        wrong = list(_wrong_rows(file, kind, names))
+    with opened_file(path) as file:
+        wrong = list(_wrong_rows(file, path, kind, names))
     return [*wrong, *(each for each in examine(path, kind, 2)[2] if each.partition(":")[0] not in names)]
 
 
@@ -235,7 +236,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
         Along ``STREAMED``, so many at most.
     """
     with opened_file(path) as file, patient(path):
-        wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
+        wanted, held = kind.FORMAT, held_format(path, file)  # type: ignore[attr-defined]
         if held != wanted:
             made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
@@ -303,15 +304,17 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int
 
 def check_rows(path: Path, kind: Any, names: Sequence[str]) -> None:
     """Refuse datasets along the axis that is written in parts which break their description, some rows at a time."""
-    with opened_file(path) as file, patient(path):
-        for name in names:
-            _dataset(file, path, name)
-        wrong = list(_wrong_rows(file, kind, names))
+    with opened_file(path) as file:
+        with patient(path):
+            for name in names:
+                _dataset(file, path, name)
+        wrong = list(_wrong_rows(file, path, kind, names))
     if wrong:
         raise InputError("\n".join(f"{path}: {each}" for each in wrong))
 
 
-def _wrong_rows(file: h5py.File, kind: Any, names: Sequence[str]) -> Iterator[str]:
+def _wrong_rows(file: h5py.File, path: Path | None, kind: Any, names: Sequence[str]) -> Iterator[str]:
+    """Look at rows some at a time; a file that is read, not written, may be damaged, and is named."""
     fields = {own.name: own for own in described_fields(kind)}
     length = len(file[kind.STREAMED])
     for name in names:
@@ -321,7 +324,8 @@ def _wrong_rows(file: h5py.File, kind: Any, names: Sequence[str]) -> Iterator[st
             yield f"{name}: {len(dataset)} along '{kind.STREAMED}', but {length} by {kind.STREAMED}"
         for start in range(0, len(dataset), _BLOCK):
             # With the row before it, to see whether it ascends.
-            block = dataset[max(0, start - own.about.ascends) : start + _BLOCK]
+            with patient(path) if path else nullcontext():
+                block = dataset[max(0, start - own.about.ascends) : start + _BLOCK]
             if found := [f"{each}, in rows from {start}" for each in _wrong(name, block, own, own.about, {})]:
                 yield from found
                 break

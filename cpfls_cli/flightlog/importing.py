@@ -122,10 +122,11 @@ def read_signals(
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
         *(*_warn_of_clock(rate_hz, settings), *warn_of_angles(read.signals), *unknown),
     )
+    dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     report = ImportReport(
         samples_read=len(read.time),
         samples=len(clock),
-        dropped=dropped | {"incomplete_ends": incomplete_ends, "gap": beyond_gap},
+        dropped={reason: rows for reason, rows in dropped.items() if rows},
         missing=counts["missing"],
         spikes=counts["spikes"],
         suspected_spikes=counts["suspected_spikes"],

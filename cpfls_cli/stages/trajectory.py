@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
+from importlib import import_module
 from math import inf
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +26,6 @@ from cpfls_cli.report.numbers import plain
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
 from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages import _next_flight as next_flight
 from cpfls_cli.stages._demand import demand_sentences
 from cpfls_cli.stages._flight import draw_attitude, draw_rotation
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
@@ -168,9 +169,9 @@ def trajectory(
     settings = run.study.trajectory if settles else _settings(run.study, waypoints)
     names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
-    texts = next_flight.waypoints_path(run) if settles else mission_paths(run, mission)
+    texts = _next_flight().waypoints_path(run) if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
-    planned = next_flight.planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
+    planned = _next_flight().planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
     written = None if planned is None else mission_texts(run, mission, planned, texts)
     if planned is None or written is None or run.dry_run:
         return None
@@ -185,6 +186,11 @@ def trajectory(
     run.also = {"figures": [str(path) for path in figures], "files": [str(path) for path in texts]}
     run.go_on("simulate", run.output, output=run.beside("flight.h5"))
     return planned
+
+
+def _next_flight() -> ModuleType:
+    """Load what reads diagnoses and models, which no other path needs."""
+    return import_module("cpfls_cli.stages._next_flight")
 
 
 def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> PlannedPath | None:

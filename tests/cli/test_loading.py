@@ -67,7 +67,7 @@ def test_the_version_and_the_help_load_nothing_heavy(after):
 
 
 def test_what_only_reads_loads_neither_compiled_loops_nor_scipy(after):
-    assert HEAVY & after["reading"] == {"h5py", "numpy", "pydantic", "yaml"}
+    assert HEAVY & after["reading"] == {"h5py", "jinja2", "numpy", "pydantic", "yaml"}
 
 
 def test_what_is_printed_loads_no_plotting(after):
@@ -110,8 +110,8 @@ def test_a_report_loads_no_compiled_loops(imported):
     assert "numba" not in imported["report"]
 
 
-def test_no_command_waits_for_what_of_scipy_is_slow_to_load(after, imported):
-    assert {"scipy.signal", "scipy.stats"} & (after["all"] | imported["all commands and pages"]) == set()
+def test_no_command_waits_for_what_of_scipy_is_slow_to_load_but_one_that_filters(after, imported):
+    assert {"scipy.signal", "scipy.stats"} & (after["identify"] | imported["all commands and pages"]) == set()
 
 
 def test_no_command_and_no_page_loads_plotting_before_it_draws(imported):

@@ -10,7 +10,7 @@ from tests.builders.studies import VEHICLE
 KEYS = {
     "trajectory": {"samples", "duration_s", "dt_s", "max"},
     "flight": {"samples", "max_torque"},
-    "selection": {"samples", "selected", "criterion", "rank", "condition_number", "condition_number_full"},
+    "selection": {"candidates", "selected", "criterion", "rank", "condition_number", "condition_number_full"},
     "model": {
         "mse",
         "max_error",
@@ -40,7 +40,7 @@ def test_figures_of_the_tiny_study(pipeline):
     assert trajectory["samples"] == flight["samples"] == prediction["samples"] == 549
     assert trajectory["dt_s"] == 0.1
     assert len(flight["max_torque"]) == 3
-    assert (selection["samples"], selection["selected"], selection["rank"]) == (549, 60, 113)
+    assert (selection["candidates"], selection["selected"], selection["rank"]) == (549, 60, 113)
     assert (model["parameters"], model["rank"], model["generations"]) == (113, 113, 1)
     assert model["evaluations"] >= 10
     assert {"rigid-body", "constant-inertia", "torque-zero"} <= set(model["baselines"])

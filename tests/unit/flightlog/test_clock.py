@@ -46,7 +46,7 @@ def test_a_crop_that_is_offered_keeps_what_it_says(time, rows):
     assert int(offer[1]) == pytest.approx(rows, abs=2)
     kept = read(time, crop_s=(float(offer[2]), float(offer[3]))).report
     assert kept.samples_read - sum(kept.dropped.values()) == pytest.approx(int(offer[1]), abs=1)
-    assert kept.dropped["backward_time"] == 0
+    assert "backward_time" not in kept.dropped
 
 
 def test_late_packets_are_dropped_and_counted_however_many():
