@@ -299,7 +299,11 @@ class Stage:
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if run.with_config else ""
-            return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+            cautions = run.cautions_of(*(self.fills.parts if self.fills else ()))
+            return Outcome(
+                {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
+                (Text(f"{where}{config}all inputs are good"), *caution_texts(cautions)),
+            )
         if isinstance(found, Outcome):
             return found
         streamed = isinstance(found, Parts)

@@ -20,7 +20,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.check import Origin as Origin
-from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_of
+from cpfls_cli.artifacts.check import dataset_of, held_format, old_file, opened_file, origin_of
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
@@ -236,7 +236,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
         Along ``STREAMED``, so many at most.
     """
     with opened_file(path) as file, patient(path):
-        wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
+        wanted, held = kind.FORMAT, held_format(path, file)  # type: ignore[attr-defined]
         if held != wanted:
             made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -23,7 +24,7 @@ from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.sweep import SettingRuns
 from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.sweep import joined_sweeps
-from cpfls_cli.report.content import Block, Cell, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
 
 _LACKS_SWEEP = Text(
@@ -39,29 +40,37 @@ _PAPER_NOTE = Text(
     "note",
 )
 _NUMBER = "Table 5. "
+_NUMBERED = re.compile(r"Figure \d")
+"""How the caption of a figure begins that has the number of one of the paper."""
 _FLOOR = " is better conditioned than the full set"
 _SAMPLES, _QUANTITY = 1, 0
 
 
 def with_the_paper(section: Section, sources: PaperSources) -> Section:
     """Put beside a section what the paper prints of it."""
-    return replace(section, blocks=list(_blocks(section, sources)))
+    blocks: list[Block] = list(_blocks(section.blocks, sources))
+    told = "models" if len(sources.models) > 1 else "summary"
+    if section.name == told and not sources.sweeps:
+        blocks.append(_LACKS_SWEEP)
+    return replace(section, blocks=blocks)
 
 
-def _blocks(section: Section, sources: PaperSources) -> Iterator[Block]:
+def _blocks(given: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
     sweeps = [sweep.record.settings for sweep in joined_sweeps(sources.sweeps)]
     shown = [settings for settings in sweeps if not compares_readings(settings)]
     in_sweeps = any(any(printed_beside(settings)) for settings in sweeps)
-    for block in section.blocks:
+    for block in given:
         match block:
+            case Folded():
+                yield replace(block, blocks=list(_blocks(block.blocks, sources)))
             case Table(name="table-3-vehicle"):
                 printed = [*PRINTED_VEHICLE, *["0"] * (len(block.rows) - len(PRINTED_VEHICLE) - 1), PRINTED_DURATION_S]
                 yield _with_column(block, printed)
-            case Table(name=name) if name.startswith("peaks-"):
-                caption = f"{block.caption} The paper prints its maxima for intervals of P = 1 s."
-                printed = [number(PRINTED_PEAKS[str(row[_QUANTITY])]) for row in block.rows]
+            case Table() if _is_of(block, "trajectory", "Derivative"):
+                caption = f"{block.caption} The paper prints its maxima for intervals of P = 1 s.".lstrip()
+                printed = [number(PRINTED_PEAKS[row[_QUANTITY].text]) for row in block.cells]
                 yield replace(_with_column(block, printed), caption=caption)
-            case Table(name="table-4-reduction"):
+            case Table() if _is_of(block, "reduce", "Set"):
                 yield _table_4(block)
             case Text(text=text) if text.endswith(f"{_FLOOR}."):
                 floor = "the paper's floor, that a reduced set cannot be, does not hold"
@@ -74,13 +83,15 @@ def _blocks(section: Section, sources: PaperSources) -> Iterator[Block]:
                 yield _replicates(block, printed)
                 if any(printed):
                     yield _PAPER_NOTE
-            case Plot(name=name) if name[len("figure-") :][:1].isdigit():
+            case Plot(caption=caption) if _NUMBERED.match(caption):
                 yield replace(block, see=("figures-of-the-paper", "What the paper's shows."))
             case _:
                 yield block
-    told = "models" if len(sources.models) > 1 else "summary"
-    if section.name == told and not sources.sweeps:
-        yield _LACKS_SWEEP
+
+
+def _is_of(table: Table, stage: str, first: str) -> bool:
+    """Whether a table is that of a stage whose first column is called so."""
+    return table.name.startswith(f"{stage}-") and str(table.header[0]) == first
 
 
 def _with_column(table: Table, printed: Sequence[str]) -> Table:
@@ -91,16 +102,16 @@ def _with_column(table: Table, printed: Sequence[str]) -> Table:
 def _table_4(table: Table) -> Table:
     """Add the printed columns by number of samples, largest sets first; those that nobody repeats stand alone."""
     printed = {str(column.samples): [str(column.condition_number), change(column.change)] for column in TABLE_4}
-    shown = {str(row[_SAMPLES]) for row in table.rows}
-    rows: list[list[str | Cell]] = [[*row, *printed.get(str(row[_SAMPLES]), ["", ""])] for row in table.rows]
+    shown = {row[_SAMPLES].text for row in table.cells}
+    rows = [[*row, *map(Cell, printed.get(row[_SAMPLES].text, ["", ""]))] for row in table.cells]
     full = TABLE_4[0].samples
     rows += [
-        [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples, percent(int(samples) / full), "", "",
-         "", "", *columns]
+        list(map(Cell, [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples,
+                        percent(int(samples) / full), "", "", "", "", *columns]))
         for samples, columns in printed.items() if samples not in shown
     ]  # fmt: skip
     header = [*table.header, "Paper: condition number", "Paper: change"]
-    return replace(table, header=header, rows=sorted(rows, key=lambda row: -int(str(row[_SAMPLES]))))
+    return replace(table, header=header, rows=sorted(rows, key=lambda row: -int(row[_SAMPLES].text)))
 
 
 def _all_columns(table: Table) -> Table:

@@ -191,11 +191,13 @@ def opened_file(path: Path) -> Iterator[h5py.File]:
 @contextmanager
 def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
     """Open an artifact of one of these formats, or of any."""
+    asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
     with opened_file(path) as file:
+        if wanted and stage_module(file.attrs):
+            raise InputError(f"{path}: is a {held_format(path, file)}; this command needs a {asked}")
         with patient(path):
             stored = stored_of(path, file)
         if wanted and not any(each.includes(stored.spec) for each in wanted):
-            asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
             made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
             raise InputError(f"{path}: is a {stored.spec.name}{made}; this command needs a {asked}")
         yield stored
@@ -268,10 +270,16 @@ def dataset_of(file: h5py.File, path: str) -> h5py.Dataset | None:
     return h5py.Dataset(found, readonly=True)
 
 
-def _identify(path: Path, file: h5py.File) -> Format:
+def held_format(path: Path, file: h5py.File) -> str:
+    """Name the format of an open file; one that cpfls did not make is refused."""
     name = _text_attribute(file, "format")
     if name is None or not name.startswith("cpfls/"):
         raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
+    return name
+
+
+def _identify(path: Path, file: h5py.File) -> Format:
+    name = held_format(path, file)
     version = file.attrs.get("schema_version")
     if not isinstance(version, int | np.integer):
         raise InputError(f"{path}: the root attribute 'schema_version' is missing or not a number")

@@ -68,7 +68,7 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     """Say which flights were made with another vehicle, a sentence each; configs that are not read are passed over."""
     differences = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
     return tuple(
-        f"{path}: was made with another vehicle; these differ: {different}; what it says applies to that vehicle"
+        f"{path.name}: was made with another vehicle; these differ: {different}; what it says applies to that vehicle"
         for path, different in differences
         if different
     )
@@ -77,7 +77,7 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
 def model_of_another(path: Path, study: Study) -> tuple[str, ...]:
     """Say of a model that it is one of another vehicle than that of the config, in a sentence or none."""
     different = _difference_of(path, study)
-    return (f"{path}: models a vehicle other than the config's; these differ: {different}",) if different else ()
+    return (f"{path.name}: models a vehicle other than the config's; these differ: {different}",) if different else ()
 
 
 def _difference_of(path: Path, study: Study) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from importlib import import_module
 from itertools import product
 from pathlib import Path
@@ -149,7 +150,7 @@ class Artifact(Mapping[str, Any]):
         """Give all datasets with named dimensions; units, frame and description stand in their ``attrs``.
 
         A dimension that a dataset has twice, as a matrix does, is named ``axis`` and ``axis_2``; one of the name of
-        another dataset ends in ``_index``.
+        another dataset ends in ``_index``; one of another length in each group begins with the group.
 
         Raises
         ------
@@ -254,12 +255,28 @@ class Artifact(Mapping[str, Any]):
         return self._path.name if self._path else f"{self.format} {number}"
 
     def _dimensions(self, name: str) -> list[str]:
-        """Name the dimensions of a dataset apart, also from datasets that are no coordinates."""
-        labels = self.about(name).dimensions
-        taken = {label for label in labels if label in self and self.about(label).dimensions != (label,)}
+        """Name the dimensions of a dataset apart, also from datasets that are no coordinates.
+
+        One that has another length in other groups is named with its group.
+        """
+        group = name.rpartition("/")[0]
+        apart_by_group = self._of_several_lengths if group else frozenset()
+        given = self.about(name).dimensions
+        labels = tuple(f"{group}/{label}" if label in apart_by_group else label for label in given)
+        named = {label for label in labels if label in self}
+        taken = {label for label in named if self.about(label).dimensions != (label.rpartition("/")[2],)}
         counts = [labels[: index + 1].count(label) for index, label in enumerate(labels)]
         apart = [f"{label}_index" if label in taken else label for label in labels]
         return [label if count == 1 else f"{label}_{count}" for label, count in zip(apart, counts, strict=True)]
+
+    @cached_property
+    def _of_several_lengths(self) -> frozenset[str]:
+        """Dimensions that have not one length only."""
+        lengths: dict[str, set[int]] = {}
+        for name, values in self._data.items():
+            for label, length in zip(self.about(name).dimensions, values.shape, strict=True):
+                lengths.setdefault(label, set()).add(length)
+        return frozenset(label for label, own in lengths.items() if len(own) > 1)
 
     def _attributes(self, name: str) -> dict[str, str]:
         about = self.about(name)

@@ -176,7 +176,7 @@ def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | N
     known |= {
         "begins_s": read_first(flight, Flight)[0].begins,
         "condition_number": identified.solve.condition_number if identified.known_everywhere else None,
-        "warnings": (*(each.text for each in unjudged(identified, model)), *others),
+        "warnings": (*(each.text for each in unjudged(identified, model.name)), *others),
     }
     chunks = (data[start : start + PART] for data in flown.chunks() for start in range(0, len(data), PART))
     parts = (

@@ -2,11 +2,25 @@
 
 import struct
 from contextlib import contextmanager
+from dataclasses import replace
 
 import h5py
 import numpy as np
 
+from cpfls_cli import store
 from cpfls_cli.files import seal_of
+from cpfls_cli.stage import loaded
+
+
+def read_result(path):
+    """Read what a stage wrote."""
+    return store.read(path, loaded(store.stage_of(path)).kind)[0]
+
+
+def with_fields(path, output, **fields):
+    """Write what a stage wrote again, with other values for some of its fields."""
+    given, origin = store.read(path, loaded(store.stage_of(path)).kind)
+    store.write(output, replace(given, **fields), origin)
 
 
 @contextmanager

@@ -91,17 +91,17 @@ def test_a_flight_in_the_place_of_a_path_asks_for_its_autopilot(refuse, pipeline
     [
         ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         ("identify", ["model"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
+        (
+            "predict",
+            ["flight", "flight"],
+            "cpfls/model (made by `cpfls identify` or `cpfls extend` or `cpfls gap` or `cpfls vehicle`)",
+        ),
     ],
 )
 def test_artifact_of_another_stage(refuse, pipeline, study, tmp_path, command, given, needed):
     paths = [pipeline.paths[stage] for stage in given]
     (line,) = refuse(command, study, *paths, "-o", tmp_path / "out.h5")
     assert line == f"{paths[0]}: is a cpfls/{given[0]}; this command needs a {needed}"
-
-
-def test_a_flight_given_as_model(refuse, pipeline, study, tmp_path):
-    (line,) = refuse("predict", study, pipeline.flight, pipeline.flight, "-o", tmp_path / "out.h5")
-    assert line.startswith(f"{pipeline.flight}: format = 'cpfls/flight': not known to this command; `cpfls info` shows")
 
 
 def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path):
@@ -133,7 +133,7 @@ def test_config_that_was_edited_in_place(refuse, changed):
 def test_required_datasets_missing(refuse, changed, study, tmp_path):
     path = changed("trajectory", drop("yaw", "time"))
     (line,) = refuse("simulate", study, path, "-o", tmp_path / "out.h5")
-    assert line == f"{path}: the cpfls/trajectory lacks time, yaw; make it again"
+    assert line == f"{path}: the cpfls/trajectory lacks /time, /yaw; make it again"
 
 
 @pytest.mark.parametrize(
@@ -232,10 +232,17 @@ def test_training_share_changed_between_reduce_and_identify(refuse, pipeline, st
     assert "identification.training_share has changed since" in line
 
 
-@pytest.mark.parametrize("first", [-1, 1.5])
-def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path, first):
+@pytest.mark.parametrize(
+    ("first", "message"),
+    [
+        (-1, "indices: is below 0"),
+        (1.5, "damaged: indices holds no int"),
+        (3, "indices is empty or has repeats; run `cpfls reduce` again"),
+    ],
+)
+def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path, first, message):
     def change(file):
-        values = file["indices"][:].astype(float)
+        values = file["indices"][:].astype(type(first))
         values[:2] = first
         del file["indices"]
         file["indices"] = values
@@ -243,7 +250,7 @@ def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path
     selection = changed("selection", change)
     words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
     (line,) = refuse(*words)
-    assert line.startswith(f"{selection}: indices is empty, negative or has repeats")
+    assert line.startswith(f"{selection}: {message}")
 
 
 @pytest.mark.parametrize("stage", ["flight", "model"])

@@ -61,7 +61,8 @@ def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, 
     result = cpfls("import", log_study, write(content, name), "-o", flight, "--json")
     assert result.exit_code == 0, result.stderr
     summary = json.loads(result.stdout)
-    assert (summary["samples"], summary["dropped"]) == (200, {})
+    assert summary["samples"] == 200
+    assert not any(summary["dropped"].values())
     assert summary["rate_hz"] == pytest.approx(50.0)
     with h5py.File(flight) as file:
         np.testing.assert_allclose(file["attitude"], rows()[:, 1:4], atol=1e-8)

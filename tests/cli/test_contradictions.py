@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from html import unescape
 
 import pytest
 
@@ -55,17 +56,14 @@ def test_gap_names_no_gap_and_no_effect(logs, name, tmp_path):
     answer = told("gap", config, first, "--held-out", second, "-o", tmp_path / "gap", *asked(wrong))
     assert answer["verdict"] == "CONTRADICTED"
     assert wrong.words in answer["contradictions"][0]
-    assert answer["headline"].startswith(begins(wrong))
-    assert wrong.words in answer["headline"]
     assert answer["effects"] == []
-    assert answer["extended"]["written"] is False
-    assert answer["next"] == [
-        "Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."
-    ]
+    assert answer["extension"]["written"] is False
     assert answer["disagreement"]["audit"]["contradictions"][0] == answer["contradictions"][0]
-    page = (tmp_path / "gap" / "report.html").read_text()
+    page = unescape((tmp_path / "gap" / "report.html").read_text())
     assert "CONTRADICTED" in page
     assert begins(wrong) in page
+    assert wrong.words in page
+    assert "Correct what is wrong, in the section" in page
 
 
 @pytest.mark.parametrize("name", WRONG)

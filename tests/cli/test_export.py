@@ -162,7 +162,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
         file.attrs["format"] = "cpfls/extended"
     (line,) = refuse("export", model, *words)
     assert line.startswith(f"{model}: was written by cpfls ")
-    assert line.endswith("whose files this version does not read; make it again")
+    assert line.endswith("whose files this version does not read; make it again with `cpfls identify`")
 
 
 @pytest.mark.parametrize(

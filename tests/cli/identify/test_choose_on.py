@@ -94,12 +94,12 @@ def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tm
     assert result.exit_code == 0, result.stderr
     said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
     assert len(said) == 1
-    assert f"{heavy}: was made with another vehicle; these differ: vehicle.inertia_kg_m2" in said[0]
+    assert f"{heavy.name}: was made with another vehicle; these differ: vehicle.inertia_kg_m2" in said[0]
 
 
 def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
     words = ("predict", study, pipeline.model, pipeline.flight, "--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
     result = cpfls(*words, "-o", tmp_path / "prediction.h5")
     assert result.exit_code == 0, result.stderr
-    said = f"{pipeline.model}: models a vehicle other than the config's; these differ: vehicle.inertia_kg_m2"
+    said = f"{pipeline.model.name}: models a vehicle other than the config's; these differ: vehicle.inertia_kg_m2"
     assert said in result.stderr

@@ -10,11 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import cpfls_cli
+from cpfls_cli import store
 from cpfls_cli.artifacts.formats import records
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
 from cpfls_cli.errors import InputError
 from tests.builders.artifacts import edited
+from tests.builders.results import craft
 
 
 def made_up(spec):
@@ -48,6 +50,15 @@ def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record
         assert plain == list(dataset.dimensions)
         assert values.attrs == {"units": dataset.units, "frame": dataset.frame, "long_name": dataset.description}
         assert artifact.about(dataset.path) == dataset
+
+
+def test_a_dimension_of_another_length_in_each_group_is_named_with_its_group(tmp_path):
+    store.write(tmp_path / "a.h5", craft(), store.Origin(stage="look"))
+    held = store.flat(tmp_path / "a.h5")
+    data, specs = ({name: pair[place] for name, pair in held.items()} for place in (1, 0))
+    named = cpfls_cli.Artifact(craft(), store.Origin(stage="look"), data, specs).to_xarray()
+    for axis, length in {"yaw": 2, "roll": 4}.items():
+        assert dict(named[f"curves/{axis}/gain"].sizes) == {f"curves/{axis}/frequency": length, "axis": 3}
 
 
 def artifact_data(artifact):
@@ -86,8 +97,20 @@ def test_single_values_are_numbers_and_words(pipeline):
 
 
 def test_it_prints_what_info_prints(cpfls, pipeline):
-    followed = f"next:\n  cpfls check {pipeline.flight}\n"
-    assert f"{cpfls_cli.read(pipeline.flight)}\n{followed}" == cpfls("info", pipeline.flight, "-v").stdout
+    model = cpfls_cli.read(pipeline.model)
+    said = [" ".join(line.split()) for line in str(model).splitlines()]
+    told = {" ".join(line.split()) for line in cpfls("info", pipeline.model, "-v").stdout.splitlines()}
+    rows = [line for line in said if line.split(" ")[0] in model]
+    assert len(rows) == len(model)
+    assert set(rows) <= told
+
+
+def test_a_result_prints_shape_unit_and_meaning_of_every_dataset(pipeline):
+    flight = cpfls_cli.read(pipeline.flight)
+    lines = {line.split()[0]: " ".join(line.split()) for line in str(flight).splitlines() if line.strip()}
+    for name in flight:
+        about, shape = flight.about(name), "x".join(map(str, np.shape(flight[name]))) or "scalar"
+        assert lines[name] == " ".join(f"{name} {shape} {about.units} {about.description}".split())
 
 
 def test_it_is_written_again_byte_by_byte_and_never_over_a_file(pipeline, tmp_path):

@@ -11,6 +11,7 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import undrawn
 from tests.builders.evidence_artifacts import REASONS, with_evidence
 
@@ -221,13 +222,13 @@ def test_each_part_of_the_evidence_stands_alone(report, bare, tmp_path, model):
 
 @pytest.mark.usefixtures("undrawn", "data_of_figures")
 def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
-    prediction, output = read_artifact(pipeline.prediction), tmp_path / "banded.h5"
+    prediction, output = read_result(pipeline.prediction), tmp_path / "banded.h5"
     bands = {
-        f"{key}_{end}": prediction.array(key) + sign * 0.25
+        f"{key}_{end}": getattr(prediction, key) + sign * 0.25
         for key in ("inertia", "torque")
         for end, sign in (("low", -1), ("high", 1))
     }
-    write_artifact(output, replace(prediction, data={**prediction.data, **bands}))
+    with_fields(pipeline.prediction, output, **bands)
     page = json.loads(report(output, form="json").text)
     figures = {
         block["name"]: block for part in page["sections"] for block in part["blocks"] if block["kind"] == "figure"
@@ -240,7 +241,7 @@ def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
     ]
     assert len(drawn) == 3
     assert np.array(drawn[0]["high"]) - np.array(drawn[0]["low"]) == pytest.approx(0.5, rel=1e-3)
-    forms = [series["form"] for panel in figures["inertia-matrix-1"]["panels"] for series in panel["series"]]
+    forms = [series["form"] for panel in figures["predict-1-inertia-matrix"]["panels"] for series in panel["series"]]
     assert forms.count("band") == 4
 
 
@@ -259,4 +260,4 @@ def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipel
     full = {"solve/rank": model.number("solve/parameters"), "solve/condition_number": condition}
     write_artifact(known, replace(model, data={**model.data, **all_round, **full}))
     cpfls("predict", study, known, pipeline.flight, "-o", prediction)
-    assert told in section(report(known, prediction), "prediction")
+    assert told in section(report(known, prediction), "predict")

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html import unescape
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -9,26 +10,41 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import file_sha256, write_artifact
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
+from cpfls_cli.store import Origin
 from tests.builders import gap_artifacts as made
 from tests.builders.command_line import run
 from tests.builders.studies import VEHICLE
 
 FIGURES = [
-    "free-runs-1", "gap-picture-1", "gap-sizes-1", "prediction-error-1", "whiteness-1", "intervals-1",
-    "gap-over-time-1", "dependence-1", "heat-map-1", "replay-1",
+    "diagnose-1-free-runs", "diagnose-1-gap-picture", "diagnose-1-gap-sizes", "diagnose-1-playback",
+    "diagnose-1-whiteness", "diagnose-1-intervals", "compare-1-gap-over-time", "compare-1-dependence",
+    "compare-1-heat-map", "compare-1-playback",
 ]  # fmt: skip
+
+STAGES = {Diagnosis: "diagnose", Disagreement: "compare"}
+
+
+def written(path, given):
+    """Write an artifact or a result that is sound."""
+    if isinstance(given, Artifact):
+        assert check_artifact(given) == []
+        write_artifact(path, given)
+    else:
+        assert store.findings(given) == []
+        store.write(path, given, Origin(stage=STAGES[type(given)], seed=1, config="seed: 1\n"))
+    return path
 
 
 def shown(folder, *artifacts, options=()):
     """Write artifacts and a report about them; give its summary, its HTML and its text."""
     config, output = folder / "study.yaml", folder / "report.html"
     config.write_text("seed: 1\n" + VEHICLE)
-    paths = [folder / f"{number}-{each.spec.name.split('/')[1]}.h5" for number, each in enumerate(artifacts)]
-    for path, artifact in zip(paths, artifacts, strict=True):
-        assert check_artifact(artifact) == []
-        write_artifact(path, artifact)
+    paths = [written(folder / f"{number}.h5", each) for number, each in enumerate(artifacts)]
     result = run("report", config, *paths, "-o", output, "--json", "--force", *options)
     assert result.exit_code == 0, result.output
     html = output.read_text(encoding="utf-8")
@@ -41,17 +57,17 @@ def shown(folder, *artifacts, options=()):
 def full(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
     diagnosis = made.diagnosis(alone=[("torque_bias", 0.9)])
-    write_artifact(folder / "diagnosis.h5", diagnosis)
-    return shown(folder, made.disagreement(), diagnosis, made.extended(file_sha256(folder / "diagnosis.h5")))
+    path = written(folder / "diagnosis.h5", diagnosis)
+    return shown(folder, made.disagreement(), diagnosis, made.extended(file_sha256(path)))
 
 
 def test_the_answer_comes_first_and_every_figure_once(full):
     assert full.summary["sections"] == [
-        "summary", "model", "diagnosis", "extension", "disagreement", "sensors", "unseen", "vehicle", "provenance",
+        "summary", "model", "diagnose", "extension", "compare", "vehicle", "provenance",
     ]  # fmt: skip
     assert full.summary["figures"] == FIGURES
     assert full.summary["missing"] == []
-    first = full.text[: full.text.index("Before and after", full.text.index("What the model misses"))]
+    first = full.text[: full.text.index("why the forces decide")]
     for words in ("NAMED", "What the model misses is offset of the centre of mass.", made.SENTENCE, "97 % is gone",
                   "Held out two.csv", "Fitted to one.csv"):  # fmt: skip
         assert words in first, words
@@ -78,8 +94,11 @@ def test_numbers_of_the_artifacts_stand_in_the_tables(full):
     assert "moment of inertia about x 2.1 1.0 … 3.0 %" in full.text
     assert "1.0123" in full.text
     assert "two.csv roll torque 1.0 … 2.0 33.3" in full.text
-    for words in ("rotor 2 looks saturated.", "A note that readers need.", "Fly near the ground.", "12 ms"):
+    for words in ("one.csv: rotor 2 looks saturated", "A note that readers need."):
         assert full.text.count(words) == 1, words
+    # The comparison and the diagnosis say both of their own flights.
+    for words in ("Fly near the ground.", "12 ms"):
+        assert full.text.count(words) == 2, words
 
 
 def test_two_levels_with_two_names_are_explained(full):
@@ -92,25 +111,25 @@ def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
 
 
 def test_equal_artifacts_give_equal_pages(tmp_path):
-    given = made.without(made.diagnosis(), "run", "picture", "playback")
+    given = replace(made.diagnosis(), run=None, picture=None, playback=None)
     assert shown(tmp_path, given).html == shown(tmp_path, given).html
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
-    bare = made.without(made.diagnosis(force=False), "run", "picture", "whiteness", "playback")
+    bare = replace(made.diagnosis(force=False), run=None, picture=None, whiteness=None, playback=None)
     page = shown(tmp_path, bare)
-    assert page.summary["figures"] == ["gap-sizes-1", "intervals-1"]
+    assert page.summary["figures"] == ["diagnose-1-gap-sizes", "diagnose-1-intervals"]
     assert page.summary["missing"] == ["disagreement", "extended"]
     assert "too short to simulate" in page.text
     assert "cpfls compare CONFIG FLIGHT" in page.text
-    assert "force along" not in page.text[: page.text.index("Effects and their numbers")]
+    assert "force along" not in page.text[: page.text.index("effects and their numbers")]
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
-    page = shown(tmp_path, made.without(made.disagreement(force=False), "heat_map", "playback"))
-    assert page.summary["figures"] == ["gap-over-time-1", "dependence-1"]
+    page = shown(tmp_path, replace(made.disagreement(force=False), heat_map=None, playback=None))
+    assert page.summary["figures"] == ["compare-1-gap-over-time", "compare-1-dependence"]
     assert "The gap is largest in the torque about x (roll): 12.0 noise floors." in page.text
     assert "It follows thrust most." in page.text
     assert "cpfls diagnose" in page.text
@@ -121,7 +140,7 @@ def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     quiet = made.disagreement(**{"gap/floors": np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9])})
     page = shown(tmp_path, quiet)
     assert "Model and flights agree within the noise." in page.text
-    assert "dependence-1" not in page.summary["figures"]
+    assert "compare-1-dependence" not in page.summary["figures"]
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -138,8 +157,8 @@ def test_an_extended_model_alone_brings_its_figures(tmp_path):
 def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
     finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
     page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))
-    section = page.html[page.html.index('id="sensors"') :]
-    assert "The gyroscope shows 0.01 rad/s at rest. The diagnosis repairs it" in section
+    assert "SENSOR FAULT" in page.text
+    assert "The gyroscope shows 0.01 rad/s at rest. The diagnosis repairs it" in page.text
     assert "Not tested for gyro scale and misaligned IMU: no attitude." in page.text
     assert "without the faults of the sensors" in page.text
 

@@ -6,11 +6,12 @@ from unittest.mock import patch
 
 import pytest
 
-from cpfls_cli.artifacts.formats import record_of_format, records
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.formats import records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import diagnosis, disagreement, model
+from cpfls_cli.pages import model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
@@ -18,9 +19,8 @@ from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
-FROM_COMMANDS = ("flight", "model", "sweep")
-FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
+FROM_COMMANDS = ("model", "sweep")
+FORMATS = (*FROM_COMMANDS, "extended", "vehicle")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -28,10 +28,10 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 def told(cpfls, study, tmp_path_factory):
     """Every artifact of the tiny study, and what its command said of it."""
     folder = tmp_path_factory.mktemp("told")
-    paths = {name: folder / f"{name}.h5" for name in ("trajectory", *FROM_COMMANDS)}
+    paths = {name: folder / f"{name}.h5" for name in ("trajectory", "flight", *FROM_COMMANDS)}
     assert cpfls("trajectory", study, "-o", paths["trajectory"]).exit_code == 0
+    assert cpfls("simulate", study, paths["trajectory"], "-o", paths["flight"]).exit_code == 0
     given = {
-        "flight": ("simulate", study, paths["trajectory"]),
         "model": ("identify", study, paths["flight"]),
         "sweep": ("sweep", study, paths["flight"], "--set", "sweep.seeds=2"),
     }
@@ -61,11 +61,9 @@ def answered(told):
         if name == "vehicle":
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
             return source, tuple(model.answer(source))
-        made = getattr(gap_artifacts, name)()
-        source = source_of(
-            record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
-        )
-        return source, tuple(FROM_NUMBERS[name].answer(source))
+        made = gap_artifacts.extended()
+        source = source_of(ExtendedRecord.of_data(made.header, made.data), f"{name}.h5")
+        return source, tuple(model.answer(source))
 
     return of
 

@@ -2,7 +2,6 @@ import json
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -11,7 +10,8 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.report import paper_page
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact
+from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import run
 from tests.builders.studies import VEHICLE
 
@@ -36,8 +36,8 @@ report: {title: "<script>alert(1)</script> & a study"}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "comparison", "models", "model", "vehicle", "path", "flights", "reduction", "identification",
-    "validation", "replicates", "search", "partitions", "prediction", "rules", "provenance",
+    "summary", "comparison", "models", "model", "vehicle", "trajectory", "simulate", "simulate-2", "reduce",
+    "identification", "validation", "replicates", "search", "partitions", "predict", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -127,9 +127,10 @@ def test_everything_given_everything_shown(full):
     assert full.summary["bytes"] == full.output.stat().st_size < 3_000_000
     kinds = {re.sub(r"-\d+$", "", name) for name in full.summary["figures"]}
     assert kinds == {
-        "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction",
-        "convergence", "pareto-front", "ridge-curve", "figure-6-partitions", "figure-7-error", "torques",
-        "inertia-matrix", "replicates",
+        "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
+        "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "convergence", "pareto-front", "ridge-curve",
+        "figure-6-partitions", "predict-1-figure-7-error", "predict-1-torques", "predict-1-inertia-matrix",
+        "replicates",
     }  # fmt: skip
 
 
@@ -142,7 +143,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 @pytest.mark.usefixtures("undrawn")
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
-    assert summary["sections"] == ["summary", "vehicle", "flights", "provenance"]
+    assert summary["sections"] == ["summary", "vehicle", "simulate", "provenance"]
     assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html
@@ -199,9 +200,9 @@ def test_the_headline_says_who_wins_and_on_what(study, full):
 
 
 def test_the_tables_show_the_numbers_of_the_artifacts(study, full):
-    selection = read_artifact(study.selection)
-    for key in ("condition_number", "condition_number_full"):
-        assert f"{selection.number(key):.5g}" in full.page.text
+    selection = read_result(study.selection)
+    for number in (selection.condition_number, selection.condition_number_full):
+        assert f"{number:.5g}" in full.page.text
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -215,10 +216,9 @@ def test_the_paper_s_numbers_stand_beside_those_of_its_own_report_alone(study, f
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
-    selection = read_artifact(study.selection)
-    rank = int(selection.number("rank_full")) - 2
+    rank = read_result(study.selection).rank_full - 2
     broken = tmp_path / "broken.h5"
-    write_artifact(broken, replace(selection, data={**selection.data, "rank": rank, "condition_number": 7.0}))
+    with_fields(study.selection, broken, rank=rank, condition_number=7.0)
     _, html, _ = report(study, tmp_path, broken)
     text = Page(html).text
     assert f"rank deficient: rank {rank}" in text
@@ -227,20 +227,20 @@ def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_selections_from_one_flight_share_its_full_set(study, tmp_path):
+def test_selections_from_one_flight_have_a_section_each(study, tmp_path):
     smaller = tmp_path / "smaller.h5"
     cpfls("reduce", study.config, study.flight, "-o", smaller, "--set", "reduction.size=40")
     summary, html, _ = report(study, tmp_path, study.selection, smaller)
-    assert Page(html).text.count("flight.h5, full set") == 1
-    assert [name for name in summary["figures"] if name.startswith("figure-5")] == ["figure-5-reduction-1"]
+    assert Page(html).text.count("flight.h5, full set") == 2
+    assert [name for name in summary["sections"] if name.startswith("reduce")] == ["reduce", "reduce-2"]
+    assert [name for name in summary["figures"] if "figure-5" in name] == ["reduce-1-figure-5", "reduce-2-figure-5"]
 
 
 def test_samples_outside_the_excited_region_are_shaded_and_counted(study, tmp_path):
-    prediction = read_artifact(study.prediction)
-    outside = np.zeros(len(prediction.array("time")), dtype=np.uint8)
-    outside[10:17] = 1
+    beyond = np.zeros(len(read_result(study.prediction).time), dtype=bool)
+    beyond[10:17] = True
     marked = tmp_path / "marked.h5"
-    write_artifact(marked, replace(prediction, data={**prediction.data, "outside": outside}))
+    with_fields(study.prediction, marked, extrapolates=beyond, outside=7)
     shaded = [report(study, tmp_path, path, options=("--force",))[1] for path in (study.prediction, marked)]
     assert [html.count("#f3d9b8") > 0 for html in shaded] == [False, True]
     assert "7 of 275 samples outside" in Page(shaded[1]).text
@@ -260,7 +260,7 @@ def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tm
     shutil.copy(study.flight, copy)
     shutil.copy(study.noisy, other)
     summary, html, result = report(study, tmp_path, study.flight, copy, other)
-    assert len([name for name in summary["figures"] if name.startswith("figure-4")]) == 2
+    assert len([name for name in summary["figures"] if name.endswith("-torque")]) == 2
     assert "shown once" in result.stderr
     assert {f"{path.parent.name}/flight.h5" for path in (study.flight, other)} <= set(
         re.findall(r"\w+/flight\.h5", html)

@@ -8,6 +8,7 @@ import pytest
 from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.report.content import Document, Listing, Section
 from cpfls_cli.report.markdown import markdown_page
+from tests.builders.artifacts import read_result
 from tests.builders.command_line import undrawn
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
@@ -70,7 +71,7 @@ def test_all_forms_hold_the_same_sections_figures_and_tables(report, as_json):
     html, markdown = report("a.html")[0], report("a.md")[0]
     assert [section["name"] for section in page["sections"]] == summary["sections"]
     assert re.findall(r'<section id="([^"]+)"', html) == summary["sections"]
-    assert re.findall(r'^<a id="([^"]+)"></a>$', markdown, re.MULTILINE) == summary["sections"]
+    assert re.findall(r'^<a id="([^"]+)"></a>\n\n## ', markdown, re.MULTILINE) == summary["sections"]
     assert [figure["name"] for figure in blocks(page, "figure")] == summary["figures"]
     assert re.findall(r"^> Figure `([^`]+)`", markdown, re.MULTILINE) == summary["figures"]
     assert sorted(table["name"] for table in blocks(page, "table")) == sorted(summary["tables"])
@@ -81,14 +82,14 @@ def test_the_json_form_holds_what_the_figures_draw(as_json, pipeline):
     page, _ = as_json
     figures = {figure["name"]: figure for figure in blocks(page, "figure")}
     assert all(panel["series"] for figure in figures.values() for panel in figure["panels"])
-    flight = read_artifact(pipeline.flight)
-    panels = figures["figure-4-torque-1"]["panels"]
+    flight = read_result(pipeline.flight)
+    panels = figures["simulate-1-torque"]["panels"]
     assert [panel["title"] for panel in panels] == ["torque on roll", "torque on pitch", "torque on yaw"]
     for axis, panel in enumerate(panels):
         (curve,) = panel["series"]
         assert (panel["x_label"], panel["y_label"]) == ("time, s", "N m")
-        assert curve["x"] == pytest.approx(flight.array("time"), rel=1e-5)
-        assert curve["y"] == pytest.approx(flight.array("torque")[:, axis], rel=1e-5, abs=1e-12)
+        assert curve["x"] == pytest.approx(flight.time, rel=1e-5)
+        assert curve["y"] == pytest.approx(flight.torque[:, axis], rel=1e-5, abs=1e-12)
 
 
 def test_the_json_form_says_where_everything_comes_from(as_json, pipeline):

@@ -65,7 +65,7 @@ def test_every_claim_and_every_figure_has_its_line(folder):
     assert [row[0].split(":")[0] for row in table_cells(html, "figures-of-the-paper")[1:]] == [
         f"Figure {number}" for number in range(1, 8)
     ]
-    assert html.count('href="#figures-of-the-paper"') == len([n for n in summary.figures if re.match(r"figure-\d", n)])
+    assert html.count('href="#figures-of-the-paper"') == len(re.findall(r"<figcaption>Figure \d", html)) >= 3
 
 
 def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, folder):

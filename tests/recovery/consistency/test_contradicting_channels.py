@@ -303,7 +303,7 @@ def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flight
     assert "low-passed, by import.lowpass_hz or earlier: attitude at about 1" in filtered.notes[0]
     assert "Use raw logs" in filtered.notes[0]
     assert not any("low-passed" in note for note in raw.notes)
-    ratio = filtered.floor / raw.floor
+    ratio = filtered.gap.floor / raw.gap.floor
     assert np.all((ratio > 0.6) & (ratio < 2.0))
 
 

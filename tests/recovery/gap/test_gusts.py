@@ -92,7 +92,7 @@ def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown):
     recordings = recorded(along_x, stated, setpoints=True)
     run = diagnosed(recordings)
     told = run.diagnosis
-    refit = extend(recordings[:3], recordings[3:], told.effects, run.audit, FEW, None, told.floor)
+    refit = extend(recordings[:3], recordings[3:], told.effects, run.audit, FEW, None, told.gap.floor)
     for estimates in (run.estimates, refit.estimates):
         numbers = {each.name: each for each in estimates.parameters}
         assert -0.1 < numbers["inertia_x"].low < 0 < numbers["inertia_x"].high < 0.1

@@ -69,6 +69,6 @@ def test_the_share_that_is_explained_is_that_of_still_air(found):
 def test_gusts_alone_do_not_come_again_and_have_their_size(found, name):
     """But for a fifth of theirs that is faster than the windows, or slower than a flight."""
     alone = found[name]
-    assert alone.channels == []
+    assert alone.repeating == []
     assert max(alone.at_most(channel) for channel in range(6)) < 0.3
     assert alone.does_not[:3] == pytest.approx(np.array(SETS[name][1]), rel=0.2)

@@ -177,10 +177,10 @@ def test_extension_refits_and_shrinks_the_unseen_gap():
     assert (before > 3).all()
     assert (after < 1.4).all()
     shown = before_after(held, held, found.unseen, found.model, SETTINGS)
-    assert shown.picture.flight == 0
+    assert shown.picture.flight == held[0].name
     error = {name: np.ptp(getattr(shown.picture, name) - shown.picture.measured) for name in ("before", "after")}
     assert error["after"] < 0.3 * error["before"]
-    assert (shown.white_after.p_value[:3] > shown.white_before.p_value[:3]).all()
+    assert (shown.whiteness.p_value_after[:3] > shown.whiteness.p_value_before[:3]).all()
 
 
 def rerun(draw, extra=None):
