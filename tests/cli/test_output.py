@@ -24,9 +24,9 @@ def test_an_input_is_never_the_output(refuse, pipeline, study, tmp_path):
     message = "is an input of this command; -o must name another file"
     link = tmp_path / "link.h5"
     link.symlink_to(pipeline.flight)
-    for output in (pipeline.flight, link):
-        words = ("reduce", study, pipeline.flight, "-o", output, "--force")
-        assert refuse(*words) == [f"{output}: {message}"]
+    words = ("reduce", study, pipeline.flight, "--force", "-o")
+    assert refuse(*words, pipeline.flight) == [f"{pipeline.flight}: {message}"]
+    assert refuse(*words, link) == [f"{link}: is a symbolic link to {pipeline.flight}; -o names the file itself"]
     words = ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", pipeline.selection, "--force")
     assert refuse(*words) == [f"{pipeline.selection}: {message}"]
 
@@ -116,7 +116,7 @@ def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
     assert "unknown key" in refuse("trajectory", study, *words, "--set", "vehicle.mass=1")[0]
     for command in ("simulate", "reduce", "identify"):
         assert "this command needs a" in refuse(command, study, pipeline.model, *words)[0]
-    assert "this command needs a" in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
+    assert "not known to this command" in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
 
 
 def test_no_file_that_a_command_reads_is_its_output(refuse, pipeline, study, tmp_path):

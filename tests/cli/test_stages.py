@@ -270,7 +270,7 @@ def test_info_check_and_report_know_results(cpfls, looked):
 def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
     log = looked.parents[1] / "log.csv"
     for words, message in (
-        (("export", looked, "-o", "x.json"), "`cpfls info` shows what it holds"),
+        (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a cpfls/model"),
         (("look", looked), "is an artifact of this program"),
         (("look", log, "-o", "x.html"), "-o x\n"),
         (("look", log, "-o", "out"), "--force"),
