@@ -63,7 +63,7 @@ def test_json_has_every_promised_key(found):
     assert promised <= set(found.summary)
     assert {"where", "playback", "contradictions", "warnings"} <= set(found.summary)
     assert found.summary["where"]["channels"] == ["torque y", "torque x"]
-    assert {"parameters", "split", "extended", "disagreement"} <= set(found.summary)
+    assert {"parameters", "split", "extension", "disagreement"} <= set(found.summary)
     assert set(found.summary["effects"][0]) == {
         "name", "coefficients", "p_value", "share", "selection_frequency", "sentence",
     }  # fmt: skip

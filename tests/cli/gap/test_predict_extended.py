@@ -11,7 +11,7 @@ from cpfls_cli import store
 from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights import flight_source
-from cpfls_cli.flights.flight import Flight, Simulated
+from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.store import read, write
 from cpfls_cli.vehicle.rotors import body_wrench
 
@@ -58,7 +58,7 @@ def test_a_flight_without_attitude_is_refused(cpfls, refuse, gap_config, extende
 
 
 def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, flown, tmp_path, monkeypatch):
-    record, origin = read(flown, Simulated)
+    record, origin = read(flown, Imported)
     times = 2 * PART // len(record.time) + 1
     tiled = {name: np.concatenate([values] * times) for name, values in record.signals.items()}
     tiled["time"] = record.time[1] * np.arange(len(tiled["body_rate"]))

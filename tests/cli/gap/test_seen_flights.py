@@ -73,12 +73,3 @@ def test_replay_and_compare_warn_of_flights_seen(
     part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that says nothing"
     assert part in result.stdout
     assert "flight_5.csv: extended.h5" not in result.stdout
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_only_what_the_command_reads_is_asked_for(cpfls, gap_config, extended, tmp_path):
-    page = tmp_path / "page.md"
-    assert cpfls("report", gap_config, extended, "-o", page).exit_code == 0
-    needs = [line for line in page.read_text().splitlines() if line.startswith("# needs")]
-    assert len(needs) == 1
-    assert needs[0].startswith("# needs diagnosis.h5, sha256 ")
