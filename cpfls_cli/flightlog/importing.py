@@ -147,8 +147,7 @@ def read_signals(
     converted = to_program_frames(on_clock, settings)
     if "attitude" in setpoints and "attitude" in converted:
         # A full turn beside the vehicle's own is the same.
-        away = rotations.wrapped(setpoints["attitude"] - converted["attitude"])
-        setpoints["attitude"] = converted["attitude"] + away
+        setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
     return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 
 
