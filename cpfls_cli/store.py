@@ -20,7 +20,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.check import Origin as Origin
-from cpfls_cli.artifacts.check import dataset_of, held_format, old_file, opened_file, origin_of
+from cpfls_cli.artifacts.check import dataset_of, held_format, opened_file, origin_of, other_version
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
@@ -241,7 +241,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
             made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
         if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
-            raise old_file(path, file)
+            raise other_version(path, file)
         origin, missing = origin_of(file), list[str]()
         given = _read(kind, file, missing, rows)
     if missing:

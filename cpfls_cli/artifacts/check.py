@@ -285,12 +285,8 @@ def _identify(path: Path, file: h5py.File) -> Format:
         raise InputError(f"{path}: the root attribute 'schema_version' is missing or not a number")
     if version < 1:
         raise InputError(f"{path}: schema_version = {version}: damaged; versions count from 1")
-    if version > SCHEMA_VERSION:
-        raise InputError(
-            f"{path}: schema_version = {version}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
-        )
-    if version < SCHEMA_VERSION:
-        raise old_file(path, file)
+    if version != SCHEMA_VERSION:
+        raise other_version(path, file)
     known = record_of_format(name, _text_attribute(file, "kind") or "")
     if known is None:
         where = "command; `cpfls info` shows what it holds" if stage_module(file.attrs) else "cpfls"
@@ -314,8 +310,13 @@ _MAKERS = {
 """Commands that made files of earlier versions, by kind or format, where they are not called alike."""
 
 
-def old_file(path: Path, file: h5py.File) -> InputError:
-    """Say of a file of an earlier version which command makes it again."""
+def other_version(path: Path, file: h5py.File) -> InputError:
+    """Say of a file of a newer version that it is one, and of an earlier one which command makes it again."""
+    schema = file.attrs.get("schema_version")
+    if isinstance(schema, int | np.integer) and schema > SCHEMA_VERSION:
+        return InputError(
+            f"{path}: schema_version = {schema}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
+        )
     version = file.attrs.get("cpfls_version", "1")
     name = str(file.attrs.get("kind", "") or file.attrs.get("format", "")).removeprefix("cpfls/")
     return InputError(

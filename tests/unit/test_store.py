@@ -335,3 +335,9 @@ def test_a_model_of_a_vehicle_is_written_with_all_its_parts(tmp_path, name):
     assert all(map(np.array_equal, given.fuzzy.partitions, fuzzy.partitions))
     assert repr(given.repairs) == repr(audit)
     assert plain(given)["effects"][-1] == {"name": "battery_sag", "shape": {"exponent": 1.5}, "coefficients": []}
+
+
+def test_a_file_of_a_newer_version_is_said_to_be_one(written):
+    changed(written, lambda file: file.attrs.modify("schema_version", 9))
+    with pytest.raises(InputError, match="schema_version = 9: written by a newer cpfls; this one reads up to"):
+        store.read(written, Craft)
