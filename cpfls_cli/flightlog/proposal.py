@@ -74,7 +74,7 @@ class Proposal:
     airframe: Airframe | None  # None where neither parameters nor motion tell the rotors.
     rotors: int  # Number of rotors; 0 where no columns are theirs.
     speed_max: float  # Round number above the largest rotor speed, rad/s.
-    facts: tuple[str, ...]  # That the logs state beside.
+    facts: tuple[str, ...]  # What else the logs state.
     equal: tuple[str, ...]  # Names of the logs whose rotors carry what those of the first one do.
     warnings: tuple[str, ...]
 
@@ -121,7 +121,12 @@ def propose(
         )
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
-    signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
+    signals = _merged_signals(logs)
+    slowest = max(one.recognition.slowest_s for one in logs)
+    others = max(one.recognition.slowest_but_voltage_s for one in logs)
+    if slowest > max(_SLOWEST_VOLTAGE_S, others):
+        # A voltage that would make gaps of all signals long is left out.
+        signals, slowest = tuple(guess for guess in signals if guess.signal != "voltage"), others
     if mass_kg is not None and arm_m is not None:
         signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
     airframe, doubts = airframe_of(logs)
@@ -228,8 +233,8 @@ def _setpoint_of_all(
             shared.append((one, guess))
         else:
             rivals.append(Rival(f"columns: [{', '.join(guess.columns.columns)}]", f"what {one.name} follows"))
-    told = replace(kept, sure="guess", rivals=(*kept.rivals, *rivals)) if rivals else kept
-    return (first, told), [(one, told if one is first else guess) for one, guess in shared]
+    own = replace(kept, sure="guess", rivals=(*kept.rivals, *rivals)) if rivals else kept
+    return (first, own), [(one, own if one is first else guess) for one, guess in shared]
 
 
 def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequence[str]) -> Guess:
@@ -246,14 +251,18 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
 def _require_same_map(
     name: SignalName, surest: tuple[KnownLog, Guess], others: Sequence[tuple[KnownLog, Guess]]
 ) -> None:
-    """Refuse two maps of a signal that both logs are sure of."""
+    """Refuse two maps of a signal that both logs are sure of; ranges of commands may be next to the same."""
     first, kept = surest
-    sure = [(one, guess) for one, guess in others if "guess" not in (guess.sure, kept.sure)]
     own = replace(kept.columns, required=True)
-    read = [(one, _as_read(replace(guess.columns, required=True), own)) for one, guess in sure]
-    for second, columns in read:
-        if columns == own:
-            continue
+    read = []
+    for one, guess in others:
+        columns = replace(guess.columns, required=True)
+        apart = np.abs(np.subtract(_span(columns), _span(own))).max()
+        if columns.unit == own.unit == "1" and apart < _SAME_RANGE * np.ptp(_span(own)):
+            columns = replace(columns, scale=own.scale, offset=own.offset)
+        read += [(one, columns)] if "guess" not in (guess.sure, kept.sure) else []
+    second, columns = next(((one, columns) for one, columns in read if columns != own), (first, own))
+    if columns != own:
         maps = [
             f"{', '.join(each.columns)} in {_unit_in_words(each)} (sign {each.sign or 'as logged'}) in {one.name}"
             for one, each in ((first, own), (second, columns))
@@ -262,13 +271,6 @@ def _require_same_map(
             f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both:"
             f" {_way_on(read)}"
         )
-
-
-def _as_read(columns: SignalMap, first: SignalMap) -> SignalMap:
-    """Give a map with the scale and offset of the first one, where the ranges of commands are next to the same."""
-    apart = np.abs(np.subtract(_span(columns), _span(first))).max()
-    same = columns.unit == first.unit == "1" and apart < _SAME_RANGE * np.ptp(_span(first))
-    return replace(columns, scale=first.scale, offset=first.offset) if same else columns
 
 
 def _span(columns: SignalMap) -> tuple[float, float]:
@@ -313,15 +315,6 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
     return tuple(merged)
 
 
-def _without_slow_voltage(logs: Sequence[KnownLog], signals: tuple[Guess, ...]) -> tuple[tuple[Guess, ...], float]:
-    """Leave a voltage out that would make gaps of all signals long; give the longest step of the others too."""
-    slow = max(one.recognition.slowest_s for one in logs)
-    others = max(one.recognition.slowest_but_voltage_s for one in logs)
-    if slow > max(_SLOWEST_VOLTAGE_S, others):
-        return tuple(guess for guess in signals if guess.signal != "voltage"), others
-    return signals, slow
-
-
 def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float) -> Guess:
     """Let the mass that rotors carry tell rad/s from rpm, where the size of their speeds does not."""
     if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
@@ -346,31 +339,27 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
     ratio, measured = heavy.size / light.size, first.recognition.signal("rotor_speed") is not None
     if not _apart(light, heavy, measured):
         return []
-    lighter, heavier = first.name, last.name
-    more = f"{100 * (ratio - 1):.0f} %"
+    more, what = f"{100 * (ratio - 1):.0f} %", "squared speeds" if measured else "squared commands"
     masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other weighs {mass_kg:.3g} kg"
     battery = "" if measured else ", or its battery is lower"
-    what = "squared speeds" if measured else "squared commands"
     return [
-        f"{lighter} and {heavier}: in flight the {what} of the rotors are {more} higher in {heavier}, so with equal"
-        f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls init"
-        " for each of them with its own --mass"
+        f"{first.name} and {last.name}: in flight the {what} of the rotors are {more} higher in {last.name}, so with"
+        f" equal propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls"
+        " init for each of them with its own --mass"
     ]
 
 
 def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
-    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others.
+    """Sort logs by what their rotors carry; none where that is known by speeds of some and commands of others.
 
     What squared commands, or speeds without an accelerometer, tell of a flight that does not hover is how it is flown.
     """
-    measured = {one.recognition.signal("rotor_speed") is not None for one in logs}
+    measured = {one.name: one.recognition.signal("rotor_speed") is not None for one in logs}
     loads = [(one.recognition.load, one) for one in logs]
     known = [
-        (load, one)
-        for load, one in loads
-        if load is not None and (load.steady or (load.sensed and one.recognition.signal("rotor_speed") is not None))
+        (load, one) for load, one in loads if load is not None and (load.steady or (load.sensed and measured[one.name]))
     ]
-    return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len(measured) == 1 else []
+    return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len({*measured.values()}) == 1 else []
 
 
 def _apart(light: Load, heavy: Load, measured: bool) -> bool:
@@ -421,14 +410,13 @@ def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
     """Round up what is somewhat above the largest speed; for commands any number will do, and 1000 is taken."""
-    largest = 0.0
-    units = {guess.signal: guess.columns.unit for guess in signals}
+    largest, units = 0.0, {guess.signal: guess.columns.unit for guess in signals}
     unit = units.get("rotor_speed", units.get("rotor_command", "1"))
-    for one in logs:
-        if one.recognition.speeds is not None and unit != "1":
-            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
+    for one in logs if unit != "1" else ():
+        if one.recognition.speeds is not None:
             guessed = one.recognition.signal("rotor_speed")
             changed = guessed is not None and guessed.columns.unit == "rad/s" and unit == "rpm"
+            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
             largest = max(largest, own * (known_unit("rpm").factor if changed else 1.0))
     return _rounded_up(_ROOM * largest) if largest else 1000.0
 

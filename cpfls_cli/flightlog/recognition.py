@@ -99,27 +99,26 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     if not candidates and log.flat:
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
-        clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
-        if clocks:
-            log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
-            names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
-            raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
-        if system and not log.flat:
-            raise InputError(f"holds only {some([*topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight")
-        shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
-        raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
+        raise InputError(_nothing_found(log, named, system))
     refuse_dead_rotors(log, named, candidates)
     log, candidates, ended = _live_part(log, candidates)
     make_grid(log, candidates)
-    columns = {str(name): [(own, own.group.columns) for own in candidates.get(name, ())] for name in ROTORS}
     found = {
-        name: [(own, log.values(each)[0], log.without_spikes(each)) for own, each in held]
-        for name, held in columns.items()
+        str(name): [
+            (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
+            for own in candidates.get(name, ())
+        ]
+        for name in ROTORS
     }
     rotors = find_rotors(found, parameters, system)
-    rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
+    rotors = rotors if rotors.driving else find_mixed(log) or rotors
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
-    shares = _shares(log, rotors)
+    shares = None
+    if rotors.driving:
+        # Commands or speeds on the clock, shape (time, rotor), as shares; 0 where rotors stand.
+        own = rotors.command or rotors.driving
+        logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
+        shares = rotor_shares(logged, shares=own is rotors.command)
     flown = find_flown(_signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
         raise InputError(flown.reasons[0])
@@ -127,12 +126,10 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if kind is None else [flown.reasons[-1]]
-    seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
+    seen.warnings += [log.time_doubt] if log.time_doubt else []
     position_by_velocity(seen)
     verdict = read_attitude(seen)
-    if verdict is not None and gyroscope_first(
-        seen, verdict.best, rotors.speed or rotors.command, rotors.speed is None
-    ):
+    if verdict is not None and gyroscope_first(seen, verdict.best, rotors.driving):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
     take_places(seen, reading)
@@ -141,15 +138,30 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    _take_voltage(seen)
+    if (voltage := seen.first("voltage")) is not None:
+        level = float(np.median(seen.grid(voltage)))
+        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
+        seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
     speeds, moved = _take_rotors(seen, rotors)
     _take_wrench(seen)
     _doubt_columns(seen)
     take_setpoints(seen, parameters, system)
     _list_unused(seen)
-    driving = rotors.speed or rotors.command
-    taken = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+    taken = _gathered(seen, flown, speeds, moved, rotors.driving.kind if rotors.driving else "")
     return replace(taken, winged=winged, rebuilt=rebuilt)
+
+
+def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
+    """Say why a log without a column that is recognised is refused."""
+    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+    if clocks:
+        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+        return f"no flight in it: {names} never change, or hold too few samples for a flight"
+    if system and not log.flat:
+        return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
+    shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
+    return f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}"
 
 
 def _live_part(
@@ -170,15 +182,6 @@ def _live_part(
     part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
     return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
-
-
-def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
-    """Give the rotors' commands or speeds on the clock, shape (time, rotor), as shares; 0 where they stand."""
-    found = rotors.command or rotors.speed
-    if found is None:
-        return None
-    values = log.on_grid(found.columns.columns, spikes=False)
-    return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
@@ -232,9 +235,6 @@ def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
     return replace(flown, span_s=(round(begin, 2), round(end, 2)), reasons=(*flown.reasons, reason))
 
 
-# Frames.
-
-
 def _take_frames(seen: Seen, reading: Reading | None) -> None:
     """Choose the frames: from the lean, from the accelerometer, from the kind of log, or as usual."""
     leading = [found[0] for found in seen.candidates.values() if found]
@@ -261,9 +261,6 @@ def _take_frames(seen: Seen, reading: Reading | None) -> None:
     seen.choose("world_frame", world, reason, "guess" if body is None else body.sure)
 
 
-# What drives it.
-
-
 def _take_wrench(seen: Seen) -> None:
     """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
     torque, thrust, rate = seen.first("body_torque"), seen.first("thrust"), seen.guesses.get("body_rate")
@@ -273,7 +270,14 @@ def _take_wrench(seen: Seen) -> None:
         seen.left_out.append(f"{torque.group.pattern}: looks like a commanded torque; the rotors say more")
         return
     turning = first_derivative(seen.log.on_grid(rate.columns.columns)[seen.part], seen.rate_hz)
-    shares = [_follows(turning, seen.grid(torque), late, seen.rate_hz) for late in _LATE_S]
+    shares = []
+    for steps in (round(late * seen.rate_hz) for late in _LATE_S):
+        # Of roll and pitch, some time after the torque.
+        pair = (turning[steps:], seen.grid(torque)[: len(turning) - steps])
+        own, other = (slow(each, seen.rate_hz, _TORQUE_HZ) for each in pair)
+        moves = own.std(axis=0) * other.std(axis=0) != 0
+        both = [float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) if moves[axis] else 0.0 for axis in range(2)]
+        shares.append(both)
     share = largest(shares, min)
     if not min(share) > _FOLLOWS:
         seen.left_out.append(f"{torque.group.pattern}: looks like a torque, but the motion does not follow it")
@@ -289,33 +293,14 @@ def _take_wrench(seen: Seen) -> None:
         seen.take(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
 
 
-def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> list[float]:
-    """Correlate angular acceleration with a torque some time before, about roll and pitch."""
-    steps = round(late_s * rate_hz)
-    own = slow(turning[steps:], rate_hz, _TORQUE_HZ)
-    other = slow(torque[: len(torque) - steps], rate_hz, _TORQUE_HZ)
-    still = own.std(axis=0) * other.std(axis=0) == 0
-    return [0.0 if still[axis] else float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
-
-
-def _take_voltage(seen: Seen) -> None:
-    voltage = seen.first("voltage")
-    if voltage is None:
-        return
-    level = float(np.median(seen.grid(voltage)))
-    scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
-    reason = f"{called(voltage)}; {level * scale:.3g} V in flight"
-    seen.take(voltage, "V", reason, "named", scale=scale, required=False)
-
-
 def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
     seen.left_out += rotors.left_out
     seen.warnings += rotors.warnings
     speeds = None
     for found in (rotors.command, rotors.speed):
         if found is not None:
-            seen.guesses[found.guess.signal] = found.guess
-            speeds = seen.mapped(found.guess)
+            seen.guesses[found.signal] = found
+            speeds = seen.mapped(found)
             if found is rotors.command and rotors.command_is is not None and rotors.command_is.value == "thrust":
                 speeds = np.sqrt(np.maximum(speeds, 0.0))
     if rotors.command_is is not None:
