@@ -1,6 +1,7 @@
 """Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,12 +25,7 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 
     Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
 
-    Parameters
-    ----------
-    signals : LogSignals
-        Not yet filtered.
-    delay_share : float
-        Leading share of the samples that the estimate looks at.
+    The signals are not yet filtered, and an estimate looks at a leading share of their samples.
     """
     estimate = _estimate(signals, settings, delay_share) if settings.delay_s == "estimate" else None
     delay = estimate.delay_s if estimate else float(settings.delay_s)
@@ -54,14 +50,14 @@ def _estimate(signals: LogSignals, settings: ImportSettings, share: float) -> De
 
 
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
-    sentences = []
-    if estimate.at_bound:
-        sentences.append("the estimated delay is the longest one tried; raise import.delay_max_s")
-    if estimate.pooled_r2 < _POOR_R2:
-        sentences.append(f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque")
-    if (estimate.inertia[:3] < 0).any():
-        sentences.append("at the estimated delay, a moment of inertia is negative; check signs and axes")
-    return tuple(sentences)
+    poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
+    odd = "at the estimated delay, a moment of inertia is negative; check signs and axes"
+    sentences = (
+        (estimate.at_bound, "the estimated delay is the longest one tried; raise import.delay_max_s"),
+        (estimate.pooled_r2 < _POOR_R2, poor),
+        ((estimate.inertia[:3] < 0).any(), odd),
+    )
+    return tuple(sentence for holds, sentence in sentences if holds)
 
 
 def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSignals:
@@ -85,8 +81,7 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
 
 
-@dataclass(frozen=True)
-class _Fit:
+class _Fit(NamedTuple):
     """Regression of the shifted torque on the columns of a rigid body."""
 
     window: slice
@@ -128,23 +123,18 @@ def estimate_delay(
     window, each axis scaled by its own standard deviation. Delays are judged by the geometric mean, over the axes, of
     the share of torque that stays unexplained: the likelihood where every axis has noise of its own size, so that an
     axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
-    sample is refined between its neighbours.
+    sample is refined between its neighbours (section 8 of the method's description).
 
     Parameters
     ----------
     time : array, shape (time,), s
         Uniform.
-    body_rate : array, shape (time, 3), rad/s, body frame
-    body_torque : array, shape (time, 3), N m, body frame
-        As commanded, or as computed from the rotors.
+    body_rate, body_torque : array, shape (time, 3), rad/s and N m, body frame
+        The torque as commanded, or as computed from the rotors.
     delay_max_s : float
         Longest delay tried, s.
     share : float
         Leading share of the samples that is looked at, so that data held out for a test stay unseen.
-
-    References
-    ----------
-    Section 8 of the method's description.
     """
     from scipy.optimize import minimize_scalar
 

@@ -64,7 +64,6 @@ def import_log(
     Parameters
     ----------
     columns : mapping from str to array, shape (sample,)
-        The log.
     rotor_torque : callable, optional
         Body torque, array of shape (time, 3), N m, FLU, from the signals of the rotors; called where
         `torque_source` names the rotors.
@@ -116,11 +115,14 @@ def read_signals(
     setpoints, unknown = _setpoints(asked, clock, mapped)
     slow = slow_signals(table, stamped_hz)
     filtered = cut_offs(on_clock, rate_hz, slow)
+    unit = settings.time_unit
+    too_fast = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
     warnings = (
         *(*cut, *broken, *warn_of_values(counts), *warn_of_dead(table, tuple(counts["saturated"]), settings)),
         *(*warn_of_rest(table, resting, settings), *warn_of_slow(slow, rate_hz), *warn_of_cut_offs(filtered, settings)),
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *(*_warn_of_clock(rate_hz, settings), *warn_of_angles(read.signals), *unknown),
+        *([too_fast] if rate_hz >= _FASTEST_HZ else []),
+        *(*warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     report = ImportReport(
@@ -174,26 +176,13 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
     return time[0] + period * np.arange(samples), 1 / period
 
 
-def _warn_of_clock(rate_hz: float, settings: ImportSettings) -> list[str]:
-    unit = settings.time_unit
-    words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
-    return [words] if rate_hz >= _FASTEST_HZ else []
-
-
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
     """Filter all signals alike and derive rates, accelerations and torques.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
     between the raw ones. The result is interpolated to `rate_hz` last. Setpoints stay as they were asked for.
 
-    Parameters
-    ----------
-    signals : LogSignals
-        With the body torque, aligned.
-
-    References
-    ----------
-    Section 1 of the method's description.
+    The signals are aligned and have the body torque (section 1 of the method's description).
     """
     filtered: dict[str, Any] = {
         name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)

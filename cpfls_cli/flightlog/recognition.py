@@ -314,7 +314,7 @@ def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedB
     moved = airframe_from_motion(body, speeds, seen.rate_hz, rotors.speed is None)
     if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or _open_rotors(seen)):
         # Whose axes are not known says left for right.
-        moved = replace(moved, clear=False, airframe=replace(moved.airframe, sure="guess"))
+        moved = moved._replace(clear=False, airframe=replace(moved.airframe, sure="guess"))
     return speeds, moved
 
 
