@@ -7,19 +7,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog.crash import (
-    ALIVE,
-    LIVELY_RAD_S,
-    SLOW_S,
-    Resting,
-    Signs,
-    averaged,
-    ended_early,
-    resting,
-    smoothed,
-    turns_over,
-    upright_of,
-)
+from cpfls_cli.flightlog import crash
+from cpfls_cli.flightlog.crash import ALIVE, LIVELY_RAD_S, SLOW_S, Resting, Signs, averaged, smoothed
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
@@ -113,8 +102,7 @@ def warn_of_end(table: SignalTable, settings: ImportSettings) -> tuple[str, ...]
 
 def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
     """Find what flies by the signals that a config maps, on the clock of the log."""
-    rows, _ = increasing_rows(table.time)
-    table = table.rows(rows)
+    table = table.rows(increasing_rows(table.time)[0])
     live, ended = live_rows(table, 0.0)
     table = table.rows(live)
     if len(table.time) < _FEWEST_ROWS:
@@ -129,19 +117,16 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
         if name in table.signals and np.isfinite(table.signals[name]).any(axis=0).all()
     }
     name = next((name for name in ROTORS if name in known), None)
-    rotors = None if name is None else rotor_shares(known[name], shares=settings.signals[name].unit == "1")
     up = 1.0 if settings.world_frame == "ENU" else -1.0
-    senses = settings.acceleration_frame == "body-specific-force"
-    flown = find_flown(
-        Signs(
-            time=clock,
-            rotors=rotors,
-            height=up * known["position"][:, 2] if "position" in known else None,
-            body_rate=known.get("body_rate"),
-            upright=upright_of(known.get("attitude"), known.get("quaternion"), settings.quaternion_order),
-            force=known.get("acceleration") if senses else None,
-        )
+    signs = Signs(
+        time=clock,
+        rotors=rotor_shares(known[name], shares=settings.signals[name].unit == "1") if name else None,
+        height=up * known["position"][:, 2] if "position" in known else None,
+        body_rate=known.get("body_rate"),
+        upright=crash.upright_of(known.get("attitude"), known.get("quaternion"), settings.quaternion_order),
+        force=known.get("acceleration") if settings.acceleration_frame == "body-specific-force" else None,
     )
+    flown = find_flown(signs)
     return flown.within(ended, (float(clock[0]), float(clock[-1])))
 
 
@@ -149,21 +134,25 @@ def find_flown(signs: Signs) -> FlownPart:
     """Find the stretches of a log that are flown, and the longest of them."""
     signs = signs.slower(_MOST_CLOCK_HZ)
     signs = replace(signs, body_rate=None) if _dead_rates(signs) else signs
-    active, told = _active(signs)
+    active, how = _active(signs)
     if active is None:
-        return FlownPart(None, (told,), flies=False)
-    if turns_over(signs, active):
+        return FlownPart(None, (how,), flies=False)
+    if crash.turns_over(signs, active):
         why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
-        return FlownPart(None, (f"no flight in it: {why}: it stands, and the attitude is wrong",), flies=False)
-    rests = resting(signs, active)
+        return _no_flight(f"{why}: it stands, and the attitude is wrong")
+    rests = crash.resting(signs, active)
     active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
     if not active.any():
-        return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
+        return _no_flight(f"{how} throughout")
     if _still(signs, active):
-        return FlownPart(None, ("no flight in it: the vehicle neither turns nor moves",), flies=False)
+        return _no_flight("the vehicle neither turns nor moves")
     if held := _held(signs, active):
-        return FlownPart(None, (f"no flight in it: {held}, as on a test stand",), flies=False)
-    return _longest(signs, active, rests, told)
+        return _no_flight(f"{held}, as on a test stand")
+    return _longest(signs, active, rests, how)
+
+
+def _no_flight(why: str) -> FlownPart:
+    return FlownPart(None, (f"no flight in it: {why}",), flies=False)
 
 
 def _active(signs: Signs) -> tuple[BoolArray | None, str]:
@@ -188,10 +177,8 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
         return flies, "it is on the ground"
     if rate is None:
-        return (
-            None,
-            f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
-        )
+        why = "no rotors, no height and no rates are recognised, so flight cannot be told from standing"
+        return None, f"{why}: {BY_HAND}"
     spread = np.sqrt(averaged(rate**2, period, _SHORT_S))
     quiet = spread < max(_STILL_RAD_S, 0.05 * float(np.quantile(spread, 0.9)))
     return np.asarray(~quiet, dtype=bool), "it does not turn at all"
@@ -321,7 +308,7 @@ def _dead_rates(signs: Signs) -> bool:
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
-    ends = [ended_early(signs, rests, part) for part in stretches]
+    ends = [crash.ended_early(signs, rests, part) for part in stretches]
     cut = []
     for (first, after), early_end in zip(stretches, ends, strict=True):
         # What is close to the ground at either end is left out, but where the log begins or ends in flight.

@@ -10,37 +10,13 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
-from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
-from cpfls_cli.flightlog.conversion import (
-    drop_absent_signals,
-    first_stamp,
-    select_columns,
-    setpoints_to_program_frames,
-    to_program_frames,
-)
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
-from cpfls_cli.flightlog.repair import (
-    SignalTable,
-    crop_and_order,
-    fill,
-    find_signal_spikes,
-    longest_stretch,
-    make_continuous,
-    mask_impossible,
-)
+from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
-from cpfls_cli.flightlog.stretches import (
-    count_values,
-    refuse_steep_pitch,
-    rotors_at_rest,
-    warn_of_angles,
-    warn_of_dead,
-    warn_of_rest,
-    warn_of_values,
-)
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
@@ -88,41 +64,46 @@ def read_signals(
     The result has the log's median rate, time from 0, neither shifted nor filtered. A torque that the rotors are to
     give is still None.
     """
-    mapped = drop_absent_signals(columns, settings)
+    mapped = conversion.drop_absent_signals(columns, settings)
     # What was asked for may be absent at any time: it decides on no row.
     settings = replace(mapped, signals={name: own for name, own in mapped.signals.items() if name not in SETPOINTS})
-    read, broken = mask_impossible(SignalTable(*select_columns(columns, mapped)), mapped)
+    read, broken = repair.mask_impossible(SignalTable(*conversion.select_columns(columns, mapped)), mapped)
     crop, cut = flown_crop(read, settings) if settings.crop_s == "flown" else (settings.crop_s, ())
     settings = replace(settings, crop_s=crop)
-    table, dropped = crop_and_order(read, settings)
+    table, dropped = repair.crop_and_order(read, settings)
     cut = warn_of_end(table, settings) if mapped.crop_s != "flown" else cut
     asked, table = (
         SignalTable(table.time, {name: own for name, own in table.signals.items() if (name in SETPOINTS) == setpoint})
         for setpoint in (True, False)
     )
-    table = make_continuous(table)
-    spikes = find_signal_spikes(table, settings)
+    table = repair.make_continuous(table)
+    spikes = repair.find_signal_spikes(table, settings)
     masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
     present = np.isfinite(np.hstack(list(repaired.signals.values())))
-    rows, incomplete_ends, beyond_gap = longest_stretch(table.time, present, settings)
+    rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
     table, repaired = table.rows(rows), repaired.rows(rows)
-    resting = rotors_at_rest(table, settings)
-    counts = count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
+    resting = stretches.rotors_at_rest(table, settings)
+    counts = stretches.count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
     clock, rate_hz = _uniform_clock(table.time)
-    on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
-    refuse_steep_pitch(on_clock)
+    on_clock = {name: repair.fill(table.time, values, clock) for name, values in repaired.signals.items()}
+    stretches.refuse_steep_pitch(on_clock)
     setpoints, unknown = _setpoints(asked, clock, mapped)
-    slow = slow_signals(table, stamped_hz)
-    filtered = cut_offs(on_clock, rate_hz, slow)
-    unit = settings.time_unit
-    too_fast = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
+    slow = bandwidth.slow_signals(table, stamped_hz)
+    filtered = bandwidth.cut_offs(on_clock, rate_hz, slow)
+    too_fast = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit ="
     warnings = (
-        *(*cut, *broken, *warn_of_values(counts), *warn_of_dead(table, tuple(counts["saturated"]), settings)),
-        *(*warn_of_rest(table, resting, settings), *warn_of_slow(slow, rate_hz), *warn_of_cut_offs(filtered, settings)),
+        *(
+            *cut,
+            *broken,
+            *stretches.warn_of_values(counts),
+            *stretches.warn_of_dead(table, counts["saturated"], settings),
+        ),
+        *(*stretches.warn_of_rest(table, resting, settings), *bandwidth.warn_of_slow(slow, rate_hz)),
+        *bandwidth.warn_of_cut_offs(filtered, settings),
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *([too_fast] if rate_hz >= _FASTEST_HZ else []),
-        *(*warn_of_angles(read.signals), *unknown),
+        *([f"{too_fast} {settings.time_unit} right"] if rate_hz >= _FASTEST_HZ else []),
+        *(*stretches.warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     report = ImportReport(
@@ -133,7 +114,7 @@ def read_signals(
         gaps=int((np.diff(table.time) > 1.5 * np.median(np.diff(table.time))).sum()),
         longest_gap_s=float(np.diff(table.time).max()),
         span_s=(float(clock[0]), float(clock[-1])),
-        first_stamp_s=first_stamp(columns, mapped),
+        first_stamp_s=conversion.first_stamp(columns, mapped),
         crop_s=crop if isinstance(crop, tuple) else None,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
@@ -143,7 +124,7 @@ def read_signals(
         parameters={},
         stated={},
     )
-    converted = to_program_frames(on_clock, settings)
+    converted = conversion.to_program_frames(on_clock, settings)
     if "attitude" in setpoints and "attitude" in converted:
         # A full turn beside the vehicle's own is the same.
         setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
@@ -158,7 +139,7 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
     }
     known = {name: values for name, values in held.items() if np.isfinite(values).all(axis=1).any()}
     left = [f"signal {name} is left out: it holds no setpoint in the part that is kept" for name in held.keys() - known]
-    return setpoints_to_program_frames(known, settings), left
+    return conversion.setpoints_to_program_frames(known, settings), left
 
 
 def _uniform_clock(time: Array) -> tuple[Array, float]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import motion_columns, recognised
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading, read_attitude
@@ -15,26 +16,9 @@ from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.motion_columns import (
-    gyroscope_first,
-    position_by_velocity,
-    take_acceleration,
-    take_body_rate,
-    take_places,
-)
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
-from cpfls_cli.flightlog.recognised import (
-    Load,
-    LogTable,
-    Recognition,
-    Rival,
-    Seen,
-    called,
-    holding_values,
-    make_grid,
-    refuse_dead_rotors,
-)
+from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import take_setpoints
@@ -95,14 +79,14 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)
     named = named_signals(column_groups(log.names), system)
-    candidates = holding_values(log, named)
+    candidates = recognised.holding_values(log, named)
     if not candidates and log.flat:
-        candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
+        candidates = recognised.holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
         raise InputError(_nothing_found(log, named, system))
-    refuse_dead_rotors(log, named, candidates)
+    recognised.refuse_dead_rotors(log, named, candidates)
     log, candidates, ended = _live_part(log, candidates)
-    make_grid(log, candidates)
+    recognised.make_grid(log, candidates)
     found = {
         str(name): [
             (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
@@ -127,14 +111,14 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if kind is None else [flown.reasons[-1]]
     seen.warnings += [log.time_doubt] if log.time_doubt else []
-    position_by_velocity(seen)
+    motion_columns.position_by_velocity(seen)
     verdict = read_attitude(seen)
-    if verdict is not None and gyroscope_first(seen, verdict.best, rotors.driving):
+    if verdict is not None and motion_columns.gyroscope_first(seen, verdict.best, rotors.driving):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
-    take_places(seen, reading)
-    take_body_rate(seen, reading)
-    take_acceleration(seen, reading)
+    motion_columns.take_places(seen, reading)
+    motion_columns.take_body_rate(seen, reading)
+    motion_columns.take_acceleration(seen, reading)
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
@@ -181,7 +165,7 @@ def _live_part(
         return log, candidates, ""
     part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
-    return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
+    return part, recognised.holding_values(part, [named for found in candidates.values() for named in found]), ended
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:

@@ -1,6 +1,6 @@
 """Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import ceil, floor, pi
 from typing import Any
 
@@ -104,7 +104,7 @@ def _crop(time: Array, rest: BoolArray) -> str:
     return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without it"
 
 
-def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSettings) -> Iterator[str]:
+def warn_of_dead(table: SignalTable, known: Iterable[str], settings: ImportSettings) -> Iterator[str]:
     """Name columns that are constant, or, unless they are known to be, clipped, or that stand still for a while."""
     for name, signal in settings.signals.items():
         values = table.signals[name]
