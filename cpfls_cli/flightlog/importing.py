@@ -85,25 +85,18 @@ def read_signals(
     table, repaired = table.rows(rows), repaired.rows(rows)
     resting = stretches.rotors_at_rest(table, settings)
     counts = stretches.count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
-    clock, rate_hz = _uniform_clock(table.time)
+    clock, rate_hz, hurried = _uniform_clock(table.time, settings.time_unit)
     on_clock = {name: repair.fill(table.time, values, clock) for name, values in repaired.signals.items()}
     stretches.refuse_steep_pitch(on_clock)
     setpoints, unknown = _setpoints(asked, clock, mapped)
     slow = bandwidth.slow_signals(table, stamped_hz)
     filtered = bandwidth.cut_offs(on_clock, rate_hz, slow)
-    too_fast = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit ="
+    dead = stretches.warn_of_dead(table, counts["saturated"], settings)
     warnings = (
-        *(
-            *cut,
-            *broken,
-            *stretches.warn_of_values(counts),
-            *stretches.warn_of_dead(table, counts["saturated"], settings),
-        ),
-        *(*stretches.warn_of_rest(table, resting, settings), *bandwidth.warn_of_slow(slow, rate_hz)),
-        *bandwidth.warn_of_cut_offs(filtered, settings),
+        *(*cut, *broken, *stretches.warn_of_values(counts), *dead, *stretches.warn_of_rest(table, resting, settings)),
+        *(*bandwidth.warn_of_slow(slow, rate_hz), *bandwidth.warn_of_cut_offs(filtered, settings)),
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *([f"{too_fast} {settings.time_unit} right"] if rate_hz >= _FASTEST_HZ else []),
-        *(*stretches.warn_of_angles(read.signals), *unknown),
+        *(*hurried, *stretches.warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     report = ImportReport(
@@ -142,7 +135,8 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
     return conversion.setpoints_to_program_frames(known, settings), left
 
 
-def _uniform_clock(time: Array) -> tuple[Array, float]:
+def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
+    """Lay a clock over stamps, and say where its rate is none of a log."""
     period = float(np.median(np.diff(time)))
     if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
         raise InputError(
@@ -150,8 +144,9 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
             " which no log has; check import.time_unit and import.time_column"
         )
     # A whole number of periods that rounding made a little short must not lose its last sample.
-    samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
-    return time[0] + period * np.arange(samples), 1 / period
+    samples, rate_hz = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
+    words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
+    return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
