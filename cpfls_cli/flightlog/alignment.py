@@ -27,37 +27,26 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 
     The signals are not yet filtered, and an estimate looks at a leading share of their samples.
     """
-    estimate = _estimate(signals, settings, delay_share) if settings.delay_s == "estimate" else None
+    estimate = None
+    if settings.delay_s == "estimate":
+        body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
+        if body_rate is None or signals.body_torque is None:
+            raise SettingError("delay_s", "needs a torque, and body rates or an attitude")
+        filtered = (settings.delay_max_s, settings.lowpass_hz, settings.lowpass_order)
+        estimate = estimate_delay(signals.time, body_rate, signals.body_torque, *filtered, share=delay_share)
     delay = estimate.delay_s if estimate else float(settings.delay_s)
     warnings = signals.report.warnings + (_warnings(estimate) if estimate else ())
     report = replace(signals.report, delay_s=delay, delay=estimate, warnings=warnings)
     return _shifted(replace(signals, report=report), delay, settings.torque_source == "rotor-speed")
 
 
-def _estimate(signals: LogSignals, settings: ImportSettings, share: float) -> DelayEstimate:
-    body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
-    if body_rate is None or signals.body_torque is None:
-        raise SettingError("delay_s", "needs a torque, and body rates or an attitude")
-    return estimate_delay(
-        signals.time,
-        body_rate,
-        signals.body_torque,
-        delay_max_s=settings.delay_max_s,
-        lowpass_hz=settings.lowpass_hz,
-        lowpass_order=settings.lowpass_order,
-        share=share,
-    )
-
-
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
     odd = "at the estimated delay, a moment of inertia is negative; check signs and axes"
-    sentences = (
-        (estimate.at_bound, "the estimated delay is the longest one tried; raise import.delay_max_s"),
-        (estimate.pooled_r2 < _POOR_R2, poor),
-        ((estimate.inertia[:3] < 0).any(), odd),
-    )
-    return tuple(sentence for holds, sentence in sentences if holds)
+    last = "the estimated delay is the longest one tried; raise import.delay_max_s"
+    negative = bool((estimate.inertia[:3] < 0).any())
+    holds = {last: estimate.at_bound, poor: estimate.pooled_r2 < _POOR_R2, odd: negative}
+    return tuple(sentence for sentence, so in holds.items() if so)
 
 
 def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSignals:
@@ -110,7 +99,6 @@ def estimate_delay(
     time: Array,
     body_rate: Array,
     body_torque: Array,
-    *,
     delay_max_s: float = 0.2,
     lowpass_hz: float | None = None,
     lowpass_order: int = 4,
@@ -167,7 +155,16 @@ def _prepare(
     rate_hz = 1 / (time[1] - time[0])
     smooth_rate = low_pass(body_rate, rate_hz, lowpass_hz, order)
     smooth_torque = low_pass(body_torque, rate_hz, lowpass_hz, order)
-    window = _window(time, delay_max_s, lowpass_hz)
+    # Without the filter's transients and, at the start, the longest delay.
+    edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
+    first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge]).tolist()
+    if last - first < _SMALLEST_WINDOW:
+        raise SettingError(
+            "delay_max_s",
+            f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
+            f" remain, and at least {_SMALLEST_WINDOW} are needed",
+        )
+    window = slice(first, last)
     scale = smooth_torque[window].std(axis=0)
     if not scale.any():
         raise ComputationError("the delay cannot be estimated: the torque is constant")
@@ -178,19 +175,6 @@ def _prepare(
     lengths = np.linalg.norm(regressor, axis=0)
     directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
     return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, directions[:, sizes > 1e-10 * sizes[0]])
-
-
-def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
-    """Exclude the filter's transients and, at the start, the longest delay."""
-    edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
-    first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge])
-    if last - first < _SMALLEST_WINDOW:
-        raise SettingError(
-            "delay_max_s",
-            f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
-            f" remain, and at least {_SMALLEST_WINDOW} are needed",
-        )
-    return slice(int(first), int(last))
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:

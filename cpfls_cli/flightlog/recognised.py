@@ -260,10 +260,10 @@ class Recognition:
     rate_hz: float  # Of the clock.
     slowest_s: float  # Longest median step of a topic that is mapped, s; and without that of the voltage.
     slowest_but_voltage_s: float
-    kind: str  # Kind of log that is known for such columns of rotors; empty where none is.
     moved: MovedBy | None  # The rotors as the motion shows them.
     # Shape (time, rotor), or None; rotor speeds in flight in rad/s, or commands as shares of the largest speed.
     speeds: Array | None = field(repr=False)
+    kind: str = ""  # Kind of log that is known for such columns of rotors; empty where none is.
     load: Load | None = None  # None where no columns are those of rotors.
     warnings: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()  # All columns that are mapped to nothing, stamps left out.

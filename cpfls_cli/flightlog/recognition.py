@@ -131,8 +131,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _doubt_columns(seen)
     take_setpoints(seen, parameters, system)
     _list_unused(seen)
-    taken = _gathered(seen, flown, speeds, moved, rotors.driving.kind if rotors.driving else "")
-    return replace(taken, winged=winged, rebuilt=rebuilt)
+    taken = _gathered(seen, flown, speeds, moved)
+    return replace(taken, winged=winged, rebuilt=rebuilt, kind=rotors.driving.kind if rotors.driving else "")
 
 
 def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
@@ -352,7 +352,7 @@ def _list_unused(seen: Seen) -> None:
             seen.left_out.append(f"{some(groups, _SHOWN, '; ')}: also {name} by name; not used")
 
 
-def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
+def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None) -> Recognition:
     log = seen.log
     signals = tuple(seen.guesses[name] for name in _ORDER if name in seen.guesses)
     asked = tuple(seen.guesses[name] for name in SETPOINTS if name in seen.guesses)
@@ -382,7 +382,6 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         rate_hz=rates[base.signal],
         slowest_s=max(1 / rates[guess.signal] for guess in signals),
         slowest_but_voltage_s=max(1 / rates[guess.signal] for guess in signals if guess.signal != "voltage"),
-        kind=kind,
         moved=moved,
         speeds=speeds,
         load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
