@@ -353,29 +353,25 @@ def _take_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
         reason += f"; judged by their values, {held} are w, x, y, z"
     seen.take(named, "1", reason, "data" if clear else "named", order=own.order, sign=own.sign)
     others = [other for other in verdict.others if other.attitude.scalar_last != own.scalar_last]
+    rivals: tuple[Rival, ...] = ()
+    sure: Sure = "data"
     if named.group.kind == "wxyz":
-        seen.choose("quaternion_order", order, "the columns are named by w, x, y, z", "named")
-        return
-    if not others:
-        seen.choose("quaternion_order", order, "in the other order, the vehicle would not stay level", "data")
-        return
-    share = max(other.explained for other in others)
-    lean = max(other.place_share for other in others)
-    if clear and share < best.explained - 0.05:
-        seen.choose("quaternion_order", order, f"{data}; in the other order, {100 * share:.0f} %", "data")
-    elif best.lean is not None and lean < best.place_share - 0.2:
-        share_of_lean = f"({100 * best.place_share:.0f} %)"
-        words = f"only in this order does the lean explain the acceleration {share_of_lean}"
-        seen.choose("quaternion_order", order, words, "data")
+        words, sure = "the columns are named by w, x, y, z", "named"
+    elif not others:
+        words = "in the other order, the vehicle would not stay level"
+    elif clear and (share := max(other.explained for other in others)) < best.explained - 0.05:
+        words = f"{data}; in the other order, {100 * share:.0f} %"
+    elif best.lean is not None and max(other.place_share for other in others) < best.place_share - 0.2:
+        words = f"only in this order does the lean explain the acceleration ({100 * best.place_share:.0f} %)"
     elif named.known:
-        seen.choose("quaternion_order", order, f"a log of {named.known}", "named")
+        words, sure = f"a log of {named.known}", "named"
     elif not verdict.tied and min(other.price for other in others) > best.price:
         words = "in the other order, more columns would have to differ from their names"
-        seen.choose("quaternion_order", order, words, "data")
     else:
-        rival = "xyzw" if order == "wxyz" else "wxyz"
+        words, sure = "the more usual one", "guess"
         why = "the vehicle stays level in both, and no gyroscope tells them apart"
-        seen.choose("quaternion_order", order, "the more usual one", "guess", Rival(f"quaternion_order: {rival}", why))
+        rivals = (Rival(f"quaternion_order: {'xyzw' if order == 'wxyz' else 'wxyz'}", why),)
+    seen.choose("quaternion_order", order, words, sure, *rivals)
 
 
 def doubt_reading(seen: Seen, verdict: TakenReading) -> None:

@@ -95,10 +95,9 @@ class Proposal:
 
     @property
     def share_of_speed(self) -> bool:
-        """Whether the rotors are told by commands that are shares alone."""
-        names = {guess.signal: guess for guess in self.signals}
-        command = names.get("rotor_command")
-        return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
+        """Whether nothing but commands that are shares says what the rotors do."""
+        units = {guess.signal: guess.columns.unit for guess in self.signals}
+        return "rotor_speed" not in units and units.get("rotor_command") == "1"
 
 
 def propose(
@@ -106,12 +105,7 @@ def propose(
 ) -> Proposal:
     """Make one proposal of what each of several logs is taken for; logs of two vehicles are refused.
 
-    Parameters
-    ----------
-    mass_kg, arm_m : float or None
-        Of the vehicle, and from its middle to a rotor, m, where they are known.
-    scale_to_arm : bool
-        Whether places that a log states are scaled to that arm.
+    The arm is from the middle to a rotor, m; places that a log states are scaled to it where that is asked for.
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
@@ -194,15 +188,15 @@ def _time_column(logs: Sequence[KnownLog]) -> str | None:
         wrong = [one for one in logs if "." not in one.recognition.time_column]
         if not wrong:
             return None
-    if wrong:
-        clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
-        odd = {one.name: (one.recognition.time_column, one.recognition.time_unit) for one in wrong}
-        way = _way_on([(one, odd.get(one.name)) for one in logs])
-        raise InputError(
-            f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
-            f" both: {way}"
-        )
-    return first.recognition.time_column
+    if not wrong:
+        return first.recognition.time_column
+    clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
+    odd = {one.name: (one.recognition.time_column, one.recognition.time_unit) for one in wrong}
+    way = _way_on([(one, odd.get(one.name)) for one in logs])
+    raise InputError(
+        f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
+        f" both: {way}"
+    )
 
 
 def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
@@ -242,8 +236,8 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
     if not lacking:
         return guess
     maps = tuple(ColumnMap(**{each.name: getattr(own, each.name) for each in fields(ColumnMap)}) for own in others)
-    without = [name for name in lacking if name not in others.values()]
-    columns = replace(guess.columns, otherwise=maps, required=guess.columns.required and not without)
+    required = guess.columns.required and {*lacking} <= {*others.values()}
+    columns = replace(guess.columns, otherwise=maps, required=required)
     reason = f"{guess.reason}; these columns are missing in {', '.join(lacking)}"
     return replace(guess, columns=columns, reason=reason)
 
@@ -320,8 +314,8 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
     if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
         return guess
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
-    diameter = room(arm_m, speeds.shape[1])
-    numbers = {unit: thrust_number(mass_kg, diameter, known_unit(unit).factor * speeds) for unit in units}
+    sizes = {unit: known_unit(unit).factor * speeds for unit in units}
+    numbers = {unit: thrust_number(mass_kg, room(arm_m, speeds.shape[1]), own) for unit, own in sizes.items()}
     fitting = [unit for unit, own in numbers.items() if IN_ROOM.usual[0] < own < IN_ROOM.usual[1]]
     if len(fitting) != 1:
         return guess
@@ -371,14 +365,15 @@ def _apart(light: Load, heavy: Load, measured: bool) -> bool:
 def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
     """List the logs whose loads a step parts from that of the first log; a battery that empties makes no step."""
     measured = logs[0].recognition.signal("rotor_speed") is not None
-    groups: list[list[tuple[Load, KnownLog]]] = []
+    groups: list[list[KnownLog]] = []
+    before: Load | None = None
     for load, one in _by_load(logs):
-        if groups and not _apart(groups[-1][-1][0], load, measured):
-            groups[-1].append((load, one))
-        else:
-            groups.append([(load, one)])
-    own = next((group for group in groups if any(one is logs[0] for _, one in group)), None)
-    return [] if own is None else [one for group in groups if group is not own for _, one in group]
+        if before is None or _apart(before, load, measured):
+            groups.append([])
+        groups[-1].append(one)
+        before = load
+    own = next((group for group in groups if any(one is logs[0] for one in group)), None)
+    return [] if own is None else [one for group in groups if group is not own for one in group]
 
 
 def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
