@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
@@ -34,7 +33,6 @@ _LEAST_OCTAVES_BEYOND = 0.3  # That have to be known for a fall to be a cliff.
 _LONGEST_SEGMENT = 2048
 _SEGMENTS = 4
 _FEWEST_IN_SEGMENT = 64  # Lines of a spectrum, below which bands hold none.
-_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])  # The window by its waves.
 _LINES_OF_WINDOW = 8  # Over which the Blackman-Harris window smears a line.
 _HALVED_DB = 6.0
 # The trend that the cut-off is read against, clear of the fall itself.
@@ -137,10 +135,9 @@ def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:
     length = min(len(values) // _SEGMENTS, _LONGEST_SEGMENT)
     if length < _FEWEST_IN_SEGMENT or np.ptp(values) == 0:
         return np.empty(0), np.empty(0)
-    segments = sliding_window_view(values, length)[:: length - length // 2]
-    window = _BLACKMAN_HARRIS @ np.cos(np.outer(np.arange(4), np.linspace(0, 2 * np.pi, length, endpoint=False)))
-    lines = np.abs(np.fft.rfft((segments - segments.mean(axis=1, keepdims=True)) * window)) ** 2
-    frequency, power = np.fft.rfftfreq(length, 1 / rate_hz), 2 * lines.mean(axis=0) / (rate_hz * (window**2).sum())
+    from scipy.signal import welch
+
+    frequency, power = welch(values, rate_hz, "blackmanharris", length, length // 2)
     # The window smears what is slower over its first lines.
     known = (frequency >= _LINES_OF_WINDOW * frequency[1]) & (frequency <= _HIGHEST_SHARE * rate_hz)
     octave, power = np.log2(frequency[known]), power[known]
