@@ -311,6 +311,11 @@ class Seen:
         choice = self.choices.get("quaternion_order")
         return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
 
+    @property
+    def open_rotors(self) -> bool:
+        """Whether other columns may be those of rotors too."""
+        return any(self.guesses[name].other_columns is not None for name in ROTORS if name in self.guesses)
+
     def first(self, name: SignalName) -> Named | None:
         """Give the best candidate for a signal."""
         return next(iter(self.candidates.get(name, ())), None)

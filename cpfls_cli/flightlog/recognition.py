@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -196,8 +197,8 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
 
 def _part(log: LogTable, flown: FlownPart) -> slice:
     begin, end = flown.span_s or (0.0, np.inf)
-    inside = np.flatnonzero((log.grid - log.grid[0] >= begin) & (log.grid - log.grid[0] <= end))
-    return slice(int(inside[0]), int(inside[-1]) + 1)
+    time = log.grid - log.grid[0]
+    return slice(int(np.searchsorted(time, begin)), int(np.searchsorted(time, end, "right")))
 
 
 def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
@@ -296,14 +297,10 @@ def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedB
     if seen.choices["body_frame"].value == "FRD":
         body = body * np.array([1.0, -1.0, -1.0])
     moved = airframe_from_motion(body, speeds, seen.rate_hz, rotors.speed is None)
-    if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or _open_rotors(seen)):
+    if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or seen.open_rotors):
         # Whose axes are not known says left for right.
         moved = moved._replace(clear=False, airframe=replace(moved.airframe, sure="guess"))
     return speeds, moved
-
-
-def _open_rotors(seen: Seen) -> bool:
-    return any(seen.guesses[name].other_columns is not None for name in ROTORS if name in seen.guesses)
 
 
 def _load(seen: Seen, speeds: Array) -> Load | None:
@@ -327,13 +324,9 @@ def _doubt_columns(seen: Seen) -> None:
     for name, guess in tuple(seen.guesses.items()):
         values = dict(zip(guess.columns.columns, seen.log.values(guess.columns.columns)[1].T, strict=True))
         still = [column for column, own in values.items() if len(values) > 1 and not np.ptp(own) > 0]
-        twice = [
-            f"{one} and {other}"
-            for index, one in enumerate(values)
-            for other in list(values)[index + 1 :]
-            if one not in still and np.array_equal(values[one], values[other])
-        ]
-        odd = [*(f"{column} never changes" for column in still), *(f"{pair} have the same values" for pair in twice)]
+        pairs = [(one, two) for one, two in combinations(values, 2) if np.array_equal(values[one], values[two])]
+        odd = [f"{column} never changes" for column in still]
+        odd += [f"{one} and {two} have the same values" for one, two in pairs if one not in still]
         if odd:
             seen.warnings.append(f"{name}: {'; '.join(odd)}")
             seen.doubt(name)
@@ -369,7 +362,8 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
     if flown.span_s is not None:
         # import.crop_s counts from the first stamp of the clock.
         off = float(log.grid[0]) - float(begin)
-        flown = replace(flown, span_s=(max(0.0, round(flown.span_s[0] + off, 2)), round(flown.span_s[1] + off, 2)))
+        first, last = (round(own + off, 2) for own in flown.span_s)
+        flown = replace(flown, span_s=(max(0.0, first), last))
     used = {time_column, *(column for guess in (*signals, *asked) for column in guess.columns.columns)}
     stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
     return Recognition(
@@ -384,7 +378,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         slowest_but_voltage_s=max(1 / rates[guess.signal] for guess in signals if guess.signal != "voltage"),
         moved=moved,
         speeds=speeds,
-        load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
+        load=None if speeds is None or seen.open_rotors else _load(seen, speeds),
         warnings=tuple(seen.warnings),
         unused=tuple(name for name in log.names if name not in used | stamps),
         counted_from_s=float(log.grid[0]) - log.origin,
