@@ -24,7 +24,6 @@ _RECORDS = {
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
-    ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
     ("cpfls/flight-numbers", ""): "flight_numbers.FlightNumbersRecord",
     ("cpfls/changed", ""): "changed.ChangedRecord",
     ("cpfls/trend", ""): "trend.TrendRecord",

@@ -11,13 +11,11 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRecord
-from cpfls_cli.artifacts.store import holds
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import to_correct, to_gap
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.models import is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.response import answer
@@ -36,7 +34,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     """Estimate frequency responses and write them."""
     roles = numbered_roles("flight", flights)
     inputs = begin(job, ({} if model is None else {"model": model}) | roles)
-    job = with_numbers(job, "response", model, whole=model is not None and holds(model, VehicleRecord))
+    job = with_numbers(job, "response", model, whole=model is not None and is_found(model))
     if table is not None:
         refuse_own(table, job.output)
         check_outputs(job, table)

@@ -121,7 +121,7 @@ def _parameters(record: IdentifiedRecord) -> str:
         return fuzzy
     if record.fuzzy_part_off:
         return f"6 of inertia and {fuzzy}, all zero because the fuzzy part is off"
-    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.model.ridge_weight)}"
+    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.chosen.ridge_weight)}"
 
 
 def _search(model: Source[IdentifiedRecord]) -> str:
