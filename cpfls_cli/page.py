@@ -141,8 +141,24 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 }
 
 
+_NOTHING: Mapping[str, Any] = {}
+
+
+class _Added:
+    """What templates know beside what all do, the same for one mapping as long as that lives."""
+
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        self.names = names
+
+    def __hash__(self) -> int:
+        return id(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Added) and other.names is self.names
+
+
 @cache
-def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
+def _environment(folder: Path, added: _Added) -> Environment:
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -153,8 +169,8 @@ def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environmen
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **dict(added))
-    functions = {name: each for name, each in added if callable(each)}
+    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **added.names)
+    functions = {name: each for name, each in added.names.items() if callable(each)}
     made.filters.update(functions)
     made.tests.update(functions)
     return made
@@ -172,7 +188,7 @@ def words(
     **more : object
         What it knows of this result.
     """
-    environment = _environment(folder, tuple((added or {}).items()))
+    environment = _environment(folder, _Added(_NOTHING if added is None else added))
     return environment.get_template(f"{template}.md.j2").render(r=given, **more)
 
 

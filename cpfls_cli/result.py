@@ -145,7 +145,7 @@ class Described(NamedTuple):
 
     @property
     def scalar(self) -> type:
-        """Type of a value, or of each of many: bool, int, float or str."""
+        """Type of a value, or of each of many: bool, int, float, complex or str."""
         return _scalar(self.kind)
 
     @property
@@ -173,7 +173,13 @@ def _scalar(kind: Any) -> type:
         return float
     if origin is np.ndarray:
         return _scalar(get_args(inner[1])[0])
-    kinds = {bool: (bool, np.bool_), int: (int, np.integer), str: (str, np.str_), float: (float, np.floating)}
+    kinds = {
+        bool: (bool, np.bool_),
+        int: (int, np.integer),
+        str: (str, np.str_),
+        float: (float, np.floating),
+        complex: (complex, np.complexfloating),
+    }
     return next(own for own, alike in kinds.items() if issubclass(kind, alike))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -17,7 +18,14 @@ from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_text
+from cpfls_cli.artifacts.output import (
+    check_folder,
+    check_output,
+    filled_folder,
+    refuse_inputs,
+    refuse_own,
+    write_text,
+)
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
@@ -91,6 +99,16 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
+    notes : list of Text
+        Behind the answer too: what a person has to know of how it came about.
+    until_written : ExitStack
+        Contexts that last until the result is written, or it is sure that it will not be.
+    afterwards : list of callable
+        What is done when the result is written.
+    data : callable
+        Gives the config as plain data, with what the command line changes of it.
+    text : tuple of (Path, str) or None
+        A file of text that is written behind the result.
     """
 
     writes: bool = True
@@ -101,6 +119,11 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
+    notes: list[Text] = field(default_factory=list)
+    until_written: ExitStack = field(default_factory=ExitStack)
+    afterwards: list[Callable[[], object]] = field(default_factory=list)
+    data: Callable[[], dict[str, Any]] = dict
+    text: tuple[Path, str] | None = None
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -133,6 +156,14 @@ class Run(Job):
         """Name a command that goes on with the config of this run."""
         self.next.append(go_on(self, command, *words, output=output))
 
+    def write_text(self, path: Path, text: str, what: str) -> None:
+        """Have a file of text written behind the result, or alone where none is written; `what` says what it is."""
+        if self.writes:
+            refuse_own(path, self.output)
+        check_output(path, self.force, self.inputs)
+        self.text = path, text
+        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
@@ -162,6 +193,8 @@ class Stage:
         Whether it takes a config.
     several : bool
         Whether options that may be repeated take all values that follow.
+    resumes : bool
+        Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
     """
 
     function: Callable[..., Any]
@@ -173,6 +206,7 @@ class Stage:
     fills: Filled | None
     study: bool
     several: bool
+    resumes: bool = False
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -227,18 +261,23 @@ class Stage:
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
-        if run.writes:
+        if run.writes and not self.resumes:
             self._check(run, run.output)
-        found = self.function(run, **given)
+        with run.until_written:
+            found = self.function(run, **given)
+            results = dict(found) if self.folder and found is not None else {"": found}
+            if run.writes and found is not None:
+                self._write(run, run.output, results)
         if found is None:
             where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
-        results = dict(found) if self.folder else {"": found}
-        if run.writes:
-            self._write(run, run.output, results)
+        if run.text:
+            write_text(*run.text)
+        for act in run.afterwards:
+            act()
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
@@ -251,11 +290,12 @@ class Stage:
             (
                 *(block for text in texts for block in page.blocks(text)),
                 *([Text(run.last_words)] if run.last_words else []),
+                *run.notes,
                 *caution_texts(cautions),
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else None,
+            written=run.output if run.writes else run.text and run.text[0],
         )
 
     def info(self, path: Path) -> Outcome:
@@ -377,9 +417,12 @@ def stage(
     fills: Filled | None = None,
     study: bool = False,
     several: bool = False,
+    resumes: bool = False,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
-    return lambda function: Stage(function, kind, title, figures or {}, words or {}, folder, fills, study, several)
+    return lambda function: Stage(
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, resumes
+    )
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

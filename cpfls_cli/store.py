@@ -23,7 +23,7 @@ from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
-from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION, DatasetSpec
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.result import AXES, About, Described, described_fields, maps
 from cpfls_cli.words import some
@@ -37,8 +37,8 @@ _LARGEST = 1e150
 _BLOCK = 1 << 18
 """Rows that are checked at a time."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
-_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
-_HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
+_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
+_HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
 """Kinds of arrays that hold values of a type."""
 
 Lengths = MutableMapping[str, tuple[int, str]]
@@ -208,6 +208,28 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
     return given, origin, findings(given)
+
+
+def flat(path: Path) -> dict[str, tuple[DatasetSpec, Any]]:
+    """Read the datasets of a result by path, each with what its attributes say of it."""
+    found: dict[str, tuple[DatasetSpec, Any]] = {}
+
+    def take(name: str, held: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(held, h5py.Dataset) and name != CONFIG.strip("/"):
+            labels = tuple(each.label for each in held.dims)
+            words = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
+            values = np.asarray(held[()])
+            values = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
+            found[name] = DatasetSpec(name, labels, *words), values
+
+    with opened_file(path) as file, patient(path):
+        file.visititems(take)
+    return found
+
+
+def format_of(given: Any) -> str:
+    """Name the format of a record or a result, or of its class."""
+    return str(getattr(given.FORMAT, "name", given.FORMAT))
 
 
 def count_rows(path: Path, kind: Any, name: str) -> int | None:
@@ -411,7 +433,7 @@ def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths
         known, where = (fixed, "its description") if fixed else lengths.setdefault(label, (length, path))
         if length != known:
             yield f"{path}: {length} along '{label}', but {known} by {where}"
-    if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
+    if array.dtype.kind in "fc" and not about.gaps and not np.isfinite(array).all():
         yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
     if array.dtype.kind == "f" and np.any(np.abs(array, dtype=float) > _LARGEST, where=np.isfinite(array)):
         yield f"{path}: holds values beyond {_LARGEST:g}"

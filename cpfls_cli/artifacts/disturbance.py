@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import dataset, group, group_of, record
 from cpfls_cli.playback.gusts import GUST_AXES, GustAxis, Gusts, gust_axes

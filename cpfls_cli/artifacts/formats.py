@@ -17,8 +17,6 @@ _RECORDS = {
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
-    ("cpfls/replay", ""): "replay.ReplayRecord",
-    ("cpfls/response", ""): "response.ResponseRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",

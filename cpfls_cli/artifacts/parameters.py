@@ -119,6 +119,11 @@ class Parameter(NamedTuple):
         return f"no: {ON_BOUND}" if self.reason == ON_BOUND else "no"
 
     @property
+    def wanting(self) -> bool:
+        """Whether it was looked for and not found."""
+        return self.value is None or (self.low is not None and not self.determined)
+
+    @property
     def needed(self) -> bool:
         """Whether it is anything but a zero that nobody asked for."""
         return self.value != 0 or self.low is not None or self.stated is not None

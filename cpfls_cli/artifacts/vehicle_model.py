@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import AnyModel, of_no_body
 from cpfls_cli.artifacts.learned import LearnedFlight
+from cpfls_cli.artifacts.model import AnyModel, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, Parameter, is_learned, parameters_of
-from cpfls_cli.artifacts.replay import FADING, HeldOutGroup, trust_by_playback
-from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.flightlog.logging_rates import SLOW_HZ
+from cpfls_cli.playback.errors import FADING, AlongFlights
 from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle
 from cpfls_cli.response.flown import VehicleResponse
-from cpfls_cli.response.mismatch import ROTATION, THRUST
+from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, THRUST, response_word
 from cpfls_cli.result import About, about, part, result
-from cpfls_cli.validation.trust import GOOD, Trust, capped
+from cpfls_cli.validation.trust import GOOD, Trust, capped, trust_by_playback
 
 
 class ResponseMismatch(NamedTuple):
@@ -30,13 +29,12 @@ class ResponseMismatch(NamedTuple):
     high: Annotated[float, About("to this one", unit="Hz", gaps=True)]
 
 
-def mismatches(responses: Sequence[VehicleResponse], *, instrumented: bool) -> tuple[ResponseMismatch, ...]:
+def mismatches(responses: Mapping[str, VehicleResponse], *, instrumented: bool) -> tuple[ResponseMismatch, ...]:
     """List those about the body axes and of thrust; only those that instruments move, where they have to."""
-    own = [each for each in responses if each.name in (*ROTATION, THRUST)]
     return tuple(
-        ResponseMismatch(each.name, each.mismatch.cost, *(each.mismatch.band or (np.nan, np.nan)))
-        for each in own
-        if each.estimate.instrumented or not instrumented
+        ResponseMismatch(name, each.cost, *(each.band or (np.nan, np.nan)))
+        for name, each in responses.items()
+        if name in (*ROTATION, THRUST) and (each.instrumented or not instrumented)
     )
 
 
@@ -48,7 +46,7 @@ class Vehicle(FoundVehicle, AnyModel):
     MADE_BY: ClassVar = "vehicle"
     SHOWN: ClassVar = ("verdict", "forecast_verdict", "trust", "not_determined", "parameters")
 
-    held_out: HeldOutGroup | None = part(default=None)
+    held_out: AlongFlights | None = part(default=None)
     """Playback along flights held out."""
     responses: tuple[ResponseMismatch, ...] = part(default=())
     fading_s: float | None = about(FADING, unit="s", default=None)
@@ -58,7 +56,9 @@ class Vehicle(FoundVehicle, AnyModel):
         default=None,
     )
     rotors_logged_hz: float | None = about("how often the slowest log holds the rotors", unit="Hz", default=None)
-    logged_by: tuple[str, ...] = about("what wrote the logs, each once; none where they do not say", "system", default=())
+    logged_by: tuple[str, ...] = about(
+        "what wrote the logs, each once; none where they do not say", "system", default=()
+    )
     warnings: tuple[str, ...] = about("what to know about the flights", "warning", default=())
     contradictions: tuple[str, ...] = about(
         "contradictions within the flights or with the vehicle", "contradiction", default=()

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cpfls_cli.arguments import (
-    AnywayOption,
     ArtifactsArgument,
     AutopilotChoice,
     ChooseOnOption,
     DiagnosisArgument,
     DisagreementArgument,
-    EveryOption,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
@@ -28,15 +26,12 @@ from cpfls_cli.arguments import (
     FlownArgument,
     FolderOption,
     HeldOutOption,
-    HistoryOption,
     HoldOption,
     HorizonOption,
-    JudgedOption,
     LogArgument,
     LogsArgument,
     ModelArgument,
     ModelOption,
-    PlayedArgument,
     ResumeOption,
     ResumeSweepOption,
     SchedulerOption,
@@ -46,7 +41,6 @@ from cpfls_cli.arguments import (
     TrainingArgument,
     ValidateOption,
     WorkersOption,
-    WriteConfigOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -335,73 +329,11 @@ def sweep(
 
 
 @_command()
-def vehicle(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    resume: ResumeOption = False,
-    write_config: WriteConfigOption = None,
-    anyway: AnywayOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
-    if anyway:
-        # The artifact holds it with its config.
-        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
-
-    def call(command: Any, job: Job) -> Any:
-        copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
-        return command.run(job, flights, held_out or [], copy, resume=resume)
-
-    _run("vehicle", config, output, common, call)
-
-
-@_command()
 def predict(
     config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
 ) -> None:
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
     _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def replay(
-    config: ConfigArgument,
-    model: PlayedArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    horizon: HorizonOption = None,
-    every: EveryOption = 1,
-    hold: HoldOption = None,
-    history: HistoryOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
-        )
-        return command.run(job, model, flights, options)
-
-    _run("replay", config, output, common, call)
-
-
-@_command()
-def response(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    model: JudgedOption = None,
-    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
-    *,
-    common: Common,
-) -> None:
-    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
-    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
 
 
 @_command()

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile

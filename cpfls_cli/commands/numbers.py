@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from cpfls_cli.artifacts.job import Job, require_numbers
 from cpfls_cli.artifacts.store import read_header
@@ -17,6 +17,8 @@ from cpfls_cli.report.outcome import Command
 from cpfls_cli.trajectory.consistency import coarsest_excited
 from cpfls_cli.words import joined
 
+J = TypeVar("J", bound=Job)
+
 _ARDUPILOT = "bin"
 """Format of the logs that ArduPilot writes."""
 
@@ -26,7 +28,7 @@ def cautions_in(path: Path) -> tuple[str, ...]:
     return cautions_of(any_model(path), path.name, read_header(path).cautions)
 
 
-def with_numbers(job: Job, command: str, model: Path | None, *, whole: bool = False) -> Job:
+def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = False) -> J:
     """Take what a config leaves open from a model of a whole vehicle, or from guesses that are asked for.
 
     What speaks against the model, or makes guesses of the numbers, goes with what the job writes.
@@ -45,14 +47,14 @@ def with_numbers(job: Job, command: str, model: Path | None, *, whole: bool = Fa
     if given is not None and is_model(given):
         job.cautions.update(dict.fromkeys(cautions_in(given)))
     if given is not None and job.study.vehicle.unknown and is_found(given):
-        job = replace(job, found=given)
+        job.found = given
         if not whole:
             return _with_found(job, given)
     require_numbers(job, command, whole=whole)
     return job
 
 
-def with_numbers_of(job: Job, found: Path) -> Job:
+def with_numbers_of(job: J, found: Path) -> J:
     """Take what a config leaves open from a vehicle that was found, of a command that takes no model.
 
     Raises
@@ -71,8 +73,10 @@ def with_numbers_of(job: Job, found: Path) -> Job:
     return _with_found(job, found)
 
 
-def _with_found(job: Job, found: Path) -> Job:
-    return replace(job, study=with_found_numbers(job.study, found), open_numbers="found", found=found)
+def _with_found(job: J, found: Path) -> J:
+    # In place: a run of a stage says by its own study where its result comes from.
+    job.study, job.open_numbers, job.found = with_found_numbers(job.study, found), "found", found
+    return job
 
 
 def why_no_body_found(job: Job, found: Path) -> str:

@@ -27,8 +27,6 @@ _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",
-    "cpfls/replay": "replay",
-    "cpfls/response": "response",
     "cpfls/twin": "twin",
     "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",

@@ -12,8 +12,8 @@ from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
-from cpfls_cli.pages.export import spread_answer, spread_summary
 from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
+from cpfls_cli.pages.export import spread_answer, spread_summary
 from cpfls_cli.playback.spread import Estimates, drawn, require_sure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome

@@ -33,9 +33,9 @@ from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.vibration import Change, vibration_of
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.look_gains import answer as answer_of_log
+from cpfls_cli.pages.model import slow_words
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.pages.model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
@@ -442,9 +442,7 @@ def _heard(
     return NoiseGroup.of(noise, lines, np.array([noise.of_commands(autopilot.law(values)) for values in sets]))
 
 
-def _hover_notes(
-    autopilot: Autopilot, today: Mapping[str, float], hover: HoverPlant, record: Vehicle
-) -> Iterator[str]:
+def _hover_notes(autopilot: Autopilot, today: Mapping[str, float], hover: HoverPlant, record: Vehicle) -> Iterator[str]:
     """Say where the hover thrust of a log is not that of the vehicle: the full thrust is another, and all gains too."""
     held = autopilot.by_role("motors.hover")
     if held is None or held.name not in today:

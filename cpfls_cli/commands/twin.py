@@ -11,28 +11,27 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on
-from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.twin import GainsGroup, TwinRecord, WindowsGroup
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
-from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
-from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.pages.twin import answer
-from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.playback.spread import Estimates, drawn
 from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.simulation.model import SimulatedEffects, played_gusts, simulated_effects, with_effects
@@ -183,7 +182,7 @@ def record_of(
         rotor_lag_s=settings.rotor_time_constant_s,
         instruments=moved_by.kind,
         warning=tuple(warnings),
-        contradiction=contradictions_of([flight]),
+        contradiction=contradictions_of([flight]) or None,
     )
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.spec import Header, InputFile, rows_of
 from cpfls_cli.artifacts.store import read_header

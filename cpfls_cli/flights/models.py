@@ -11,7 +11,6 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import AnyModel, ModelRecord
-from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import format_name, holds, read_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
@@ -19,6 +18,7 @@ from cpfls_cli.errors import InputError, about
 from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.settings import VEHICLE
 
 _READ: Mapping[str, Callable[[Path], AnyModel]] = {
     ModelRecord.FORMAT.name: lambda path: read_record(path, ModelRecord),

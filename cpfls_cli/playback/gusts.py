@@ -95,9 +95,7 @@ class GustAxis(NamedTuple):
 class GustRanges:
     """Gusts by body axis, torque then force, with their 95 % intervals."""
 
-    size: Array = about(
-        "standard deviation, N m or N; not finite where it is not known", "gust", unit="SI", gaps=True
-    )
+    size: Array = about("standard deviation, N m or N; not finite where it is not known", "gust", unit="SI", gaps=True)
     low: Array = about("lower end of its 95 % interval; 0 where it is not known", "gust", unit="SI", gaps=True)
     high: Array = about(
         "upper end; where no size is known that of all that is left, and not finite where the body is not known either",

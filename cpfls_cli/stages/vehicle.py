@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from fnmatch import fnmatch
 from itertools import groupby
 from pathlib import Path
@@ -14,8 +14,9 @@ import numpy as np
 
 from cpfls_cli.arguments import AnywayOption, FlightsArgument, HeldOutOption, ResumeOption, WriteConfigOption
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.output import check_output, refuse_own, write_text
+from cpfls_cli.artifacts.output import check_output, refuse_own
 from cpfls_cli.artifacts.parameters import (
     CENTRE,
     DELAY,
@@ -34,7 +35,7 @@ from cpfls_cli.artifacts.parameters import (
 )
 from cpfls_cli.artifacts.vehicle_model import Vehicle, mismatches
 from cpfls_cli.commands.numbers import to_fly
-from cpfls_cli.commands.stopped import without_model
+from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
@@ -268,6 +269,7 @@ def remainder_curves(r: Vehicle) -> tuple[Array, Array, Array]:
     },
     words=WORDS,
     study=True,
+    resumes=True,
 )
 def vehicle(
     run: Run,
@@ -280,8 +282,7 @@ def vehicle(
     """Find a vehicle in flights, and judge it on those held out."""
     if anyway:
         # The file holds it with its config.
-        playback = run.study.playback.model_copy(update={"anyway": True})
-        run.study = run.study.model_copy(update={"playback": playback})
+        run.study = run.study.model_copy(update={"playback": replace(run.study.playback, anyway=True)})
     others = held_out or []
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
     checkpoint, kept = begin_vehicle_search(run, learned | unseen, resume=resume)
@@ -303,15 +304,217 @@ def vehicle(
         return None
     if kept is None:
         checkpoint.remove()
-    with checkpoint.kept():
-        found, signal = _found(run, training, settings, checkpoint, kept or {})
-        warnings = [*limit, *twice, *(warning for flight in read for warning in flight.warnings)]
-        made = _judged(run, found, training, rest, [run.files[role] for role in learned], warnings)
-        run.write(made)
+    run.until_written.enter_context(checkpoint.kept())
+    found, signal = _found(run, training, settings, checkpoint, kept or {})
+    warnings = [*limit, *twice, *(warning for flight in read for warning in flight.warnings)]
+    files = [run.files[role] for role in learned]
+    made = _judged(
+        run, found, read, [LearnedFlight.in_file(*each) for each in zip(files, *_samples(training))], warnings
+    )
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
-        _write_config(run, write_config, made)
-        checkpoint.remove()
-    _next(run, made, flights, others)
-    run.stop("generations" if made.complete else "interrupted", signal)
+        run.text = _config_copy(run, write_config, made)
+        run.afterwards.append(checkpoint.remove)
+    run.next += next_commands(run, made, flights, others)
+    note, run.exit_code = stop_note("generations" if made.complete else "interrupted", signal, run.output)
+    run.notes += [] if note is None else [note]
     return made
+
+
+def next_commands(
+    job: Job, made: Vehicle, flights: Sequence[Path], held_out: Sequence[Path]
+) -> tuple[Sequence[str | Path], ...]:
+    """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
+    config, name = job.config, job.output.stem
+    page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
+    # No flight that is planned says more before the logs are faster.
+    if not made.complete or made.logged_slowly:
+        return (page,)
+    if made.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING, Trust.DO_NOT_USE):
+        mission = job.output.with_name(f"{name}-mission.h5")
+        return page, to_fly(job, mission)
+    if not held_out and len(flights) > 1:
+        judged = job.output.with_name(f"{name}-judged.h5")
+        return page, ("cpfls", "vehicle", config, *flights[:-1], "--held-out", flights[-1], "-o", judged)
+    return page, ("cpfls", "export", job.output, "-o", job.output.with_suffix(".c"))
+
+
+def _config_copy(run: Run, copy: Path | None, made: Vehicle) -> tuple[Path, str] | None:
+    """Write the config again with the numbers that were found in the place of its section `vehicle`."""
+    if copy is None:
+        return None
+    run.last_words = f"{copy}: written, the config with these constants"
+    data = run.data() | {"vehicle": vehicle_section(made)}
+    if run.study.playback.anyway:
+        data["playback"] = {**data.get("playback", {}), "anyway": True}
+    return copy, f"# {run.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}"
+
+
+def _what_can_come(
+    run: Run, flights: Sequence[LoggedFlight], training: Sequence[LoggedFlight]
+) -> tuple[PlaybackSettings, tuple[str, ...]]:
+    """Refuse logs that contradict themselves, and seek no more than slow ones can tell; first a word of it.
+
+    Returns
+    -------
+    PlaybackSettings
+    tuple of str
+        What to say beside the answer.
+    """
+    settings, wrong = run.study.playback, contradictions_of(flights)
+    if wrong and not settings.anyway:
+        raise InputError("\n".join(map(contradicted, wrong)) + f"\n{NOTHING_COMES}")
+    tell_before_search(wrong)
+    own = [flight for flight in training if not flight.group]
+    logged_hz = min(flight.told_hz for flight in own)
+    along = [flight.playback for flight in own]
+    if settings.anyway or not shows_loop_anyhow(run.study.vehicle, along, logged_hz):
+        return settings, ()
+    said = vehicle_words(logged_hz, "too-slow")[0]
+    logging.getLogger("cpfls_cli").warning(said)
+    return replace(settings, leave_out=blocks_of(run.study.vehicle), history_s=0.0), (said,)
+
+
+def _require_rotors(flight: LoggedFlight) -> None:
+    if flight.playback.wrench is not None:
+        raise InputError(
+            f"{flight.name}: holds torque instead of rotor speeds; `cpfls vehicle` needs rotor_speed or rotor_command, "
+            "or thrust beside body_torque, of four rotors with known factors: name their columns in import.signals"
+        )
+
+
+def _found(
+    run: Run,
+    flights: Sequence[LoggedFlight],
+    settings: PlaybackSettings,
+    checkpoint: VehicleCheckpoint,
+    kept: Kept,
+) -> tuple[FoundVehicle, int | None]:
+    """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
+    study, watch = run.study, Watch(run, None)
+    run.progress(0.0, 1, "loads compiled loops")
+
+    def progress(judged: Sequence[Judged], total: int) -> None:
+        best = min(each.error for each in judged)
+        run.progress(len(judged), total, f"structure {len(judged)}, smallest error {best:.3g}")
+        stop = watch.should_stop()
+        if stop or len(judged) % _KEPT_EVERY == 0:
+            checkpoint.write(judged)
+        if stop:
+            raise SearchStoppedError
+
+    along = [flight.playback for flight in flights]
+    with settings_of("playback", study), watch.deferring():
+        try:
+            vehicle = find_vehicle(study.vehicle, along, settings, generator(study, "vehicle"), progress, kept)
+        except SearchStoppedError as error:
+            raise (without_model("interrupted", watch.signal) or error) from None
+    return vehicle, watch.signal
+
+
+def _judged(
+    run: Run,
+    found: FoundVehicle,
+    flights: Sequence[LoggedFlight],
+    learned: Sequence[LearnedFlight],
+    warnings: Iterable[str],
+) -> Vehicle:
+    """Say how well a vehicle predicts the flights that it was not found in, which come last, and what else is known."""
+    training, rest = flights[: len(learned)], flights[len(learned) :]
+    fading_s = fading([flight.playback for flight in training], _horizon(run, training[0]))
+    behind = any(flight.parts[0].commanded for flight in training)
+    shares = any(flight.shares for flight in training)
+    own = {each.name: getattr(found, each.name) for each in fields(found)}
+    own |= {name: replace(own[name], commanded=behind) for name in ("model", "forecast") if own[name] is not None}
+    responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
+    return Vehicle(
+        **own,
+        held_out=_held_out(found, rest, run, fading_s) if rest else None,
+        responses=responses,
+        fading_s=fading_s,
+        full_speed_rad_s=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
+        rotors_logged_hz=min(flight.told_hz for flight in training),
+        logged_by=tuple(dict.fromkeys(flight.system for flight in training if flight.system)),
+        warnings=tuple(warnings),
+        contradictions=contradictions_of(flights),
+        learned=tuple(learned),
+    )
+
+
+def _held_out(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], run: Run, fading_s: float) -> AlongFlights:
+    """Play a vehicle back along flights that it was not found in, from every sample."""
+    models = {"": vehicle.forecast or vehicle.model, **vehicle.others}
+    pairs = [replace(played(models[flight.group], flight, run.study.vehicle), fading_s=fading_s) for flight in flights]
+    if vehicle.history is not None:
+        pairs = [replace(pair, with_past=replace(pair.model, observer=vehicle.history)) for pair in pairs]
+    errors = replay(
+        pairs, _horizon(run, flights[0]), 1, lambda done: run.progress(done, 1, "plays back the flights held out")
+    )
+    return errors.along(pairs)
+
+
+def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> Mapping[str, VehicleResponse]:
+    """Estimate frequency responses with those of the model; none where the flights show the loop alone."""
+    own = [flight for flight in flights if not flight.group]
+    if vehicle.instruments is None and vehicle.loop.unexplained:
+        return {}
+    assert vehicle.sources is not None, "it was found just now"
+    try:
+        return vehicle_responses(vehicle.model, own, vehicle.sources.beside)
+    except InputError:
+        # Stretches that are too short for a window; the flights' inputs were checked before.
+        return {}
+
+
+def _samples(flights: Sequence[LoggedFlight]) -> tuple[list[int], list[int]]:
+    """Count the samples of flights that were learned from, and all that were used: the same."""
+    samples = [sum(map(len, flight.parts)) for flight in flights]
+    return samples, samples
+
+
+def _grouped(
+    flights: Sequence[LoggedFlight], paths: Sequence[Path], groups: Sequence[GroupSettings]
+) -> tuple[LoggedFlight, ...]:
+    """Say of each flight in which configuration the vehicle flew it: the first whose names match."""
+    grouped = []
+    for flight, path in zip(flights, paths, strict=True):
+        own = (group.name for group in groups if any(fnmatch(path.name, name) for name in group.flights))
+        grouped.append(replace(flight, group=next(own, "")))
+    return tuple(grouped)
+
+
+def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlight]) -> None:
+    """Refuse groups that no flight tells anything of."""
+    flown = {flight.group for flight in training}
+    for group in groups:
+        if group.name not in flown:
+            names = joined(repr(name) for name in group.flights)
+            raise ConfigError(
+                f"playback.groups: no training flight belongs to {group.name}: no file name matches {names}; name its "
+                f"files there or leave the group out"
+            )
+    if "" not in flown:
+        raise ConfigError(
+            "playback.groups: every flight belongs to a group; at least one has to be of the section vehicle, whose "
+            "mass gives all numbers their size"
+        )
+
+
+def _horizon(run: Run, flight: LoggedFlight) -> int:
+    return max(1, round(run.study.playback.horizon_s / flight.parts[0].period))
+
+
+def _check_blocks(study: Study) -> None:
+    """Refuse names of blocks that no vehicle has."""
+    known = (*study.vehicle.unknown, *blocks_of(study.vehicle))
+    for name in study.playback.leave_out:
+        _check_block("playback.leave_out", name, known)
+    for group in study.playback.groups:
+        for name in group.differs or ():
+            _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *known))
+
+
+def _check_block(key: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        hint = did_you_mean(name, known, f"the blocks are {', '.join(known)}")
+        raise ConfigError(f"{key} = {name}: no such block ({hint})")
