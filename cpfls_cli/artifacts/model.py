@@ -302,7 +302,9 @@ class AnyModel:
 
     MADE_BY: ClassVar[str]
     """Command that makes it."""
-    model: VehicleModel
+    if TYPE_CHECKING:
+        # Of a result it is a field, whose kind the class says that has it.
+        model: VehicleModel
 
     @property
     def learned_from(self) -> tuple[LearnedFlight, ...]:

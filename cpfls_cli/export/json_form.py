@@ -23,6 +23,7 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
 
 _WHITE = ("torque_white_n_m_sqrt_s", "force_white_n_sqrt_s")

@@ -237,9 +237,9 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
         motion = flight.motion
         moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if len(found.size) > 3 else [])]
         signals = np.hstack([flight.speed**2, *moves])
-        for part in (part for part in flight.stretches if seen.count(part.stop - part.start)):
-            left.append(seen.derivative(own[part, 0]) - seen.average(own[part, 1]))
-            told.append(seen.average(signals[part]))
+        for own_part in (each for each in flight.stretches if seen.count(each.stop - each.start)):
+            left.append(seen.derivative(own[own_part, 0]) - seen.average(own[own_part, 1]))
+            told.append(seen.average(signals[own_part]))
     if not left:
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
@@ -314,8 +314,15 @@ def gusts_in(
     foretold, without = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
-    shares = {"foretold": none * foretold, "foretold_without": none * (foretold + shared * (without - foretold))}
-    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares, white=white, lack=lack)
+    return FoundGusts(
+        **ends,
+        told_by=told_by,
+        noise=columns[:, len(RANGES) :],
+        foretold=none * foretold,
+        foretold_without=none * (foretold + shared * (without - foretold)),
+        white=white,
+        lack=lack,
+    )
 
 
 def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
@@ -379,8 +386,8 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
     momentum = np.hstack([motion.rate @ inertia, mass * velocity])
     sides = np.zeros((len(flight), 2, 6))
     sides[:, 0] = momentum
-    for part in flight.stretches:
-        sides[part, 1] = wrench_during(model, flight, part)
+    for stretch in flight.stretches:
+        sides[stretch, 1] = wrench_during(model, flight, stretch)
     sides[:, 1, :3] -= np.cross(motion.rate, momentum[:, :3])
     sides[:, 1, 3:] -= np.cross(motion.rate, momentum[:, 3:])
     sides[:, 1, 3:] -= mass * model.vehicle.gravity_m_s2 * motion.rotation[:, 2]

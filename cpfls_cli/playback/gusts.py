@@ -126,8 +126,8 @@ class GustRanges:
 def gust_axes(found: Any, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
     """Give what has the fields of `GustRanges` as accelerations by axis; other parameters as `GustRanges.axes`."""
     bodies = np.append(inertia[:3], [mass] * 3)[: len(found.size)]
-    columns = (found.size / bodies, found.low / bodies, found.high / bodies)
-    columns += (found.memory, found.memory_low, found.memory_high)
+    sizes = (found.size / bodies, found.low / bodies, found.high / bodies)
+    columns = (*sizes, found.memory, found.memory_low, found.memory_high)
     return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
 
 

@@ -61,8 +61,6 @@ class LoopBounds(NamedTuple):
     What is explained may be of a better model than that of the bounds.
     """
 
-    SHOWN = ("shows_loop", "misses")
-
     low: Annotated[Array, _by_axis("least factor on the moment of inertia; 1 lies between both if the model is right")]
     high: Annotated[Array, _by_axis("largest factor on the moment of inertia")]
     explained: Annotated[Array, _by_axis("share of the rotation in a band that torque explains, the least")]

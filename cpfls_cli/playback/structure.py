@@ -174,7 +174,8 @@ class Choice:
                 name,
                 each.structure.blocks,
                 each.error,
-                *each.worse_than(self.best),
+                each.worse_than(self.best)[0],
+                each.worse_than(self.best)[1],
                 each.numbers,
                 each.condition_number,
             )

@@ -170,7 +170,7 @@ def find_vehicle(
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, told=forecast is not None)
     shares, airspeed = _shares(model, own)
-    rests = forecast is not None and constants is not None
+    used = None if forecast is None or constants is None else used_instruments(given, constants)
     return FoundVehicle(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
@@ -185,7 +185,7 @@ def find_vehicle(
         guessed=tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
         loop=loop,
-        instruments=used_instruments(given, constants) if rests else None,
+        instruments=used,
         forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
         disturbance=gusts,
         history=find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,

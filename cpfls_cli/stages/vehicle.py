@@ -33,6 +33,7 @@ from cpfls_cli.artifacts.parameters import (
     too_heavy,
     vehicle_section,
 )
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle, mismatches
 from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.stopped import stop_note, without_model
@@ -298,7 +299,7 @@ def vehicle(
     # After the rotors are known to be those of a vehicle that flies: blocks of others cannot be scaled.
     _check_blocks(run.study)
     _check_groups(run.study.playback.groups, read[: len(flights)])
-    training, rest = read[: len(flights)], read[len(flights) :]
+    training = read[: len(flights)]
     settings, limit = _what_can_come(run, read, training)
     if run.dry_run:
         return None
@@ -307,10 +308,7 @@ def vehicle(
     run.until_written.enter_context(checkpoint.kept())
     found, signal = _found(run, training, settings, checkpoint, kept or {})
     warnings = [*limit, *twice, *(warning for flight in read for warning in flight.warnings)]
-    files = [run.files[role] for role in learned]
-    made = _judged(
-        run, found, read, [LearnedFlight.in_file(*each) for each in zip(files, *_samples(training))], warnings
-    )
+    made = _judged(run, found, read, list(_learned([run.files[role] for role in learned], training)), warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
         run.text = _config_copy(run, write_config, made)
@@ -466,10 +464,11 @@ def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> Mappin
         return {}
 
 
-def _samples(flights: Sequence[LoggedFlight]) -> tuple[list[int], list[int]]:
-    """Count the samples of flights that were learned from, and all that were used: the same."""
-    samples = [sum(map(len, flight.parts)) for flight in flights]
-    return samples, samples
+def _learned(files: Iterable[InputFile], flights: Iterable[LoggedFlight]) -> Iterator[LearnedFlight]:
+    """Say of flights that all samples that were used were learned from."""
+    for file, flight in zip(files, flights, strict=True):
+        samples = sum(map(len, flight.parts))
+        yield LearnedFlight.in_file(file, samples, samples)
 
 
 def _grouped(
