@@ -176,6 +176,11 @@ def _environment(folder: Path, added: _Added) -> Environment:
     return made
 
 
+def environment(folder: Path, added: Mapping[str, Any] = _NOTHING) -> Environment:
+    """Make what renders the templates of a folder, with what a stage adds."""
+    return _environment(folder, _Added(added))
+
+
 def words(
     template: str, given: Any, *, folder: Path = TEMPLATES, added: Mapping[str, Any] | None = None, **more: Any
 ) -> str:
@@ -188,8 +193,7 @@ def words(
     **more : object
         What it knows of this result.
     """
-    environment = _environment(folder, _Added(_NOTHING if added is None else added))
-    return environment.get_template(f"{template}.md.j2").render(r=given, **more)
+    return environment(folder, added or _NOTHING).get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass

@@ -24,6 +24,7 @@ from cpfls_cli.artifacts.output import (
     filled_folder,
     refuse_inputs,
     refuse_own,
+    write_files,
     write_text,
 )
 from cpfls_cli.artifacts.spec import InputFile
@@ -99,16 +100,16 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
-    notes : list of Text
-        Behind the answer too: what a person has to know of how it came about.
+    texts : dict of Path to str
+        Other files that are written with the result.
+    said : list of Text
+        Of this run alone: its file says none of it again.
     until_written : ExitStack
         Contexts that last until the result is written, or it is sure that it will not be.
     afterwards : list of callable
         What is done when the result is written.
     data : callable
         Gives the config as plain data, with what the command line changes of it.
-    text : tuple of (Path, str) or None
-        A file of text that is written behind the result.
     """
 
     writes: bool = True
@@ -119,11 +120,11 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
-    notes: list[Text] = field(default_factory=list)
+    texts: dict[Path, str] = field(default_factory=dict)
+    said: list[Text] = field(default_factory=list)
     until_written: ExitStack = field(default_factory=ExitStack)
     afterwards: list[Callable[[], object]] = field(default_factory=list)
     data: Callable[[], dict[str, Any]] = dict
-    text: tuple[Path, str] | None = None
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -137,6 +138,14 @@ class Run(Job):
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
+
+    def say(self, text: str) -> None:
+        """Add to the answer what only this run has to say."""
+        self.said.append(Text(text))
+
+    def note(self, text: str) -> None:
+        """Add a note to the answer of this run."""
+        self.said.append(Text(text, "warning"))
 
     def cautions_of(self, *names: str) -> tuple[str, ...]:
         """List what speaks against results of these names, and against all."""
@@ -195,6 +204,8 @@ class Stage:
         Whether options that may be repeated take all values that follow.
     resumes : bool
         Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
+    overrides : callable or None
+        Gives overrides of the config that its options stand for.
     """
 
     function: Callable[..., Any]
@@ -206,7 +217,8 @@ class Stage:
     fills: Filled | None
     study: bool
     several: bool
-    resumes: bool = False
+    resumes: bool
+    overrides: Callable[..., list[str]] | None
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -274,8 +286,6 @@ class Stage:
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
-        if run.text:
-            write_text(*run.text)
         for act in run.afterwards:
             act()
         if self.fills and run.writes:
@@ -283,6 +293,8 @@ class Stage:
         several = len(results) > 1
         texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
         texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+        if run.writes:
+            self._write(run, run.output, results)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -290,7 +302,7 @@ class Stage:
             (
                 *(block for text in texts for block in page.blocks(text)),
                 *([Text(run.last_words)] if run.last_words else []),
-                *run.notes,
+                *run.said,
                 *caution_texts(cautions),
             ),
             run.exit_code,
@@ -387,6 +399,7 @@ class Stage:
             return
         if not self.folder:
             store.write(output, results[""], run.origin(self.name))
+            write_files(run.texts)
             return
         several = {f"{_INDEX}.html": results} if len(results) > 1 else {}
         names = [*several, *(name + end for name in results for end in (".h5", ".html"))]
@@ -418,10 +431,11 @@ def stage(
     study: bool = False,
     several: bool = False,
     resumes: bool = False,
+    overrides: Callable[..., list[str]] | None = None,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, resumes
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, resumes, overrides
     )
 
 

@@ -23,7 +23,7 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.rebuilt import inertia_functions
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.reduction.selection import Selection
@@ -413,7 +413,7 @@ def _move(sources: Sources) -> Measurement:
     return decided(off[worst] <= _MOVE_TOLERANCE, f"{percent(off[worst], 2)} ({worst})", why)
 
 
-def _move_numbers(trajectory: Source[TrajectoryRecord]) -> dict[str, float]:
+def _move_numbers(trajectory: Source[PlannedPath]) -> dict[str, float]:
     """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
     from scipy.integrate import trapezoid
 

@@ -11,7 +11,6 @@ from typing import Any
 from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
-    ("cpfls/trajectory", ""): "trajectory.TrajectoryRecord",
     ("cpfls/flight", ""): "flight.FlightRecord",
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",

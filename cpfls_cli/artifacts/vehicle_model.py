@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import AnyModel, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, Parameter, is_learned, parameters_of
-from cpfls_cli.flightlog.logging_rates import SLOW_HZ
+from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.playback.errors import FADING, AlongFlights
 from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle
 from cpfls_cli.response.flown import VehicleResponse

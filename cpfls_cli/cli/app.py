@@ -22,12 +22,9 @@ from cpfls_cli.arguments import (
     FileArgument,
     FlightArgument,
     FlightsArgument,
-    Flown,
     FlownArgument,
     FolderOption,
     HeldOutOption,
-    HoldOption,
-    HorizonOption,
     LogArgument,
     LogsArgument,
     ModelArgument,
@@ -52,23 +49,6 @@ from cpfls_cli.cli.options import (
     refuse_overrides,
     sheet,
     with_common,
-)
-from cpfls_cli.cli.path_options import (
-    BandOption,
-    BoxOption,
-    DurationOption,
-    ExciteOption,
-    ForOption,
-    HeightOption,
-    HomeOption,
-    HoverOption,
-    MissionOption,
-    PlotOption,
-    RepeatOption,
-    SignalOption,
-    SizeOption,
-    ToTellOption,
-    WaypointsOption,
 )
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
@@ -119,47 +99,6 @@ def _main(
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
-
-
-@_command()
-def trajectory(
-    config: ConfigArgument,
-    output: OutputOption,
-    waypoints: WaypointsOption = None,
-    to_tell: ToTellOption = None,
-    diagnosis: ForOption = None,
-    box: BoxOption = None,
-    height: HeightOption = None,
-    duration: DurationOption = None,
-    hover: HoverOption = None,
-    repeat: RepeatOption = None,
-    excite: ExciteOption = None,
-    signal: SignalOption = None,
-    band: BandOption = None,
-    size: SizeOption = None,
-    form: MissionOption = None,
-    home: HomeOption = None,
-    plot: PlotOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
-    with messages_for_errors():
-        options = _of("path-options")
-        added = options.Added(repeat, excite, None if signal is None else signal.value, band, size, hover)
-        asked = options.option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
-        asked += added.overrides(waypoints, to_tell is not None or diagnosis is not None, duration)
-        common = replace(common, overrides=[*(common.overrides or []), *asked])
-
-    def call(command: Any, job: Job) -> Any:
-        mission = _of("mission").mission_of(job.study, [each.value for each in form or []], home)
-        if job.study.trajectory.path == "next-flight":
-            return _of("next-flight").run(job, diagnosis, plot)
-        options.require_no_room(box, height)
-        added.require_axes(job.study)
-        return command.run(job, waypoints, plot, mission)
-
-    _run("trajectory", config, output, common, call)
 
 
 @_command()
@@ -573,8 +512,8 @@ def export(
         ExportFormat | None,
         typer.Option(
             "--format",
-            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
+            "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
             "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
             "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
             "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
@@ -618,28 +557,6 @@ def spread(
         return command.run(job, model, count, seed, anyway=anyway)
 
     _run_without_config("spread", output, common, call)
-
-
-@_command("verify-export")
-def verify_export(
-    model: ModelArgument,
-    flight: Annotated[
-        Path, typer.Argument(metavar="FLIGHT", help="A flight, or a log that the config of the model describes.")
-    ],
-    form: Annotated[Flown, typer.Option("--format", help="What the exported vehicle is flown in.")],
-    horizon: HorizonOption = None,
-    windows: Annotated[int, typer.Option("--windows", metavar="N", min=1, help="Runs, spread over the flight.")] = 10,
-    hold: HoldOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Export a model, fly that along a flight from measured states, and compare it with the model's own playback."""
-    with messages_for_errors():
-        command = _of("verify-export")
-        options = command.Options(
-            form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
-        )
-        tell(command.run(model, flight, options, force=common.force, dry_run=common.dry_run), common)
 
 
 @_command()

@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -146,6 +147,8 @@ def command_of(own: Stage) -> Callable[..., None]:
             from cpfls_cli.artifacts.output import locked
 
             narration = Narration(own.name, common.verbose and not common.quiet)
+            if own.overrides:
+                common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
             with progress_bar(own.name, common) as progress:
                 run = run_of(own, common, output, config, narration.reads, progress)
                 with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):

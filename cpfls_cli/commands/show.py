@@ -23,7 +23,6 @@ from cpfls_cli.store import examine, stage_of
 _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
-    "cpfls/trajectory": "trajectory",
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",

@@ -15,21 +15,22 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on, require_numbers
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.store import holds
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.trajectory import violation_sentence
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
+from cpfls_cli.stages._demand import violation_sentence
+from cpfls_cli.store import read
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel
@@ -79,15 +80,13 @@ def _in_closed_loop(study: Study) -> Study:
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
     """Read times and signals of a plan; without any translation the vehicle is held at its centre of mass."""
-    source = read_record(trajectory, TrajectoryRecord, "time", *MOTION)
-    held = all(getattr(source, name) is None for name in _MOVED)
-    if held and closed:
+    source, _ = read(trajectory, PlannedPath)
+    if source.held and closed:
         raise InputError(
             f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
             "closed-loop out, or plan a path in space"
         )
-    needed = MOTION if held else MOTION + _MOVED
-    source = read_record(trajectory, TrajectoryRecord, "time", *needed)
+    needed = MOTION if source.held else MOTION + _MOVED
     return source.time, {name: getattr(source, name) for name in needed}
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.text import strict_json
+from cpfls_cli.flights.path import Excited, PlannedPath
 from cpfls_cli.trajectory.excited import fade_time
 
 _STEP_S = 0.1
@@ -55,7 +55,7 @@ class Home:
     height: float
 
 
-def waypoint_lines(record: TrajectoryRecord) -> str:
+def waypoint_lines(record: PlannedPath) -> str:
     """Write a path as CSV: time, position, yaw, velocity; of an excited one acceleration, attitude, what is added."""
     assert record.position is not None, "a path in space"
     assert record.velocity is not None, "a path in space"
@@ -64,14 +64,14 @@ def waypoint_lines(record: TrajectoryRecord) -> str:
     step, excited = _STEP_S, record.excited
     if excited is not None:
         assert record.acceleration is not None, "a path in space"
-        step = min(step, 1 / (_SAMPLES_IN_A_PERIOD * float(excited.band[1])))
+        step = min(step, 1 / (_SAMPLES_IN_A_PERIOD * float(excited.band_hz[1])))
         columns += [record.acceleration, record.attitude[:, :2], excited.attitude, excited.acceleration]
         names = (*_POINTS, *_MORE, *_ADDED)
     rows = np.concatenate(columns, axis=1)[:: max(1, round(step / float(record.time[1])))]
     return "\n".join([",".join(names), *(",".join(f"{value:.6f}" for value in row) for row in rows)]) + "\n"
 
 
-def qgc_plan(record: TrajectoryRecord, home: Home) -> str:
+def qgc_plan(record: PlannedPath, home: Home) -> str:
     """Write the points at which a path rests as a mission for PX4, in the file format of QGroundControl.
 
     Raises
@@ -119,11 +119,11 @@ def qgc_plan(record: TrajectoryRecord, home: Home) -> str:
     )
 
 
-def _refuse_no_points(record: TrajectoryRecord, home: Home) -> None:
+def _refuse_no_points(record: PlannedPath, home: Home) -> None:
     assert record.position is not None, "a path in space"
     if record.excited is not None:
         raise InputError("--format px4: a mission of waypoints holds no excitation; leave out --excite, or use csv")
-    if record.leg is None and float(np.ptp(record.position, axis=0).max()):
+    if not record.legs and float(np.ptp(record.position, axis=0).max()):
         raise InputError("--format px4: this path is a curve, but a mission flies from point to point; use csv")
     lowest = home.height + float(record.position[:, 2].min())
     if lowest <= 0:
@@ -133,11 +133,11 @@ def _refuse_no_points(record: TrajectoryRecord, home: Home) -> None:
         )
 
 
-def _rests(record: TrajectoryRecord) -> Iterator[tuple[float, Array, float]]:
+def _rests(record: PlannedPath) -> Iterator[tuple[float, Array, float]]:
     """List how long a path rests, s, where, m, and at which yaw, rad: at its start and at the end of each move."""
     assert record.position is not None, "a path in space"
-    begins = np.array([0.0]) if record.leg is None else np.concatenate([[0.0], record.leg.end])
-    ends = record.time[-1:] if record.leg is None else np.concatenate([record.leg.begin, record.time[-1:]])
+    begins = [0.0, *(move.end_s for move in record.legs)]
+    ends = [*(move.begin_s for move in record.legs), float(record.time[-1])]
     for begin, end in zip(begins, ends, strict=True):
         sample = int(np.searchsorted(record.time, 0.5 * (begin + max(end, begin)), side="right")) - 1
         sample = min(max(sample, 0), len(record.time) - 1)
@@ -166,7 +166,7 @@ def _on_earth(home: Home, place: Array) -> tuple[float, float]:
     return round(home.latitude + degrees(float(place[1]) / north), 9), round(longitude, 9)
 
 
-def system_id_lines(excited: ExcitedGroup, axis: str, run: float, hover: float) -> str:
+def system_id_lines(excited: Excited, axis: str, run: float, hover: float) -> str:
     """Write a sweep of one axis for ArduPilot's System ID mode as a parameter file.
 
     Parameters
@@ -187,10 +187,10 @@ def system_id_lines(excited: ExcitedGroup, axis: str, run: float, hover: float) 
     ----------
     ArduPilot, Copter, System ID mode: parameters SID_*.
     """
-    low, high = (float(value) for value in excited.band)
-    length = run / (1 if excited.signal == "multisine" else len(excited.axis))
+    low, high = (float(value) for value in excited.band_hz)
+    length = run / (1 if excited.signal == "multisine" else len(excited.axes))
     fade = fade_time(low, length)
-    thrust, size = axis == "vertical", float(excited.size[excited.axis.index(axis)])
+    thrust, size = axis == "vertical", float(excited.size_rad[excited.axes.index(axis)])
     magnitude = hover * tan(size) if thrust else degrees(size) * 2 * pi * low
     _refuse_record(length, low, high)
     values = {

@@ -19,35 +19,24 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 _FILTER_ORDER = 2
-_EDGE_S = 0.5
-"""At both ends, where the filter settles, s."""
-
+_EDGE_S = 0.5  # At both ends, where the filter settles, s.
+# Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there.
 SLOW_HZ = 3.0
-"""Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
-
+# Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise.
 _TILT_HZ = 1.0
-"""Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise."""
-
-_RISES = 0.4
-"""Correlation with the lift from which on a vertical axis follows it."""
-
-_AS_NAMED_IS_GOOD_ENOUGH = 0.02
-"""Share that other axes may explain more by noise alone."""
-
+_RISES = 0.4  # Correlation with the lift from which on a vertical axis follows it.
+_AS_NAMED_IS_GOOD_ENOUGH = 0.02  # Share that other axes may explain more by noise alone.
+# Share that other axes than named have to explain, and how many times less they have to leave.
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
-"""Share that other axes than named have to explain, and how many times less they have to leave."""
-
+# Share of the spread of the axis that moves most below which another hardly moves: its sign is that of noise.
 _STILL = 1e-3
-"""Share of the spread of the axis that moves most below which another hardly moves: its sign is that of noise."""
-
-_MOVES_RAD_S = 0.03
-"""Rate below which noise and drift of an attitude are as large as its motion."""
+_MOVES_RAD_S = 0.03  # Rate below which noise and drift of an attitude are as large as its motion.
 
 
 Order = tuple[int, ...]
 Sign = tuple[float, ...]
+# Order and signs of three axes that are what they are called.
 AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
-"""Order and signs of three axes that are what they are called."""
 
 
 def handed(order: Sequence[int], sign: Sequence[float]) -> float:
@@ -57,33 +46,16 @@ def handed(order: Sequence[int], sign: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """How the axes of a measured vector lie to those of a reference.
+    """How the axes of a measured vector lie to those of a reference."""
 
-    Attributes
-    ----------
-    order : tuple of int
-        Which measured column is x, y and z of the reference.
-    sign : tuple of float
-        Of those columns, in that order.
-    gain : float
-        Measured over reference.
-    explained : float
-        Share of the measured vector's square that the reference explains.
-    runner_up : float
-        The same of the next best axes.
-    as_named : float
-        The same of the axes in their order, with a plus.
-    along : tuple of float
-        Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
-        two does not move.
-    """
-
-    order: tuple[int, int, int]
-    sign: tuple[float, float, float]
-    gain: float
-    explained: float
-    runner_up: float
-    as_named: float
+    order: tuple[int, int, int]  # Which measured column is x, y and z of the reference.
+    sign: tuple[float, float, float]  # Of those columns, in that order.
+    gain: float  # Measured over reference.
+    explained: float  # Share of the measured vector's square that the reference explains.
+    runner_up: float  # The same of the next best axes.
+    as_named: float  # The same of the axes in their order, with a plus.
+    # Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
+    # two does not move.
     along: tuple[float, float, float]
 
     @property
@@ -103,18 +75,10 @@ _SIGNED_AXES: Final = tuple(
 
 
 def fit_axes(reference: Array, measured: Array) -> AxisFit:
-    """Find the order and the signs of axes with which one vector follows another.
+    """Find the order and the signs of axes with which one vector follows another, both shape (time, 3), filtered alike.
 
-    Parameters
-    ----------
-    reference, measured : array, shape (time, 3)
-        Filtered alike.
-
-    Returns
-    -------
-    AxisFit
-        As named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
-        with one or two axes, a turn and a mirrored column look alike.
+    They are as named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
+    with one or two axes, a turn and a mirrored column look alike.
     """
     reference = reference - reference.mean(axis=0)
     measured = measured - measured.mean(axis=0)
@@ -127,7 +91,7 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
         (order, sign): sum(sign[axis] * cross[order[axis], axis] for axis in range(3)) for order, sign in _SIGNED_AXES
     }
     explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
-    named = ((0, 1, 2), (1.0, 1.0, 1.0))
+    named = AS_NAMED
     # An axis that does not move fits as well with either sign.
     best = largest(explained, lambda axes: explained[axes])
     runner_up = max(value for axes, value in explained.items() if axes != best)
@@ -185,13 +149,7 @@ def on_clock(rotation: Rotation, time: Array, clock: Array) -> Rotation:
 
 
 def body_rate_from(rotation: Rotation, rate_hz: float) -> Array:
-    """Derive body rates from rotations on a uniform clock.
-
-    Returns
-    -------
-    array, shape (time, 3), rad/s
-        In the body frame of the rotations; the last one stands twice.
-    """
+    """Derive body rates, shape (time, 3), rad/s, from rotations of the body on a uniform clock, the last repeated."""
     steps = (rotation[:-1].inv() * rotation[1:]).as_rotvec() * rate_hz
     return np.vstack([steps, steps[-1:]])
 
@@ -204,22 +162,14 @@ def turning_of(rotation: Rotation, rate_hz: float) -> Array | None:
 
 @dataclass(frozen=True)
 class LeanFit:
-    """How the acceleration over ground follows the lean of a body.
+    """How the acceleration over ground follows the lean of a body."""
 
-    Attributes
-    ----------
-    shares : mapping from (order, sign) to float
-        Share of the acceleration that the lean explains, if these columns of the position with these signs are the
-        first two axes of the attitude's world, and the thrust points along the body's third axis.
-    rises : float
-        1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
-    gain : float
-        Acceleration over what the lean makes of gravity, 1 where the units agree.
-    """
-
+    # By (order, sign); Share of the acceleration that the lean explains, if these columns of the position with these
+    # signs are the first two axes of the attitude's world, and the thrust points along the body's third axis.
     shares: Mapping[tuple[tuple[int, int], tuple[float, float]], float]
+    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
     rises: float
-    gain: float
+    gain: float  # Acceleration over what the lean makes of gravity, 1 where the units agree.
 
     @property
     def explained(self) -> float:
@@ -228,16 +178,10 @@ class LeanFit:
 
 
 class Ground(NamedTuple):
-    """What is slow of an acceleration over ground, in any unit.
+    """What is slow of an acceleration over ground, in any unit."""
 
-    Attributes
-    ----------
-    horizontal : array, shape (time, 2)
-    vertical : array, shape (time,)
-    """
-
-    horizontal: Array
-    vertical: Array
+    horizontal: Array  # Shape (time, 2)
+    vertical: Array  # Shape (time,)
 
     @classmethod
     def of(cls, acceleration: Array, rate_hz: float) -> Ground:
@@ -250,12 +194,7 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
     in the world, which is the body's third axis where that points up and its opposite where it points down. What moves
-    along one axis alone, such as an airplane in a plane, explains nothing.
-
-    Parameters
-    ----------
-    lift : array, shape (time,), or None
-        What grows with the thrust.
+    along one axis alone, such as an airplane in a plane, explains nothing. The lift, if known, grows with the thrust.
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
@@ -270,17 +209,13 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
             together = first * cross[order[0], 0] + second * cross[order[1], 1]
             share = max(float(together), 0.0) ** 2 / (power * total) if told else 0.0
             shares[(order, (first, second))] = share
-    rises = 0.0 if lift is None else _rises(moving.vertical, lift * np.abs(axis[:, 2]), rate_hz)
+    rises = 0.0
+    if lift is not None:
+        other = slow((lift * np.abs(axis[:, 2]))[:, None], rate_hz)[:, 0]
+        if moving.vertical.std() != 0 and other.std() != 0:
+            together = float(np.corrcoef(moving.vertical, other)[0, 1])
+            rises = float(np.sign(together)) if abs(together) > _RISES else 0.0
     return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))
-
-
-def _rises(vertical: Array, lift: Array, rate_hz: float) -> float:
-    """Tell whether a slow vertical acceleration grows (1) or falls (-1) with the lift; 0 if neither."""
-    other = slow(lift[:, None], rate_hz)[:, 0]
-    if vertical.std() == 0 or other.std() == 0:
-        return 0.0
-    together = float(np.corrcoef(vertical, other)[0, 1])
-    return float(np.sign(together)) if abs(together) > _RISES else 0.0
 
 
 def second_derivative(values: Array, rate_hz: float) -> Array:

@@ -16,16 +16,13 @@ from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import largest
 
+# Below which torque and angular acceleration are compared: a controller answers slower, and noise is above.
 _ACCELERATION_HZ = 12.0
-"""Below which torque and angular acceleration are compared: a controller answers slower, and noise is above."""
-
+# A band above that of most gusts and of a controller's answer to them: there the rotors are the cause of motion.
 _FAST_HZ = (6.0, 20.0)
-"""A band above that of most gusts and of a controller's answer to them: there the rotors are the cause of motion."""
-
 _LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
+# Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough.
 _SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
-"""Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough."""
-
 _CORNERS: Final = {
     "front left": (1.0, 1.0),
     "front right": (1.0, -1.0),
@@ -33,70 +30,38 @@ _CORNERS: Final = {
     "rear left": (-1.0, 1.0),
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
-_ROUNDED = 1e-9
-"""Below which a place along an axis is 0."""
-
+_ROUNDED = 1e-9  # Below which a place along an axis is 0.
 _TURNS = ("roll", "pitch", "yaw")
-_LEAST_EXPLAINED = 0.05
-"""Share of the acceleration about one axis that chance does not explain."""
-
+_LEAST_EXPLAINED = 0.05  # Share of the acceleration about one axis that chance does not explain.
+# Sum of the shares of roll and pitch that rotors in their places explain, and how many times that of other places.
 _LEAST_OF_BOTH, _LEAST_TIMES = 0.2, 1.3
-"""Sum of the shares of roll and pitch that rotors in their places explain, and how many times that of other places."""
-
+# How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean.
 _LEAST_OF_MEAN = 0.2
-"""How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean."""
-
-_PREFER_X = 1.3
-"""Few vehicles are a plus: one has to explain that much more than an X."""
+_PREFER_X = 1.3  # Few vehicles are a plus: one has to explain that much more than an X.
 
 
 @dataclass(frozen=True)
 class RotorPlace:
-    """Where a rotor is and how it turns.
+    """Where a rotor is and how it turns."""
 
-    Attributes
-    ----------
-    name : str
-        Such as ``front left``; empty where it is told by its numbers alone.
-    direction : tuple of float
-        x forward and y left, of length 1 where only the direction is known.
-    height_m : float
-        Of the hub above the point that the parameters count from.
-    spin : int
-        1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
-    """
-
-    name: str
-    direction: tuple[float, float]
-    spin: int
-    height_m: float = 0.0
+    name: str  # Such as ``front left``; empty where it is told by its numbers alone.
+    direction: tuple[float, float]  # x forward and y left, of length 1 where only the direction is known.
+    spin: int  # 1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
+    height_m: float = 0.0  # Of the hub above the point that the parameters count from.
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """The rotors of a vehicle, in the order of the log.
-
-    Attributes
-    ----------
-    in_metres : bool
-        Whether the places are lengths; False where they are directions.
-    reason : str
-        Where that is known from.
-    sure : {"stated", "data", "usual", "guess"}
-        Whether parameters state it, the motion shows it clearly, it is what a kind of log has unless changed, or the
-        motion only suggests it.
-    moment_ratio_m : float or None
-        Drag factor over thrust factor that the parameters state.
-    scaled : bool
-        Whether its places are those of an arm that was given.
-    """
+    """The rotors of a vehicle, in the order of the log."""
 
     rotors: tuple[RotorPlace, ...]
-    in_metres: bool
-    reason: str
+    in_metres: bool  # Whether the places are lengths; False where they are directions.
+    reason: str  # Where that is known from.
+    # Whether parameters state it, the motion shows it clearly, it is what a kind of log has unless changed, or the
+    # motion only suggests it.
     sure: str
-    moment_ratio_m: float | None = None
-    scaled: bool = False
+    moment_ratio_m: float | None = None  # Drag factor over thrust factor that the parameters state.
+    scaled: bool = False  # Whether its places are those of an arm that was given.
 
     @property
     def is_guess(self) -> bool:
@@ -128,17 +93,16 @@ class Airframe:
 def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:
     """Read the rotors that the parameters of an autopilot state; None where they state none.
 
+    Rotors that cannot turn the vehicle about all of its axes are refused.
+
     Parameters
     ----------
     rotors : int
         That the log's columns show; 0 where they show none.
-
-    Raises
-    ------
-    InputError
-        If the rotors that are stated cannot turn the vehicle about all of its axes.
     """
-    found = _of_px4(parameters) or _of_frame(parameters, rotors)
+    found, frame = _of_px4(parameters), stated_frame(parameters, rotors)
+    if found is None and frame is not None:
+        found = _laid_out(*frame, "usual" if is_open(frame[0], parameters) else "stated")
     if found is not None:
         _require_control(found)
     return found
@@ -162,14 +126,6 @@ def _name(x: float, y: float) -> str:
     along = "front" if x > _ROUNDED else "rear" if x < -_ROUNDED else ""
     across = "left" if y > _ROUNDED else "right" if y < -_ROUNDED else ""
     return f"{along} {across}".strip()
-
-
-def _of_frame(parameters: Parameters, rotors: int) -> Airframe | None:
-    found = stated_frame(parameters, rotors)
-    if found is None:
-        return None
-    frame, reason = found
-    return _laid_out(frame, reason, "usual" if is_open(frame, parameters) else "stated")
 
 
 def _laid_out(frame: str, reason: str, sure: str) -> Airframe:
@@ -210,8 +166,7 @@ class _RotorLayout(NamedTuple):
         return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in self.rotors]])
 
 
-_Explained = tuple[float, float, float]
-"""Shares of the angular acceleration about roll, pitch and yaw."""
+_Explained = tuple[float, float, float]  # Shares of the angular acceleration about roll, pitch and yaw.
 
 
 @cache
@@ -234,26 +189,17 @@ def _layouts() -> tuple[tuple[_RotorLayout, Array], ...]:
 
 @dataclass(frozen=True)
 class MovedBy:
-    """Four rotors told by the motion, and how clearly.
-
-    Attributes
-    ----------
-    explained : tuple of float
-        Share of the angular acceleration about roll, pitch and yaw that they explain.
-    by_axes : bool
-        Whether every axis says it.
-    clear : bool
-        Whether every rotor by itself says it too.
-    """
+    """Four rotors told by the motion, and how clearly."""
 
     airframe: Airframe
+    # Share of the angular acceleration about roll, pitch and yaw that they explain.
     explained: tuple[float, float, float]
-    by_axes: bool
-    clear: bool
+    by_axes: bool  # Whether every axis says it.
+    clear: bool  # Whether every rotor by itself says it too.
 
 
+# Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus.
 _ON_AN_AXIS = 0.2
-"""Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus."""
 
 
 def place_of(direction: tuple[float, float]) -> str:
@@ -298,7 +244,9 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     band = ""
     if not by_axes and rate_hz / 5 > 2 * _FAST_HZ[0]:
         fast = [_shares(*each)[0] for each in _driven(body_rate, speed, rate_hz, is_command, *_FAST_HZ)]
-        quick = _chosen(_best_of(fast), ("X",))
+        # Of each layout what it explains about each axis with the lag that suits this axis best.
+        best = ((same[0][0], np.max([own for _, own in same], axis=0).tolist()) for same in zip(*fast, strict=True))
+        quick = _chosen([(layout, (x, y, z)) for layout, (x, y, z) in best], ("X",))
         if quick[2]:
             (layout, explained, by_axes), band = quick, f" above {_FAST_HZ[0]:g} Hz"
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
@@ -307,14 +255,6 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     form = "an X" if layout.form == "X" else "a plus"
     reason = f"the motion: as {form} in this order, the rotors explain {words} acceleration{band}"
     return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, by_axes, clear)
-
-
-def _best_of(tried: list[list[tuple[_RotorLayout, _Explained]]]) -> list[tuple[_RotorLayout, _Explained]]:
-    """Give of each layout what it explains about each axis with the lag that suits this axis best."""
-    return [
-        (same[0][0], (max(own[0] for _, own in same), max(own[1] for _, own in same), max(own[2] for _, own in same)))
-        for same in zip(*tried, strict=True)
-    ]
 
 
 def _chosen(
@@ -330,7 +270,7 @@ def _chosen(
 
 
 def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> float:
-    """Give the share of the angular acceleration that rotors explain, wherever they are.
+    """Give the share of the angular acceleration that rotors explain, wherever they are, the mean of the three axes.
 
     Parameters
     ----------
@@ -338,11 +278,6 @@ def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_comma
         In any unit and axes.
     speed, is_command
         See `airframe_from_motion`.
-
-    Returns
-    -------
-    float
-        The mean of the three axes.
     """
     if not speed.any():
         return 0.0

@@ -14,11 +14,9 @@ from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
+# Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
 _POOR_R2 = 0.5
-"""Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted."""
-
-_SMALLEST_WINDOW = 50
-"""Samples for nine numbers, and for a delay."""
+_SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 
 
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
@@ -30,32 +28,13 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
     ----------
     signals : LogSignals
         Not yet filtered.
-    settings : ImportSettings
-        `delay_s`, `delay_max_s`, `torque_source` and the filter that the estimate uses.
     delay_share : float
         Leading share of the samples that the estimate looks at.
-
-    Returns
-    -------
-    LogSignals
-        Time from 0, shorter by the delay.
-
-    Raises
-    ------
-    SettingError
-        If the flight is too short for the estimate, or shorter than the delay; or if the delay is to be estimated and
-        body rates or torque are absent.
-    ComputationError
-        If the torque is constant and the delay is to be estimated.
     """
     estimate = _estimate(signals, settings, delay_share) if settings.delay_s == "estimate" else None
     delay = estimate.delay_s if estimate else float(settings.delay_s)
-    report = replace(
-        signals.report,
-        delay_s=delay,
-        delay=estimate,
-        warnings=signals.report.warnings + (_warnings(estimate) if estimate else ()),
-    )
+    warnings = signals.report.warnings + (_warnings(estimate) if estimate else ())
+    report = replace(signals.report, delay_s=delay, delay=estimate, warnings=warnings)
     return _shifted(replace(signals, report=report), delay, settings.torque_source == "rotor-speed")
 
 
@@ -93,12 +72,11 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     if first > len(signals.time) - 2:
         raise SettingError("delay_s", f"longer than the flight, {signals.time[-1]:.4g} s")
     time = signals.time[first:]
-    commands = (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS
-    cut: dict[str, Array] = {}
-    for name, values in signals.arrays.items():
-        cut[name] = values[first:]
-        if name in commands:
+    cut = {name: values[first:] for name, values in signals.arrays.items()}
+    for name in (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS:
+        if name in cut:
             # A cubic overshoots the steps of a command; it stays within what was commanded.
+            values = signals.arrays[name]
             moved = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
             cut[name] = moved[first:]
     begin, end = signals.report.span_s
@@ -120,8 +98,7 @@ class _Fit:
 
     def scaled_torque(self, delay: float) -> Array:
         moved = delayed(self.torque, delay / self.period)[self.window] / self.scale
-        centred: Array = moved - moved.mean(axis=0)
-        return centred
+        return np.asarray(moved - moved.mean(axis=0))
 
     def r2(self, delay: float) -> tuple[float, Array]:
         torque = self.scaled_torque(delay)
@@ -132,10 +109,6 @@ class _Fit:
         r2 = np.ones(3)
         r2[acting] = 1 - unexplained
         return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
-
-    def inertia(self, delay: float) -> Array:
-        solution = np.linalg.lstsq(self.regressor, self.scaled_torque(delay).ravel(), rcond=None)[0]
-        return np.asarray(solution, dtype=float)
 
 
 def estimate_delay(
@@ -166,33 +139,34 @@ def estimate_delay(
         As commanded, or as computed from the rotors.
     delay_max_s : float
         Longest delay tried, s.
-    lowpass_hz : float or None
-        Cut-off of the filter, Hz.
-    lowpass_order : int
-        Its order.
     share : float
         Leading share of the samples that is looked at, so that data held out for a test stay unseen.
-
-    Raises
-    ------
-    SettingError
-        If the longest delay leaves too few samples.
-    ComputationError
-        If the torque is constant, or the share holds no samples.
 
     References
     ----------
     Section 8 of the method's description.
     """
+    from scipy.optimize import minimize_scalar
+
     used = slice(0, round(share * len(time)))
     fit = _prepare(time[used], body_rate[used], body_torque[used], delay_max_s, lowpass_hz, lowpass_order)
-    delays = np.arange(0.0, delay_max_s, time[1] - time[0])
-    delays = np.append(delays, delay_max_s)
+    delays = np.append(np.arange(0.0, delay_max_s, time[1] - time[0]), delay_max_s)
     curve = np.array([fit.r2(delay)[0] for delay in delays])
-    delay = _refine(fit, delays, int(np.argmin(levelled(-curve))))
+    best = int(np.argmin(levelled(-curve)))
+    bounds = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
+    refined = float(minimize_scalar(lambda own: -fit.r2(float(own))[0], bounds=bounds, method="bounded").x)
+    delay = refined if less(fit.r2(float(delays[best]))[0], fit.r2(refined)[0]) else float(delays[best])
     pooled, r2 = fit.r2(delay)
-    at_bound = bool(delay > delays[-2])
-    return DelayEstimate(delay, r2, pooled, fit.inertia(delay), delays, curve, at_bound)
+    inertia = np.linalg.lstsq(fit.regressor, fit.scaled_torque(delay).ravel(), rcond=None)[0]
+    return DelayEstimate(
+        delay_s=delay,
+        r2=r2,
+        pooled_r2=pooled,
+        inertia=np.asarray(inertia, dtype=float),
+        delays=delays,
+        curve=curve,
+        at_bound=bool(delay > delays[-2]),
+    )
 
 
 def _prepare(
@@ -210,7 +184,10 @@ def _prepare(
     scale[scale == 0] = np.inf
     columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
     regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
-    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, _orthonormal(regressor))
+    # Of columns of one length, so that a weakly excited one is not lost.
+    lengths = np.linalg.norm(regressor, axis=0)
+    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
+    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, directions[:, sizes > 1e-10 * sizes[0]])
 
 
 def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
@@ -224,23 +201,6 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
             f" remain, and at least {_SMALLEST_WINDOW} are needed",
         )
     return slice(int(first), int(last))
-
-
-def _orthonormal(regressor: Array) -> Array:
-    """Compute an orthonormal basis of the columns, scaled first so that a weakly excited one is not lost."""
-    lengths = np.linalg.norm(regressor, axis=0)
-    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
-    basis: Array = directions[:, sizes > 1e-10 * sizes[0]]
-    return basis
-
-
-def _refine(fit: _Fit, delays: Array, best: int) -> float:
-    from scipy.optimize import minimize_scalar
-
-    low, high = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
-    minimum = minimize_scalar(lambda delay: -fit.r2(float(delay))[0], bounds=(low, high), method="bounded")
-    refined, on_grid = float(minimum.x), float(delays[best])
-    return refined if less(fit.r2(on_grid)[0], fit.r2(refined)[0]) else on_grid
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 
@@ -15,48 +15,28 @@ from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 _NOT_JUDGED = frozenset({"voltage"})
 # A rigid body hardly answers what is faster than half of this.
 _FAST_HZ = 100.0
-_FEWEST_UPDATES = 20
-"""Below which a regular step may be chance."""
-
+_FEWEST_UPDATES = 20  # Below which a regular step may be chance.
 _REGULAR_SHARE = 0.8
-_LARGEST_SHARE_AT_ONCE = 0.2
-"""Of updates that come from row to row: jitter, not a rate."""
-
+_LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
 # A knot between two rows bends the line at both of them.
 _ROWS_OF_KNOT = 2
-_STRAIGHT = 1e-3
-"""Bend of what is interpolated, by the rounding of a file, as a share of the largest."""
-
+_STRAIGHT = 1e-3  # Bend of what is interpolated, by the rounding of a file, as a share of the largest.
 # Measured: logs of five vehicles fall by 29 dB below their trend at most, those that were filtered forward and backward
 # by 38 to 85 dB.
 _CLIFF_DB = 30.0
-_STEEPEST_BEFORE_DB = 24.0
-"""Fall in an octave up to which a trend is that of motion, a filter of fourth order."""
-
+_STEEPEST_BEFORE_DB = 24.0  # Fall in an octave up to which a trend is that of motion, a filter of fourth order.
 # A line of vibration is above its trend; a filter leaves no band beyond it near any band before it.
 _CLEARANCE_DB = 25.0
 _LOWEST_HZ = 8.0
-_HIGHEST_SHARE = 0.48
-"""Of the rate: above, aliasing shapes the spectrum."""
-
+_HIGHEST_SHARE = 0.48  # Of the rate: above, aliasing shapes the spectrum.
 _BANDS_PER_OCTAVE = 8
-_FEWEST_BANDS = 5
-"""For the line of a trend."""
-
-_LEAST_OCTAVES_BEYOND = 0.3
-"""That have to be known for a fall to be a cliff."""
-
+_FEWEST_BANDS = 5  # For the line of a trend.
+_LEAST_OCTAVES_BEYOND = 0.3  # That have to be known for a fall to be a cliff.
 _LONGEST_SEGMENT = 2048
 _SEGMENTS = 4
-_FEWEST_IN_SEGMENT = 64
-"""Lines of a spectrum, below which bands hold none."""
-
-_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])
-"""The window by its waves."""
-
-_LINES_OF_WINDOW = 8
-"""Over which the Blackman-Harris window smears a line."""
-
+_FEWEST_IN_SEGMENT = 64  # Lines of a spectrum, below which bands hold none.
+_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])  # The window by its waves.
+_LINES_OF_WINDOW = 8  # Over which the Blackman-Harris window smears a line.
 _HALVED_DB = 6.0
 # The trend that the cut-off is read against, clear of the fall itself.
 _TREND_OCTAVES, _CLEAR_OCTAVES = 2.0, 0.5
@@ -65,19 +45,11 @@ _SMALLEST_POWER = 1e-300
 
 @dataclass(frozen=True)
 class SlowSignal:
-    """A signal that is updated slower than the clock of its log.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Of its updates.
-    between : {"repeated", "interpolated"}
-        What the rows between two updates hold.
-    """
+    """A signal that is updated slower than the clock of its log."""
 
     name: str
-    rate_hz: float
-    between: Literal["repeated", "interpolated"]
+    rate_hz: float  # Of its updates.
+    between: Literal["repeated", "interpolated"]  # What the rows between two updates hold.
 
 
 def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = None) -> tuple[SlowSignal, ...]:
@@ -92,24 +64,14 @@ def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = No
         How often a second signals were logged, of those with stamps of their own: of these the stamps decide, unless
         their values come slower still.
     """
-    stamped = _stamped(table, stamped_hz or {})
-    found = {name: _slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED}
-    for name, own in stamped.items():
-        seen = found[name]
-        if seen is None or seen.rate_hz > _REGULAR_SHARE * own.rate_hz:
-            found[name] = own
-    return tuple(signal for signal in found.values() if signal is not None)
-
-
-def _stamped(table: SignalTable, stamped_hz: Mapping[str, float]) -> dict[str, SlowSignal]:
-    """List what was logged at less than half the rate of the rows, by its own stamps."""
     rate = 1 / float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
-    slow = {name: own for name, own in stamped_hz.items() if name in table.signals and name not in _NOT_JUDGED}
-    return {
-        name: SlowSignal(name, own, "repeated" if name in COMMANDS else "interpolated")
-        for name, own in slow.items()
-        if 0 < 2 * own <= rate
-    }
+    found = {name: _slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED}
+    for name, own in (stamped_hz or {}).items():
+        if name in found and 0 < 2 * own <= rate:
+            seen = found[name]
+            if seen is None or seen.rate_hz > _REGULAR_SHARE * own:
+                found[name] = SlowSignal(name, own, "repeated" if name in COMMANDS else "interpolated")
+    return tuple(signal for signal in found.values() if signal is not None)
 
 
 def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:
@@ -124,8 +86,10 @@ def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:
     bends = np.abs(np.diff(steps / np.diff(time)[:, None], axis=0))
     straight = np.all(bends <= _STRAIGHT * np.quantile(bends, 0.95, axis=0), axis=1)
     knots = np.flatnonzero(~straight & np.concatenate([[True], straight[:-1]]))
-    if _regular(knots, fewest=_ROWS_OF_KNOT + 1) and _mostly_straight(straight, knots):
-        return SlowSignal(name, _rate(time, knots), "interpolated")
+    if _regular(knots, fewest=_ROWS_OF_KNOT + 1):
+        usual = float(np.median(np.diff(knots)))
+        if straight.mean() >= _REGULAR_SHARE * (usual - _ROWS_OF_KNOT) / usual:
+            return SlowSignal(name, _rate(time, knots), "interpolated")
     return None
 
 
@@ -141,11 +105,6 @@ def _regular(updates: IntArray, fewest: int) -> bool:
     usual = float(np.median(apart))
     near = np.abs(apart - usual) <= max(1.0, 0.25 * usual)
     return bool(usual >= fewest and near.mean() >= _REGULAR_SHARE and (apart < fewest).mean() <= _LARGEST_SHARE_AT_ONCE)
-
-
-def _mostly_straight(straight: BoolArray, knots: IntArray) -> bool:
-    usual = float(np.median(np.diff(knots)))
-    return bool(straight.mean() >= _REGULAR_SHARE * (usual - _ROWS_OF_KNOT) / usual)
 
 
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
@@ -165,38 +124,24 @@ def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
 
 
 def cut_offs(signals: Mapping[str, Array], rate_hz: float, slow: tuple[SlowSignal, ...]) -> dict[str, float]:
-    """Find the cut-off of the low-pass filter that a signal went through before it was logged.
+    """Find the cut-off, Hz, of the low-pass filter that a signal, uniform in time, went through before it was logged.
 
     Its spectrum falls off a cliff there: within an octave by 30 dB more than its trend of the octave before. A filter
-    of low order falls too gently to be told from motion, and one below 8 Hz from motion that ends there.
-
-    Parameters
-    ----------
-    signals : mapping from signal name to array, shape (time, column)
-        Uniform in time, without absent values.
-    slow : tuple of SlowSignal
-        Not judged: straight lines between updates have a spectrum of their own.
-
-    Returns
-    -------
-    dict from signal name to float, Hz
-        Where the amplitude is halved, median over the columns that show it; signals where most columns do not are
-        left out.
+    of low order falls too gently to be told from motion, and one below 8 Hz from motion that ends there. It is where
+    the amplitude is halved, median over the columns that show it; left out are signals where most columns do not, and
+    `slow` ones: straight lines between updates have a spectrum of their own.
     """
     left_out = _NOT_JUDGED | {signal.name for signal in slow}
     found = {}
     for name, values in signals.items():
-        edges = [] if name in left_out else [_cut_off(column, rate_hz) for column in values.T]
-        seen = [edge for edge in edges if edge is not None]
-        if 2 * len(seen) > len(edges):
+        seen = []
+        for octave, level in [] if name in left_out else [_spectrum(column, rate_hz) for column in values.T]:
+            drops = [(_cliff(octave, level, at), at) for at in octave if 2**at >= _LOWEST_HZ]
+            drop, at = max(drops, default=(0.0, 0.0))
+            seen += [_halved(octave, level, at)] if drop > _CLIFF_DB else []
+        if 2 * len(seen) > values.shape[1]:
             found[name] = float(np.median(seen))
     return found
-
-
-def _cut_off(values: Array, rate_hz: float) -> float | None:
-    octave, level = _spectrum(values, rate_hz)
-    cliffs = [(drop, at) for at in octave if 2**at >= _LOWEST_HZ and (drop := _cliff(octave, level, at)) > _CLIFF_DB]
-    return _halved(octave, level, max(cliffs)[1]) if cliffs else None
 
 
 def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:

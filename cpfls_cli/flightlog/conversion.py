@@ -11,8 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.agreement import rotations_of
-from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings, SignalMap
+from cpfls_cli.flightlog.repair import continuous_attitude
+from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 from cpfls_cli.words import some
 
@@ -21,9 +21,8 @@ _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
+# Likeness of names by difflib that is worth a hint, and that of names of so many letters.
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
-"""Likeness of names by difflib that is worth a hint, and that of names of so many letters."""
-
 # Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
 # what mixers get and no command of a rotor.
 _SAME_IN_PX4 = (
@@ -48,14 +47,9 @@ def present_choices(columns: Container[str], settings: ImportSettings) -> Import
 
 
 def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
-    """Leave out the optional signals whose columns the log does not hold.
+    """Leave out the optional signals whose columns the log does not hold; what is left has to describe a flight.
 
     A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
-
-    Raises
-    ------
-    InputError
-        If the remaining signals describe neither the rotation nor the rotors, or another key needs an absent one.
     """
     absent = [
         name
@@ -77,25 +71,10 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
 
 
 def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tuple[Array, dict[str, Array]]:
-    """Take the time stamps and the mapped columns of a log, in SI and with their signs.
+    """Take the stamps of a log, s from 0, and its mapped columns by signal, shape (sample, column), SI, with signs.
 
-    Parameters
-    ----------
-    columns : mapping from str to array, shape (sample,)
-        The log.
-
-    Returns
-    -------
-    time : array, shape (sample,), s
-        Time stamps from 0.
-    signals : dict from signal name to array, shape (sample, column), SI
-        Frames and order as in the log.
-
-    Raises
-    ------
-    InputError
-        If columns are missing, empty or of unequal length; the message names all of them, the config key of each
-        and the nearest columns of the log.
+    Frames and order are those of the log. Columns that are missing, empty or of unequal length are refused; the message
+    names all of them, the config key of each and the nearest columns of the log.
     """
     _require_present(columns, settings)
     stamps = np.asarray(columns[str(settings.time_column)], dtype=float)
@@ -105,7 +84,11 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         unlike = next((size for column in signal.columns if (size := len(columns[column])) != len(time)), None)
         if unlike is not None:
             raise InputError(f"import.signals.{name}.columns: {unlike} values for {len(time)} time stamps")
-    signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
+    signals: dict[str, Array] = {}
+    for name, signal in settings.signals.items():
+        values = np.column_stack([np.asarray(columns[column], dtype=float) for column in signal.columns])
+        values[~np.isfinite(values)] = np.nan
+        signals[name] = to_si(as_mapped(values, signal), signal.unit)
     return time, signals
 
 
@@ -120,12 +103,6 @@ def _first(stamps: Array, settings: ImportSettings) -> float:
     if len(finite) < 2:
         raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")
     return float(finite[0])
-
-
-def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
-    values = np.column_stack([np.asarray(columns[name], dtype=float) for name in signal.columns])
-    values[~np.isfinite(values)] = np.nan
-    return to_si(as_mapped(values, signal), signal.unit)
 
 
 def as_mapped(values: Array, columns: ColumnMap) -> Array:
@@ -192,19 +169,9 @@ def columns_in_words(columns: Collection[str]) -> str:
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
-    """Convert signals to roll, pitch, yaw, body vectors in FLU and world vectors in ENU.
+    """Convert signals, shape (time, column), SI, in the log's frames, to those of `LogSignals`, by its names.
 
-    Parameters
-    ----------
-    signals : mapping from signal name to array, shape (time, column), SI
-        Without absent values, in the log's frames.
-    settings : ImportSettings
-        The frames and the order of a quaternion.
-
-    Returns
-    -------
-    dict from str to array
-        Names among those of `LogSignals`.
+    Those are roll, pitch, yaw, body vectors in FLU and world vectors in ENU.
     """
     in_body = _as_body_vectors(signals, settings)
     converted: dict[str, Array] = {name: signals[name] for name in ROTORS if name in signals}
@@ -225,20 +192,9 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
 
 
 def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
-    """Convert setpoints as what they are setpoints of.
+    """Convert setpoints, shape (time, column), SI, NaN where nothing is asked for, as what they are setpoints of.
 
-    Parameters
-    ----------
-    signals : mapping from signal name to array, shape (time, column), SI
-        Those of `SETPOINTS`, in the log's frames; NaN where nothing is asked for.
-    settings : ImportSettings
-        The frames and the order of a quaternion.
-
-    Returns
-    -------
-    dict from str to array, shape (time, column)
-        By the names that `SETPOINTS` gives: attitude as roll, pitch, yaw, also of a quaternion; thrust and sticks as
-        logged.
+    They are named as in `SETPOINTS`: attitude is roll, pitch, yaw, also of a quaternion; thrust and sticks as logged.
     """
     named: dict[str, Array] = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
     converted = dict(named)
@@ -257,8 +213,7 @@ def _attitude_asked(values: Array, settings: ImportSettings) -> Array:
         own = values[known]
         if settings.signals["setpoint_attitude"].unit == "1":
             own = attitude_from_quaternion(own, settings.quaternion_order)
-        angles = attitude_to_enu_flu(own, settings.body_frame, settings.world_frame)
-        attitude[known] = np.column_stack([unwrap_angles(angles[:, 0]), angles[:, 1], unwrap_angles(angles[:, 2])])
+        attitude[known] = continuous_attitude(attitude_to_enu_flu(own, settings.body_frame, settings.world_frame))
     return attitude
 
 
@@ -316,22 +271,16 @@ def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) 
 
 def euler_angles(rotation: Array) -> Array:
     """Extract `rotations.euler_angles`, roll and yaw without jumps; both arbitrary where the pitch is +-90 degrees."""
-    roll, pitch, yaw = rotations.euler_angles(rotation).T
-    return np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
+    return continuous_attitude(rotations.euler_angles(rotation))
 
 
 def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> Array:
-    """Convert specific force to acceleration, ``a = R f - g e_z``.
+    """Convert specific force, m/s^2, body FLU, to acceleration, ``a = R f - g e_z``, shape (time, 3), m/s^2, world ENU.
 
     Parameters
     ----------
     attitude : array, shape (time, 3), rad
         Of body FLU in world ENU.
-    specific_force : array, shape (time, 3), m/s^2, body frame FLU
-
-    Returns
-    -------
-    array, shape (time, 3), m/s^2, world frame ENU
     """
     acceleration: Array = rotations.multiply(rotations.rotation_matrix(attitude), specific_force)
     acceleration[:, 2] -= STANDARD_GRAVITY

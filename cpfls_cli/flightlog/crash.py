@@ -10,79 +10,49 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_opening
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.units import STANDARD_GRAVITY
 
-ALIVE = 0.02
-"""Share of the largest command below which rotors stand."""
-
+ALIVE = 0.02  # Share of the largest command below which rotors stand.
+# For how long it rests at least, the rate below which it does, however it shakes, and in all, by which it would turn by
+# some 10 degrees; and that above which it surely flies.
 _REST_S, _CALM_RAD_S, _TURNED_RAD_S, LIVELY_RAD_S = 1.5, 0.5, 0.15, 0.05
-"""For how long it rests at least, the rate below which it does, however it shakes, and in all, by which it would turn
-by some 10 degrees; and that above which it surely flies."""
-
-SLOW_S = 0.5
-"""Means over so long hold no vibration."""
-
+SLOW_S = 0.5  # Means over so long hold no vibration.
+# Of gravity: size of the force that carries a vehicle at rest, and its share along the thrust below which no rotor
+# does: more than 60 degrees off.
 _WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
-"""Of gravity: size of the force that carries a vehicle at rest, and its share along the thrust below which no rotor
-does: more than 60 degrees off."""
-
-_SENSES = (0.7, 2.0)
-"""Of gravity: the median force of a log, by which an accelerometer and its unit are believed."""
-
+_SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accelerometer and its unit are believed.
+# For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
+# of the time with rotors on that is so where an attitude is wrong throughout.
 _OVER_S, _OVER = 3.0, 0.2
-"""For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the
-share of the time with rotors on that is so where an attitude is wrong throughout."""
-
+# Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
+# below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
-"""Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
-below which it does not turn, as a share of what is usual and by itself."""
-
+# Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
+# the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
-"""Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
-the time from its last wild motion to the end, in which no pilot has recovered."""
-
+# After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies.
 _THEN_S, _LIES_S = 1.0, 3.0
-"""After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies."""
-
+# Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes.
 _BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
-"""Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes."""
-
+# Rate and lean beyond those of the flight before, at least, by which control is lost where a rotor is at its limit, as
+# a share of the largest command.
 _STRAINED_RAD_S, _STRAINED_RAD, _AT_LIMIT = 1.0, 0.5, 0.95
-"""Rate and lean beyond those of the flight before, at least, by which control is lost where a rotor is at its limit,
-as a share of the largest command."""
-
+# Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does not
+# follow them.
 _TURN_S, _NOT_FOLLOWED = 0.1, 0.7
-"""Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does
-not follow them."""
-
+# Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second, m.
 _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
-"""Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second,
-m."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
-    """What a log holds on whether the vehicle flies, on a uniform clock.
+    """What a log holds on whether the vehicle flies, on a uniform clock."""
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-        As it is said.
-    rotors : array, shape (time, rotor), or None
-        Commands or speeds as shares, 0 where they stand.
-    height : array, shape (time,), m, or None
-        Upward.
-    body_rate : array, shape (time, 3), rad/s, or None
-    upright : array, shape (time,), or None
-        Cosine of the lean; of either sign, as frames of logs have it.
-    force : array, shape (time, 3), body frame, or None
-        Of an accelerometer, in m/s^2 or in g.
-    """
-
-    time: Array
-    rotors: Array | None = None
-    height: Array | None = None
-    body_rate: Array | None = None
+    time: Array  # Shape (time,), s; as it is said.
+    rotors: Array | None = None  # Shape (time, rotor), or None; commands or speeds as shares, 0 where they stand.
+    height: Array | None = None  # Shape (time,), m, or None; upward.
+    body_rate: Array | None = None  # Shape (time, 3), rad/s; or None
+    # Shape (time,), or None; cosine of the lean; of either sign, as frames of logs have it.
     upright: Array | None = None
-    force: Array | None = None
+    force: Array | None = None  # Shape (time, 3), body frame, or None; of an accelerometer, in m/s^2 or in g.
 
     @property
     def period(self) -> float:
@@ -127,17 +97,12 @@ class Signs:
 
 
 class EarlyEnd(NamedTuple):
-    """What ended a flight before its time, and its first sample.
-
-    Attributes
-    ----------
-    moments : tuple of (str, float)
-        What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``, ``impact``, ``rests with its
-        rotors on``, ``rotors stop in the air``.
-    """
+    """What ended a flight before its time, and its first sample."""
 
     first: int
     what: str
+    # What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``,
+    # ``impact``, ``rests with its rotors on``, ``rotors stop in the air``.
     moments: tuple[tuple[str, float], ...] = ()
 
 

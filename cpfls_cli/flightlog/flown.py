@@ -7,7 +7,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.crash import (
     ALIVE,
     LIVELY_RAD_S,
@@ -22,58 +21,34 @@ from cpfls_cli.flightlog.crash import (
     upright_of,
 )
 from cpfls_cli.flightlog.names import BY_HAND
-from cpfls_cli.flightlog.repair import SignalTable, fill
+from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
 from cpfls_cli.flightlog.stretches import live_rows
 
-_OF_HOVER = 0.6
-"""Share of the level at hover below which rotors idle."""
-
-_OF_LARGEST = 0.5
-"""Share of the largest level above which rotors carry the vehicle."""
-
-_SHORT_S = 1.0
-"""Shorter pauses are part of a flight, and shorter flights none."""
-
-_OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05
-"""Above the ground it flies: as a share of the highest, and in m."""
-
-_MARGIN_S = 0.5
-"""Left out after take-off and before landing, where the ground pushes."""
-
+_OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
+_OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
+_SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
+_OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
+_MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
+# Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
-"""Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
-
+# Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
+# range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-"""Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
-range of leans above which a vehicle moves."""
-
+# Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
+# of the height that is estimated for it.
 _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
-"""Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
-of the height that is estimated for it."""
-
+# Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
+# vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
-"""Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
-vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin."""
-
-_UNMOVED_M = 0.01
-"""Range of heights that no hover keeps to."""
-
+_UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
+# Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
+# below which it falls, on the mean over s.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
-"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in
-weights below which it falls, on the mean over s."""
-
-_LONGEST_CUT_S = 3.0
-"""Longer than that no throttle is cut in flight: a fall of 44 m."""
-
-_MOST_CLOCK_HZ = 50.0
-"""Rate that is enough to find a flight."""
-
-_FEWEST_ROWS = 10
-"""Of which it can be told."""
-
-SHORTEST_FLIGHT_S = 2.0
-"""Below which nothing is a flight."""
+_LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
+_MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
+_FEWEST_ROWS = 10  # Of which it can be told.
+SHORTEST_FLIGHT_S = 2.0  # Below which nothing is a flight.
 
 
 def too_short(span_s: float) -> str:
@@ -83,30 +58,16 @@ def too_short(span_s: float) -> str:
 
 @dataclass(frozen=True)
 class FlownPart:
-    """What of a log is a flight.
+    """What of a log is a flight."""
 
-    Attributes
-    ----------
-    span_s : tuple of float or None
-        Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
-    reasons : tuple of str
-        What was cut, where, and how that was told; what else flies and is left out.
-    flies : bool
-        False where nothing in it flies.
-    stretches_s : tuple of tuple of float
-        Begin and end of each stretch that flies, in order.
-    ended, used : str
-        How flight ended before its time, and what is used; empty where nothing ended it.
-    moments : tuple of (str, float)
-        What ended flights before their time, of all stretches, as `EarlyEnd` has it.
-    """
-
+    # Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
     span_s: tuple[float, float] | None
-    reasons: tuple[str, ...]
-    flies: bool = True
-    stretches_s: tuple[tuple[float, float], ...] = ()
-    ended: str = ""
+    reasons: tuple[str, ...]  # What was cut, where, and how that was told; what else flies and is left out.
+    flies: bool = True  # False where nothing in it flies.
+    stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
+    ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
     used: str = ""
+    # What ended flights before their time, of all stretches, as `EarlyEnd` has it.
     moments: tuple[tuple[str, float], ...] = ()
 
     def within(self, ended: str, looked_at: tuple[float, float]) -> Self:
@@ -134,13 +95,7 @@ def rotor_shares(speeds: Array, *, shares: bool) -> Array:
 
 
 def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
-    """Find the longest stretch of a log that is flown, by the signals that a config maps, and say what that cuts.
-
-    Raises
-    ------
-    SettingError
-        If nothing in it flies.
-    """
+    """Find the longest stretch of a log that is flown, by the signals that a config maps, and say what that cuts."""
     flown = _flown_of(table, settings)
     if not flown.flies:
         raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
@@ -160,8 +115,8 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
     """Find what flies by the signals that a config maps, on the clock of the log."""
     rows, _ = increasing_rows(table.time)
     table = table.rows(rows)
-    live = live_rows(table, 0.0)
-    table = table.rows(live.rows)
+    live, ended = live_rows(table, 0.0)
+    table = table.rows(live)
     if len(table.time) < _FEWEST_ROWS:
         return FlownPart(None, ())
     step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
@@ -187,7 +142,7 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
             force=known.get("acceleration") if senses else None,
         )
     )
-    return flown.within(live.ended, (float(clock[0]), float(clock[-1])))
+    return flown.within(ended, (float(clock[0]), float(clock[-1])))
 
 
 def find_flown(signs: Signs) -> FlownPart:
@@ -237,8 +192,9 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
             None,
             f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
         )
-    quiet = _quiet(rate, period)
-    return ~quiet, "it does not turn at all"
+    spread = np.sqrt(averaged(rate**2, period, _SHORT_S))
+    quiet = spread < max(_STILL_RAD_S, 0.05 * float(np.quantile(spread, 0.9)))
+    return np.asarray(~quiet, dtype=bool), "it does not turn at all"
 
 
 def _carried(signs: Signs, largest: float) -> BoolArray:
@@ -290,11 +246,6 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         if len(high):
             off[high[0] : high[-1] + 1] = True
     return smoothed(off, period, _SHORT_S)
-
-
-def _quiet(rate: Array, period: float) -> BoolArray:
-    level = np.sqrt(averaged(rate**2, period, _SHORT_S))
-    return np.asarray(level < max(_STILL_RAD_S, 0.05 * float(np.quantile(level, 0.9))), dtype=bool)
 
 
 def _still(signs: Signs, active: BoolArray) -> bool:
@@ -371,10 +322,14 @@ def _dead_rates(signs: Signs) -> bool:
 def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
     ends = [ended_early(signs, rests, part) for part in stretches]
-    cut = [
-        _clear_of_ground(time, first, after if end is None else end.first, early=end is not None)
-        for (first, after), end in zip(stretches, ends, strict=True)
-    ]
+    cut = []
+    for (first, after), early_end in zip(stretches, ends, strict=True):
+        # What is close to the ground at either end is left out, but where the log begins or ends in flight.
+        stop = after if early_end is None else early_end.first
+        begin, end = float(time[first]), float(time[stop - 1])
+        margin = min(_MARGIN_S, (end - begin) / 10)
+        free = stop == len(time) or early_end is not None
+        cut.append((begin + (margin if first > 0 else 0.0), end - (0.0 if free else margin)))
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
     if cut[chosen][1] - cut[chosen][0] < SHORTEST_FLIGHT_S:
         return FlownPart(None, (f"flies for {too_short(cut[chosen][1] - cut[chosen][0])}",), flies=False)
@@ -401,14 +356,6 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     span = None if whole else (round(begin, 2), round(end, 2))
     moments = tuple(moment for _, each in early if each is not None for moment in each.moments)
     return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
-
-
-def _clear_of_ground(time: Array, first: int, after: int, *, early: bool) -> tuple[float, float]:
-    """Leave out what is close to the ground at either end of a stretch that does not begin or end with the log."""
-    begin, end = float(time[first]), float(time[after - 1])
-    margin = min(_MARGIN_S, (end - begin) / 10)
-    begin += margin if first > 0 else 0.0
-    return begin, end - (0.0 if after == len(time) or early else margin)
 
 
 def _how(signs: Signs, part: slice, told: str) -> str:

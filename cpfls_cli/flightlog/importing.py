@@ -12,7 +12,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
 from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
-from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.conversion import (
     drop_absent_signals,
     first_stamp,
@@ -26,9 +25,9 @@ from cpfls_cli.flightlog.repair import (
     crop_and_order,
     fill,
     find_signal_spikes,
+    longest_stretch,
     make_continuous,
     mask_impossible,
-    mask_values,
 )
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
@@ -45,14 +44,11 @@ from cpfls_cli.flightlog.stretches import (
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
-_LARGEST_REFINEMENT = 10
-"""Rows of the result for one of the log: more hold nothing new."""
-
+_LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
 _SHORTEST_PERIOD_S = 1e-6
-_FASTEST_HZ = 40e3
-"""Above the 32 kHz at which the fastest gyroscopes are read."""
-_FEWEST_SAMPLES = 10
-"""Of which a flight can be told."""
+_FASTEST_HZ = 40e3  # Above the 32 kHz at which the fastest gyroscopes are read.
+_FEWEST_SAMPLES = 10  # Of which a flight can be told.
+_ALIASING = "the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight"
 
 
 def import_log(
@@ -76,15 +72,6 @@ def import_log(
         Leading share of the flight that an estimate of the delay may look at.
     stamped_hz : mapping from str to float, optional
         See `slow_signals`.
-
-    Raises
-    ------
-    InputError
-        If columns are missing, a gap is too long, or the rotors are to give the torque and no way is given.
-    SettingError
-        If a key of the section does not suit the log: crop, rate, cut-off or delay.
-    ComputationError
-        If the pitch comes within a degree of +-90 degrees, or the delay cannot be estimated.
     """
     signals = apply_rotor_lag(read_signals(columns, settings, stamped_hz), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
@@ -99,26 +86,8 @@ def read_signals(
 ) -> LogSignals:
     """Read the mapped columns of a log, drop bad rows, repair bad values, and resample to one uniform clock.
 
-    Parameters
-    ----------
-    columns : mapping from str to array, shape (sample,)
-        The log.
-    stamped_hz : mapping from str to float, optional
-        See `slow_signals`.
-
-    Returns
-    -------
-    LogSignals
-        At the log's median rate, time from 0; neither shifted nor filtered. A torque that the rotors are to
-        give is still None.
-
-    Raises
-    ------
-    SettingError
-        If the crop leaves fewer than two rows, or is to be what flies and nothing does.
-    InputError
-        If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
-        behind, or the pitch is larger than any pitch.
+    The result has the log's median rate, time from 0, neither shifted nor filtered. A torque that the rotors are to
+    give is still None.
     """
     mapped = drop_absent_signals(columns, settings)
     # What was asked for may be absent at any time: it decides on no row.
@@ -128,49 +97,51 @@ def read_signals(
     settings = replace(settings, crop_s=crop)
     table, dropped = crop_and_order(read, settings)
     cut = warn_of_end(table, settings) if mapped.crop_s != "flown" else cut
-    table, asked = _without_setpoints(table)
+    asked, table = (
+        SignalTable(table.time, {name: own for name, own in table.signals.items() if (name in SETPOINTS) == setpoint})
+        for setpoint in (True, False)
+    )
     table = make_continuous(table)
     spikes = find_signal_spikes(table, settings)
-    repaired = table if settings.spike_deviations is None else mask_values(table, spikes)
-    stretch = longest_stretch(table.time, np.isfinite(repaired.columns()), settings)
-    dropped |= {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap}
-    table, repaired = table.rows(stretch.rows), repaired.rows(stretch.rows)
+    masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
+    repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
+    present = np.isfinite(np.hstack(list(repaired.signals.values())))
+    rows, incomplete_ends, beyond_gap = longest_stretch(table.time, present, settings)
+    table, repaired = table.rows(rows), repaired.rows(rows)
     resting = rotors_at_rest(table, settings)
-    counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, resting, settings)
+    counts = count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
     clock, rate_hz = _uniform_clock(table.time)
     on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
     refuse_steep_pitch(on_clock)
     setpoints, unknown = _setpoints(asked, clock, mapped)
-    steps = np.diff(table.time)
     slow = slow_signals(table, stamped_hz)
     filtered = cut_offs(on_clock, rate_hz, slow)
+    warnings = (
+        *(*cut, *broken, *warn_of_values(counts), *warn_of_dead(table, tuple(counts["saturated"]), settings)),
+        *(*warn_of_rest(table, resting, settings), *warn_of_slow(slow, rate_hz), *warn_of_cut_offs(filtered, settings)),
+        *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
+        *(*_warn_of_clock(rate_hz, settings), *warn_of_angles(read.signals), *unknown),
+    )
     report = ImportReport(
         samples_read=len(read.time),
         samples=len(clock),
-        dropped=dropped,
-        **vars(counts),
-        gaps=int((steps > 1.5 * np.median(steps)).sum()),
-        longest_gap_s=float(steps.max()),
+        dropped=dropped | {"incomplete_ends": incomplete_ends, "gap": beyond_gap},
+        missing=counts["missing"],
+        spikes=counts["spikes"],
+        suspected_spikes=counts["suspected_spikes"],
+        saturated=counts["saturated"],
+        gaps=int((np.diff(table.time) > 1.5 * np.median(np.diff(table.time))).sum()),
+        longest_gap_s=float(np.diff(table.time).max()),
         span_s=(float(clock[0]), float(clock[-1])),
         first_stamp_s=first_stamp(columns, mapped),
-        crop_s=crop,
+        crop_s=crop if isinstance(crop, tuple) else None,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
         cut_off_hz=filtered,
         updated_hz={signal.name: signal.rate_hz for signal in slow},
-        warnings=(
-            *cut,
-            *broken,
-            *warn_of_values(counts),
-            *warn_of_dead(table, tuple(counts.saturated), settings),
-            *warn_of_rest(table, resting, settings),
-            *warn_of_slow(slow, rate_hz),
-            *warn_of_cut_offs(filtered, settings),
-            *([f"{stretch.beyond_gap} rows beyond a gap are not used"] if stretch.beyond_gap else []),
-            *_warn_of_clock(rate_hz, settings),
-            *warn_of_angles(read.signals),
-            *unknown,
-        ),
+        warnings=warnings,
+        parameters={},
+        stated={},
     )
     converted = to_program_frames(on_clock, settings)
     if "attitude" in setpoints and "attitude" in converted:
@@ -178,13 +149,6 @@ def read_signals(
         away = rotations.wrapped(setpoints["attitude"] - converted["attitude"])
         setpoints["attitude"] = converted["attitude"] + away
     return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
-
-
-def _without_setpoints(table: SignalTable) -> tuple[SignalTable, SignalTable]:
-    """Part what was measured or commanded from what was asked for."""
-    asked = {name: values for name, values in table.signals.items() if name in SETPOINTS}
-    others = {name: values for name, values in table.signals.items() if name not in SETPOINTS}
-    return SignalTable(table.time, others), SignalTable(table.time, asked)
 
 
 def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
@@ -211,10 +175,9 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
 
 
 def _warn_of_clock(rate_hz: float, settings: ImportSettings) -> list[str]:
-    if rate_hz < _FASTEST_HZ:
-        return []
     unit = settings.time_unit
-    return [f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"]
+    words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
+    return [words] if rate_hz >= _FASTEST_HZ else []
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
@@ -227,16 +190,6 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     ----------
     signals : LogSignals
         With the body torque, aligned.
-    settings : ImportSettings
-        `lowpass_hz`, `lowpass_order` and `rate_hz`.
-
-    Raises
-    ------
-    SettingError
-        If the cut-off is not below half of the log's rate, or `rate_hz` leaves next to no samples or is more than ten
-        times the log's.
-    ComputationError
-        If the pitch comes within a degree of +-90 degrees, where Euler rates are not defined.
 
     References
     ----------
@@ -257,12 +210,10 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
         previous = previous_rows(smooth.time, time)
         setpoints = {name: values[previous] for name, values in setpoints.items()}
-        report = replace(
-            report,
-            rate_hz=settings.rate_hz,
-            samples=len(time),
-            warnings=report.warnings + _warn_of_aliasing(settings, report.log_rate_hz),
-        )
+        warnings, cutoff = report.warnings, settings.lowpass_hz
+        if settings.rate_hz < report.log_rate_hz * 0.99 and (cutoff is None or cutoff >= settings.rate_hz / 2):
+            warnings += (_ALIASING,)
+        report = replace(report, rate_hz=settings.rate_hz, samples=len(time), warnings=warnings)
     return ImportedFlight(time=time, setpoints=setpoints, report=report, **arrays)
 
 
@@ -295,10 +246,3 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
     if signals.body_torque is not None:
         derived["torque"] = rotations.generalised_torque(signals.attitude, signals.body_torque)
     return derived
-
-
-def _warn_of_aliasing(settings: ImportSettings, log_rate_hz: float) -> tuple[str, ...]:
-    rate, cutoff = settings.rate_hz, settings.lowpass_hz
-    if rate is None or rate >= log_rate_hz * 0.99 or (cutoff is not None and cutoff < rate / 2):
-        return ()
-    return ("the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight",)

@@ -9,9 +9,8 @@ from math import cos, radians, sin
 from typing import Final
 
 Parameters = Mapping[str, float | str]
+# x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1.
 Place = tuple[float, float, int]
-"""x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1."""
-
 _LAYOUTS: Final = """
     # Angle of each motor clockwise from the front, degrees, or x forward and y left; + turns counter-clockwise
     quad plus                  90+ -90+ 0- 180-
@@ -55,6 +54,12 @@ _LAYOUTS: Final = """
 """
 
 
+def numbered(text: str) -> dict[int, str]:
+    """Read a table of numbers and what they stand for, ``1: X; 2: V``."""
+    pairs = (each.split(":") for each in text.split(";"))
+    return {int(number): words.strip() for number, words in pairs}
+
+
 def _place(text: str) -> Place:
     spin = 1 if text[-1] == "+" else -1
     if "," in text:
@@ -74,28 +79,15 @@ def _layouts() -> dict[str, tuple[Place, ...]]:
 
 
 LAYOUTS: Final = _layouts()
-
 # FRAME_CLASS of ArduPilot, and the number of its motors; others are no frames of upright rotors alone.
-_CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa", 4: "octa quad", 5: "Y6", 12: "dodeca hexa", 14: "deca"}
+_CLASSES: Final = numbered("1: quad; 2: hexa; 3: octa; 4: octa quad; 5: Y6; 12: dodeca hexa; 14: deca")
 _OF_CLASS: Final = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 7: 3, 12: 12, 14: 10}
-_TYPES: Final = {
-    0: "plus",
-    1: "X",
-    2: "V",
-    3: "H",
-    6: "plus, reversed",
-    10: "B",
-    11: "F",
-    12: "X of Betaflight",
-    13: "X of DJI",
-    14: "X clockwise",
-    15: "I",
-    18: "X reversed",
-    19: "Y4",
-}
+_TYPES: Final = numbered(
+    "0: plus; 1: X; 2: V; 3: H; 6: plus, reversed; 10: B; 11: F; 12: X of Betaflight; 13: X of DJI; 14: X clockwise;"
+    " 15: I; 18: X reversed; 19: Y4"
+)
+# Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone.
 _COUNTS_OF_FORMS: Final = (8, 6, 4)
-"""Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone."""
-
 # First and last SYS_AUTOSTART of PX4 that is a frame of one kind.
 _AIRFRAMES: Final = (
     (4000, 4899, "quad X"),
@@ -108,11 +100,8 @@ _AIRFRAMES: Final = (
     (12000, 12999, "octa quad X"),
     (24000, 24999, "dodeca hexa X"),
 )
-_UPWARD: Final = -0.5
-"""Part of a rotor's axis along z, downward, from which on it carries the vehicle."""
-
+_UPWARD: Final = -0.5  # Part of a rotor's axis along z, downward, from which on it carries the vehicle.
 _OF_MAV_TYPE: Final = {2: 4, 13: 6, 14: 8, 15: 3, 29: 12, 35: 10}
-
 USUAL: Final[Mapping[str, Mapping[int, str]]] = {
     "PX4": {4: "quad X", 6: "hexa X", 8: "octa X"},
     "ArduPilot": {4: "quad X", 6: "hexa X", 8: "octa X"},
@@ -135,10 +124,7 @@ def whole(parameters: Parameters, *names: str) -> int | None:
 def stated_frame(parameters: Parameters, rotors: int) -> tuple[str, str] | None:
     """Give the frame that parameters state by its number, and the words for them; None where they state none.
 
-    Parameters
-    ----------
-    rotors : int
-        That the log's columns show; 0 where they show none.
+    The log's columns show so many rotors; 0 where they show none.
     """
     kind = whole(parameters, "FRAME_CLASS", "Q_FRAME_CLASS")
     form = whole(parameters, "FRAME_TYPE", "Q_FRAME_TYPE")

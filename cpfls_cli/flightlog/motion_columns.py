@@ -17,61 +17,35 @@ from cpfls_cli.flightlog.agreement import (
     slow,
 )
 from cpfls_cli.flightlog.airframe import explained_by_rotors
+from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, Reading, nearest
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.readings import CLEAR, Reading
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
+from cpfls_cli.flightlog.rotor_columns import RotorGuess
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
-GOOD = 0.6
-"""Share of a signal that another has to explain to overrule a name."""
-
+# Wind and clocks change a size by less than the first, and never from one unit of length to the next.
 _TOLERANCE, _TEN = 1.4, 10.0
-"""Wind and clocks change a size by less than the first, and never from one unit of length to the next."""
-
+# Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
-"""Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s."""
-
-_OVER_GROUND: Sequence[Row] = (
-    (1.0, "m/s^2", 1.0),
-    (1 / STANDARD_GRAVITY, "g", 1.0),
-    (1000.0, "m/s^2", 1e-3),
-)
-"""Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2."""
-
-NEAR_GRAVITY, _BY_NAME, _WEIGHT = 1.3, 2.0, 1.15
-"""Ratios to gravity: of what is gravity in some unit, since a vehicle pushes; the same of columns that are known to
-hold it, also where the sensor reads wrong; and of what is no more than that."""
-
+# Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2.
+_OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
+# Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
+_BY_NAME, _WEIGHT = 2.0, 1.15
+# Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
+# a gyroscope beside motion capture it is 0.1 to 0.4.
 _FAST_HZ, _DERIVED = 10.0, 0.8
-"""Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
-a gyroscope beside motion capture it is 0.1 to 0.4."""
-
+# What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former.
 _CLOSER = 0.4
-"""What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
-
+# Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
-"""Correlations of one axis: below the first a column follows nothing, below the second it runs the other way."""
-
-
-def nearest(size: float, rows: Sequence[Row]) -> Row:
-    """Give the row of the nearest size."""
-    return min(rows, key=lambda row: abs(np.log(size / row[0])))
-
-
-def over_ground(seen: Seen) -> Array | None:
-    """Derive the acceleration over ground from the position, or else from the velocity."""
-    position, velocity = seen.first("position"), seen.first("velocity")
-    if position is not None:
-        return second_derivative(seen.grid(position), seen.rate_hz)
-    return None if velocity is None else first_derivative(seen.grid(velocity), seen.rate_hz)
 
 
 # The gyroscope.
 
 
-def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | None) -> bool:
+def gyroscope_first(seen: Seen, reading: Reading, rotors: RotorGuess | None, are_commands: bool) -> bool:
     """Put a gyroscope before a rate that is the attitude's own derivative, where the rotors explain more of it.
 
     Both are one motion where that is slow. Above, a derivative holds what noise and filter of the attitude make of it,
@@ -85,18 +59,16 @@ def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | N
     if _fast_share(derived, seen.grid(first), seen.rate_hz) < _DERIVED:
         return False
     turning = slow(derived, seen.rate_hz)
-    driven = {first: explained_by_rotors(seen.grid(first), rotors[0], seen.rate_hz, rotors[1])}
+    speeds = seen.mapped(rotors.guess)
+    driven = {first: explained_by_rotors(seen.grid(first), speeds, seen.rate_hz, are_commands)}
     for named in others:
         own = fit_axes(turning, slow(seen.grid(named), seen.rate_hz))
         if own.explained > GOOD and _fast_share(derived, seen.grid(named), seen.rate_hz) < _DERIVED:
-            driven[named] = explained_by_rotors(seen.grid(named), rotors[0], seen.rate_hz, rotors[1])
+            driven[named] = explained_by_rotors(seen.grid(named), speeds, seen.rate_hz, are_commands)
     best = largest(driven, lambda named: driven[named])
     if best is first:
         return False
-    seen.candidates = {
-        **seen.candidates,
-        "body_rate": (best, *(own for own in (first, *others) if own is not best)),
-    }
+    seen.candidates = {**seen.candidates, "body_rate": (best, *(own for own in (first, *others) if own is not best))}
     seen.left_out.append(
         f"{', '.join(first.group.columns)}: also a body rate, but the derivative of the attitude, of which the rotors"
         f" explain {100 * driven[first]:.0f} % where they explain {100 * driven[best]:.0f} % of"
@@ -111,7 +83,7 @@ def _fast_share(derived: Array, measured: Array, rate_hz: float) -> float:
     return fit_axes(*fast).explained
 
 
-def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
+def take_body_rate(seen: Seen, reading: Reading | None) -> None:
     """Take the gyroscope as the derivative of the attitude has it, or else by its name and its spread."""
     named = seen.first("body_rate")
     if named is None:
@@ -130,7 +102,7 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
                 " explains: is the unit of the stamps right?"
             )
-        seen.tell(
+        seen.take(
             named,
             unit,
             _rates_in_words(named, fit, unit, scale),
@@ -157,7 +129,7 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
         )
     sure: Sure = "guess" if rivals or fit is not None else "named"
     reason = f"{called(named)}, {size_in_words}{turned}; {against}"
-    seen.tell(named, unit, reason, sure, sign=named.sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, sign=named.sign, rivals=rivals)
 
 
 def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
@@ -203,7 +175,7 @@ def position_by_velocity(seen: Seen) -> None:
         )
 
 
-def tell_places(seen: Seen, reading: Reading | None) -> None:
+def take_places(seen: Seen, reading: Reading | None) -> None:
     """Take position and velocity in the axes in which the lean explains the motion, and the one derives the other."""
     position, velocity = seen.first("position"), seen.first("velocity")
     relative = None
@@ -223,17 +195,13 @@ def tell_places(seen: Seen, reading: Reading | None) -> None:
                 velocity = None
     tilt = None if reading is None or reading.lean is None else reading
     if position is not None:
-        _tell_place(seen, position, ("m", "mm"), tilt, None)
+        _take_place(seen, position, ("m", "mm"), tilt, None)
     if velocity is not None:
-        _tell_place(seen, velocity, ("m/s", "mm/s"), tilt, relative)
+        _take_place(seen, velocity, ("m/s", "mm/s"), tilt, relative)
 
 
-def _tell_place(
-    seen: Seen,
-    named: Named,
-    units: tuple[UnitName, UnitName],
-    tilt: Reading | None,
-    relative: AxisFit | None,
+def _take_place(
+    seen: Seen, named: Named, units: tuple[UnitName, UnitName], tilt: Reading | None, relative: AxisFit | None
 ) -> None:
     stated, place = named.unit, seen.guesses.get("position")
     unit: UnitName = stated or units[0]
@@ -273,7 +241,7 @@ def _tell_place(
         order, sign = _behind(relative, order, sign) if free else AS_NAMED
     if (order, sign) != AS_NAMED:
         reason += "; rotated into the axes of the attitude, as the tilt requires"
-    seen.tell(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
 
 
@@ -288,7 +256,7 @@ def _behind(relative: AxisFit, order: Order, sign: Sign) -> tuple[Order, Sign]:
 # The accelerometer.
 
 
-def tell_acceleration(seen: Seen, reading: Reading | None) -> None:
+def take_acceleration(seen: Seen, reading: Reading | None) -> None:
     """Take the first candidate that holds gravity, or follows the motion over ground."""
     any(_take_acceleration(seen, named, reading) for named in seen.candidates.get("acceleration", ()))
 
@@ -317,7 +285,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         # By chance the middle of what moves in a far smaller unit is as large as gravity.
         sensed = sensed if size < _TEN else None
     if sensed is not None:
-        _tell_sensed(seen, named, vertical, carried, sensed, reading)
+        _take_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
             other = at_hover[0][1]
             seen.doubt(
@@ -339,7 +307,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
         f" {'thousandths of ' if scale != 1.0 else ''}{unit}, and it does not include gravity"
     )
-    seen.tell(named, unit, reason, "data", scale=scale)
+    seen.take(named, unit, reason, "data", scale=scale)
     words = "the acceleration does not include gravity and follows the motion"
     seen.choose("acceleration_frame", "world", words, "data")
     return True
@@ -373,7 +341,7 @@ def _carried(seen: Seen, reading: Reading | None) -> float:
     return float(np.median(size)) / STANDARD_GRAVITY
 
 
-def _tell_sensed(
+def _take_sensed(
     seen: Seen, named: Named, vertical: float, carried: float, sensed: Row, reading: Reading | None
 ) -> None:
     _, unit, scale = sensed
@@ -385,14 +353,14 @@ def _tell_sensed(
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     if body is None or body == up:
-        seen.tell(named, unit, reason, "data", scale=scale)
+        seen.take(named, unit, reason, "data", scale=scale)
     else:
         reason += f", and points the wrong way for {body}, so gravity is logged, not the force that carries it"
         others = (
             Rival("sign: [1, -1, -1]", "if its y and z are opposite to those of all others"),
             Rival("sign: [1, 1, -1]", "if only its z is; a push, or a lean on the ground, along x and y decides"),
         )
-        seen.tell(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
+        seen.take(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
     words = f"gravity stays in z (median {vertical:.3g}) in flight"
     seen.choose("acceleration_frame", "body-specific-force", words, "data")
     if body is None:

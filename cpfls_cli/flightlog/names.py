@@ -1,11 +1,26 @@
-"""What the names of a log's columns say by the tables of `vocabulary`: columns that belong together, what they hold."""
+"""What names of columns say by the tables of `vocabulary`, and which columns of a matrix without names move alike."""
+
+from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.agreement import (
+    SLOW_HZ,
+    first_derivative,
+    fit_axes,
+    on_clock,
+    rotations_of,
+    second_derivative,
+    slow,
+    turning_of,
+)
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.vocabulary import (
     A_WORD,
@@ -29,8 +44,13 @@ from cpfls_cli.flightlog.vocabulary import (
     WISHED,
     Meaning,
 )
-from cpfls_cli.units import KNOWN_UNITS, UnitName
+from cpfls_cli.rounding import less
+from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName
 
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+_MEASURED: Final = tuple(own for own in KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
 _WRITTEN: Final = {
     text: (unit, scale) for unit, own in SPELLINGS.items() for scale, written in own.items() for text in written.split()
 }
@@ -39,21 +59,11 @@ Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 @dataclass(frozen=True)
 class ColumnGroup:
-    """Columns whose names differ in an axis or a number alone.
+    """Columns whose names differ in an axis or a number alone."""
 
-    Attributes
-    ----------
-    pattern : str
-        The name with ``*`` in place of the axis or the number.
-    kind : {"xyz", "wxyz", "angles", "numbers", "one"}
-        What tells the columns apart.
-    columns : tuple of str
-        In the order of axes or numbers, of a quaternion w, x, y, z.
-    """
-
-    pattern: str
-    kind: Kind
-    columns: tuple[str, ...]
+    pattern: str  # The name with ``*`` in place of the axis or the number.
+    kind: Kind  # What tells the columns apart.
+    columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
 
     @cached_property
     def ending(self) -> str:
@@ -95,37 +105,20 @@ def _symbols(text: str) -> str:
 
 @dataclass(frozen=True)
 class Named:
-    """Columns that may be a signal, by their name.
-
-    Attributes
-    ----------
-    rank : float
-        Smaller ones come first.
-    unit : UnitName or None
-        That the name or the kind of log states.
-    scale : float
-        Factor on the logged numbers, which makes them this unit.
-    frame : {"FLU", "FRD", "ENU", "NED"} or None
-        Axes that the kind of log is known for.
-    sign : tuple of float or None
-        Of each column in that frame; None for +1 everywhere.
-    known : str
-        The kind of log whose documentation says so; empty where only words of the name do.
-    """
+    """Columns that may be a signal, by their name."""
 
     signal: SignalName
     group: ColumnGroup
-    rank: float
-    unit: UnitName | None = None
-    scale: float = 1.0
-    frame: str | None = None
-    known: str = ""
-    sign: tuple[float, ...] | None = None
+    rank: float  # Smaller ones come first.
+    unit: UnitName | None = None  # That the name or the kind of log states.
+    scale: float = 1.0  # Factor on the logged numbers, which makes them this unit.
+    frame: str | None = None  # Axes that the kind of log is known for.
+    known: str = ""  # The kind of log whose documentation says so; empty where only words of the name do.
+    sign: tuple[float, ...] | None = None  # Of each column in that frame; None for +1 everywhere.
 
 
+# What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
-"""What to do where names do not tell what columns hold."""
-
 _FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (
     ("wxyz", ("w", "x", "y", "z")),
     ("wxyz", ("W", "X", "Y", "Z")),
@@ -190,13 +183,7 @@ _AXES_OF_A_BODY = 3
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
-    """List what groups of columns may be by their names, what a kind of log is known for first.
-
-    Parameters
-    ----------
-    system : str
-        Kind of log, as its reader names it; empty where any may be meant.
-    """
+    """List what groups of columns may be by name, what a kind of log is known for first; without a system any."""
     known = [named for group in groups for named in _known_to_systems(group, system)]
     kinds = {own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE)}
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
@@ -217,16 +204,14 @@ def is_of(system: str, known: str) -> bool:
 
 
 def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
-    for rank, known in enumerate(KNOWN):
+    for rank, known in enumerate(_MEASURED):
         of_other = system and not is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(CRAZYFLIE) else "")
-        suits = any(own.signal == known.signal and _suits(own, group) for own in MEANINGS)
-        if not of_other and angles and known.pattern in patterns and suits:
-            yield Named(
-                known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign
-            )
+        suits = [own.signal for own in MEANINGS if own.signal == known.signal and _suits(own, group)]
+        if not of_other and angles and known.columns[0] in patterns and suits:
+            yield Named(suits[0], group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign)
 
 
 def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
@@ -240,23 +225,26 @@ def _by_words(group: ColumnGroup) -> Iterator[Named]:
     words = group.words
     rank = _BY_WORDS + len(words) + 10 * sum(word in SECOND_HAND for word in words)
     rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
-    for meaning in MEANINGS:
+    squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
+    for meaning, stated in _possible(group, words, NOT_MEASURED):
         signal = meaning.signal
-        squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
-        if (squared and signal in ROTORS) or not _suits(meaning, group):
-            continue
-        stated = stated_unit(group, signal)
-        if _in_other_unit(group, stated) or (NOT_MEASURED - ALLOWED.get(signal, frozenset())) & {*words}:
-            continue
-        if _means(meaning, group, words):
+        if not (squared and signal in ROTORS) and _means(meaning, group, words):
             fast = any(signal in IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
             yield Named(signal, group, rank, *(stated or (usual, 1.0)))
 
 
-def _in_other_unit(group: ColumnGroup, stated: tuple[UnitName, float] | None) -> bool:
-    """Tell whether a name ends in a unit, and in none that is stated of a signal."""
-    return bool(group.ending) and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
+def _possible(
+    group: ColumnGroup, words: tuple[str, ...], never: frozenset[str]
+) -> Iterator[tuple[Meaning, tuple[UnitName, float] | None]]:
+    """List the meanings that suit a group and its unit, and the unit; those that words rule out are left out."""
+    for meaning in MEANINGS:
+        stated, ending = stated_unit(group, meaning.signal), group.ending
+        # A name that ends in a unit, and in none of the signal, is of something else.
+        other = bool(ending) and stated is None and (len(ending.strip("_ ")) > 1 or ending == "_m")
+        ruled_out = (never - ALLOWED.get(meaning.signal, frozenset())) & {*words}
+        if _suits(meaning, group) and not other and not ruled_out:
+            yield meaning, stated
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -276,16 +264,11 @@ def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
 
 def _wished(group: ColumnGroup) -> Iterator[Named]:
     words = tuple(word for word in group.words if word not in WISHED)
-    if len(words) == len(group.words):
-        return
     before, _, after = group.pattern.partition("*")
     pqr = group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
-    for meaning in MEANINGS:
-        signal, stated = meaning.signal, stated_unit(group, meaning.signal)
-        ruled_out = (NOT_MEASURED - WISHED - ALLOWED.get(signal, frozenset())) & {*words}
-        if signal not in _SETPOINT_OF or ruled_out or not _suits(meaning, group) or _in_other_unit(group, stated):
-            continue
-        if signal == "body_rate" if pqr else _means(meaning, group, words):
+    for meaning, stated in _possible(group, words, NOT_MEASURED - WISHED) if len(words) < len(group.words) else ():
+        signal = meaning.signal
+        if signal in _SETPOINT_OF and (signal == "body_rate" if pqr else _means(meaning, group, words)):
             usual: UnitName | None = "1" if signal == "quaternion" else None
             yield Named(_SETPOINT_OF[signal], group, _BY_WORDS + len(words), *(stated or (usual, 1.0)))
 
@@ -322,3 +305,150 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         turns = pqr or ends_in_speed or bool(own & {*RATE_WORDS.split(), "speed"})
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
     return bool({*words[-meaning.last :]} & set(meaning.words.split()))
+
+
+# Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.
+_FEWEST_COLUMNS = 12
+_STEPS_S, _EVEN = (2e-4, 0.2), 0.05  # Steps of a clock in s, and the share of them by which they differ on the mean.
+_UNIT_LENGTH = 0.02  # By which the length of a quaternion is off 1, in single precision or filtered.
+# Share that a derivative has to explain, and the ratio of sizes, where no name speaks for it.
+_FOLLOWS, _NEAR = 0.8, 1.3
+# Level in rad/s, or more in another unit, of every rotor in flight, and the ratio of their levels.
+_SLOWEST_ROTOR, _ROTORS_ALIKE = 50.0, 1.3
+_SIZE = 0.1  # Share by which an accelerometer may be off what carries the vehicle.
+_RATE_HZ = 100.0  # Rate to which a fast matrix is thinned: every pair of runs is compared.
+OF_A_MATRIX: Final = "a matrix without names"
+
+
+def nameless_clock(columns: Mapping[str, Array]) -> str | None:
+    """Find the column of a matrix without names that counts seconds in even steps."""
+    for name in _of_matrix(columns):
+        values = np.asarray(columns[name], dtype=float)
+        steps = np.diff(values[np.isfinite(values)])
+        if len(steps) < 2 or steps.min() <= 0:
+            continue
+        step = float(np.median(steps))
+        if _STEPS_S[0] <= step <= _STEPS_S[1] and float(np.abs(steps - step).mean()) < _EVEN * step:
+            return name
+    return None
+
+
+def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
+    """List the columns of the widest matrix, ``name[0]`` and on, in their order; none where it is narrow."""
+    wide: dict[str, list[str]] = {}
+    for name in columns:
+        if name.endswith("]"):
+            wide.setdefault(name.rpartition("[")[0], []).append(name)
+    longest = max(wide.values(), key=len, default=[])
+    return longest if len(longest) >= _FEWEST_COLUMNS else []
+
+
+def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
+    """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names, on a clock, s.
+
+    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity tells the
+    accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
+    are rotors. Without an attitude nothing is found.
+    """
+    names = _of_matrix(columns)
+    every = max(1, round(1 / (_RATE_HZ * float(np.median(np.diff(time)))))) if len(time) > 2 else 1
+    table = np.column_stack([np.asarray(columns[name], dtype=float)[::every] for name in names]) if names else None
+    if table is None or not np.isfinite(table).all():
+        return ()
+    grid = np.arange(time[0], time[-1], every * float(np.median(np.diff(time))))[: len(table)]
+    table = table[: len(grid)]
+    return tuple(_Matrix(names, table, time[::every][: len(grid)], grid).signals())
+
+
+class _Matrix:
+    """The table, and which of its columns are taken."""
+
+    def __init__(self, names: Sequence[str], table: Array, time: Array, grid: Array) -> None:
+        self.names, self.table, self.grid, self.time = names, table, grid, time
+        self.rate_hz = 1 / float(grid[1] - grid[0])
+        self.taken: set[int] = set()
+        self.carried: tuple[float, ...] = (STANDARD_GRAVITY,)
+
+    def runs(self, length: int) -> Iterator[tuple[int, Array]]:
+        """Go through the runs of neighbours of which none is taken."""
+        for first in range(self.table.shape[1] - length + 1):
+            if not self.taken & set(range(first, first + length)):
+                values = self.table[:, first : first + length]
+                if float(np.ptp(values, axis=0).min()) > 0:
+                    yield first, values
+
+    def take(self, signal: SignalName, first: int, length: int) -> Named:
+        """Take neighbours for a signal."""
+        self.taken |= set(range(first, first + length))
+        columns = tuple(self.names[first : first + length])
+        pattern = f"columns {columns[0]} to {columns[-1]}"
+        return Named(signal, ColumnGroup(pattern, "numbers", columns), 0.0, known=OF_A_MATRIX)
+
+    def signals(self) -> Iterator[Named]:
+        attitude = self._attitude()
+        if attitude is None:
+            return
+        first, rotation, rates = attitude
+        yield self.take("quaternion", first, 4)
+        yield self.take("body_rate", rates, 3)
+        yield from self._places(rotation)
+        sensed = self._accelerometer()
+        if sensed is not None:
+            yield self.take("acceleration", sensed, 3)
+        for first, values in self.runs(4):
+            middle = np.median(values, axis=0)
+            if values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ROTORS_ALIKE * middle.min():
+                yield self.take("rotor_speed", first, 4)
+                return
+
+    def _attitude(self) -> tuple[int, Rotation, int] | None:
+        """Find the quaternion whose derivative explains three other columns best."""
+        best: tuple[float, int, Rotation, int] | None = None
+        for first, values in self.runs(4):
+            if float(np.quantile(np.abs(np.linalg.norm(values, axis=1) - 1), 0.95)) > _UNIT_LENGTH:
+                continue
+            for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
+                rotation = on_clock(rotations_of(values, *key), self.time, self.grid)
+                turning = turning_of(rotation, self.rate_hz)
+                if turning is None:
+                    continue
+                for rates, measured in self.runs(3):
+                    fit = fit_axes(turning, slow(measured, self.rate_hz))
+                    apart = rates + 3 <= first or rates >= first + 4
+                    if apart and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
+                        best = (fit.as_named, first, rotation, rates)
+        return None if best is None else best[1:]
+
+    def _places(self, rotation: Rotation) -> Iterator[Named]:
+        """Find three columns whose derivative, as it is or turned into the body, three others are."""
+        best: tuple[float, int, int] | None = None
+        for place, values in self.runs(3):
+            derived = first_derivative(values, self.rate_hz)
+            turned = rotation.inv().apply(derived)
+            for speed, measured in self.runs(3):
+                if abs(speed - place) < 3:
+                    continue
+                own = slow(measured, self.rate_hz, SLOW_HZ)
+                for reference in (derived, turned):
+                    fit = fit_axes(slow(reference, self.rate_hz, SLOW_HZ), own)
+                    near = 1 / _NEAR < fit.gain < _NEAR
+                    if near and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
+                        best = (fit.as_named, place, speed)
+        if best is not None:
+            # The usual size of what carries the vehicle, z of the position upward and downward.
+            moving = second_derivative(self.table[:, best[1] : best[1] + 3], self.rate_hz)
+            forces = (moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]) for up in (1.0, -1.0))
+            self.carried = tuple(float(np.median(np.linalg.norm(force, axis=1))) for force in forces)
+            yield self.take("position", best[1], 3)
+            yield self.take("velocity", best[2], 3)
+
+    def _accelerometer(self) -> int | None:
+        """Find three columns of the size of what carries the vehicle, nearly all of it in the third."""
+        best: tuple[float, int] | None = None
+        for first, values in self.runs(3):
+            middle = np.median(np.abs(values), axis=0)
+            size = float(np.median(np.linalg.norm(values, axis=1)))
+            off = min(abs(size / own - 1) for own in self.carried)
+            if middle[:2].max() < 0.3 * middle[2] and off < (best[0] if best else _SIZE):
+                best = (off, first)
+        return None if best is None else best[1]

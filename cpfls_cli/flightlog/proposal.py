@@ -10,10 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
-from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.stated_vehicle import plain, stated_vehicle, vehicles_apart
 from cpfls_cli.flightlog.topics import Topics, column_names
@@ -22,64 +22,36 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
 
 _SURENESS: Final = ("data", "named", "guess")
-_STEPS_BRIDGED = 2.5
-"""Steps of the slowest topic that a gap may have: one sample of it may be lost."""
-
+_STEPS_BRIDGED = 2.5  # Steps of the slowest topic that a gap may have: one sample of it may be lost.
 _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
+# Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long.
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
-"""Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long."""
-
+# Share of the range of commands by which its ends may differ: a stick is calibrated anew to a few us.
 _SAME_RANGE: Final = 0.01
-"""Share of the range of commands by which its ends may differ: a stick is calibrated anew to a few us."""
-
-_ROOM = 1.2
-"""By which a limit of the rotor speeds lies above the fastest one that is logged."""
-
+_ROOM = 1.2  # By which a limit of the rotor speeds lies above the fastest one that is logged.
+# Share by which an arm that is given may differ from the places that a log states: both are rounded.
 _SAME_ARM: Final = 0.05
-"""Share by which an arm that is given may differ from the places that a log states: both are rounded."""
-
 DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
+# Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
+# batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06.
 _ALIKE: Final = {True: 1.06, False: 1.12}
-"""Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
-batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
-
 _NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN")
 
 
 @dataclass(frozen=True)
 class KnownLog:
-    """A log and what it is taken for.
+    """A log and what it is taken for."""
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    parameters : mapping
-        That it states.
-    system : str
-        What wrote it; empty where that is not known.
-    columns : frozenset of str
-        Names of all of its columns.
-    of_file : tuple of str
-        Faults of the file, and what its reader left out.
-    """
-
-    name: str
+    name: str  # For messages.
     recognition: Recognition
-    parameters: Parameters
-    system: str
-    columns: frozenset[str]
-    of_file: tuple[str, ...] = ()
+    parameters: Parameters  # That it states.
+    system: str  # What wrote it; empty where that is not known.
+    columns: frozenset[str]  # Names of all of its columns.
+    of_file: tuple[str, ...] = ()  # Faults of the file, and what its reader left out.
 
 
 def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
-    """Recognise a log, as its reader gives it.
-
-    Raises
-    ------
-    InputError
-        See `recognise`.
-    """
+    """Recognise a log, as its reader gives it."""
     recognition = recognise(topics, units, parameters, system)
     derived = () if recognition.rebuilt is None else recognition.rebuilt.columns
     return KnownLog(name, recognition, parameters, system, frozenset((*column_names(topics), *derived)))
@@ -87,50 +59,23 @@ def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: P
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """What a config is to say of logs and their vehicle.
+    """What a config is to say of logs and their vehicle."""
 
-    Attributes
-    ----------
-    logs : tuple of KnownLog
-        The first one leads.
-    time_column, time_unit : str or None, str
-        The clock of all of them; None for that of each log's fastest topic.
-    signals, choices : tuple
-        That hold for all of them.
-    crop_s : tuple of float, "flown" or None
-        Of one log; of several each takes what flies in it. None where none is to be cut.
-    crops : mapping from str to tuple of float or None
-        Of each log.
-    rate_hz : float or None
-        One rate for all logs, Hz; None where they have one.
-    gap_s : float
-        Longest step that has to be bridged, s.
-    airframe : Airframe or None
-        None where neither parameters nor motion tell the rotors.
-    rotors : int
-        Number of rotors; 0 where no columns are theirs.
-    speed_max : float
-        Round number above the largest rotor speed, rad/s.
-    facts : tuple of str
-        That the logs state beside.
-    equal : tuple of str
-        Names of the logs whose rotors carry what those of the first one do.
-    """
-
-    logs: tuple[KnownLog, ...]
-    time_column: str | None
+    logs: tuple[KnownLog, ...]  # The first one leads.
+    time_column: str | None  # The clock of all of them; None for that of each log's fastest topic.
     time_unit: str
-    signals: tuple[Guess, ...]
+    signals: tuple[Guess, ...]  # That hold for all of them.
     choices: tuple[KeyChoice, ...]
+    # Of one log; of several each takes what flies in it. None where none is to be cut.
     crop_s: tuple[float, float] | Literal["flown"] | None
-    crops: Mapping[str, tuple[float, float] | None]
-    rate_hz: float | None
-    gap_s: float
-    airframe: Airframe | None
-    rotors: int
-    speed_max: float
-    facts: tuple[str, ...]
-    equal: tuple[str, ...]
+    crops: Mapping[str, tuple[float, float] | None]  # Of each log.
+    rate_hz: float | None  # One rate for all logs, Hz; None where they have one.
+    gap_s: float  # Longest step that has to be bridged, s.
+    airframe: Airframe | None  # None where neither parameters nor motion tell the rotors.
+    rotors: int  # Number of rotors; 0 where no columns are theirs.
+    speed_max: float  # Round number above the largest rotor speed, rad/s.
+    facts: tuple[str, ...]  # That the logs state beside.
+    equal: tuple[str, ...]  # Names of the logs whose rotors carry what those of the first one do.
     warnings: tuple[str, ...]
 
     @property
@@ -159,24 +104,14 @@ class Proposal:
 def propose(
     logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None, *, scale_to_arm: bool = False
 ) -> Proposal:
-    """Make one proposal of what each of several logs is taken for.
+    """Make one proposal of what each of several logs is taken for; logs of two vehicles are refused.
 
     Parameters
     ----------
-    logs : sequence of KnownLog
-        One at least.
-    mass_kg : float or None
-        None: not known.
-    arm_m : float or None
-        From the middle of the vehicle to a rotor, m; None: not known.
+    mass_kg, arm_m : float or None
+        Of the vehicle, and from its middle to a rotor, m, where they are known.
     scale_to_arm : bool
         Whether places that a log states are scaled to that arm.
-
-    Raises
-    ------
-    InputError
-        If the logs are of two vehicles, or no mapping suits them all; or if the rotors that are stated cannot turn a
-        vehicle, or have another arm than the one that is given.
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
@@ -192,9 +127,16 @@ def propose(
     airframe, doubts = airframe_of(logs)
     if airframe is not None and arm_m is not None:
         if airframe.in_metres and not scale_to_arm:
-            _require_same_arm(logs[0].name, airframe, arm_m)
+            # Who asks knows which of the two is right.
+            if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
+                raise InputError(
+                    f"{logs[0].name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m"
+                    " from the middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
+                )
         else:
             airframe = airframe.with_arm(arm_m)
+    stated = logs[0].parameters
+    noted = (f"{key} = {plain(stated[key])}" for key in _NOTED if key in stated)
     rates = [one.recognition.rate_hz for one in logs]
     apart = _of_other_load(logs)
     crops = {one.name: one.recognition.flown.span_s for one in logs}
@@ -213,19 +155,10 @@ def propose(
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
         speed_max=_speed_max(logs, signals),
-        facts=_facts(logs[0]),
+        facts=(*([f"written by {logs[0].system}"] if logs[0].system else []), *noted),
         equal=tuple(one.name for one in logs if all(one is not other for other in apart)),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
     )
-
-
-def _require_same_arm(name: str, airframe: Airframe, arm_m: float) -> None:
-    """Refuse an arm beside other places that a log states: who asks knows which of the two is right."""
-    if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
-        raise InputError(
-            f"{name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m from the"
-            " middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
-        )
 
 
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
@@ -504,8 +437,3 @@ def _rounded_up(value: float) -> float:
     """Round up to two digits."""
     unit = 10.0 ** (floor(log10(value)) - 1)
     return float(f"{ceil(value / unit - 1e-9) * unit:.6g}")
-
-
-def _facts(one: KnownLog) -> tuple[str, ...]:
-    noted = (f"{key} = {plain(one.parameters[key])}" for key in _NOTED if key in one.parameters)
-    return (*([f"written by {one.system}"] if one.system else []), *noted)

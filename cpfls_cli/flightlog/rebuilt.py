@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.allocation import Allocation, Limits, Spread, factor_mix, px4_mix
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -22,8 +22,8 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
-from cpfls_cli.flightlog.log_table import LogTable, holding_values
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
+from cpfls_cli.flightlog.recognised import LogTable, holding_values
 from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, RotorGuess, find_rotors, too_slow
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
@@ -43,24 +43,22 @@ SOURCES: Final = (
 )
 """All columns that rebuilding reads."""
 
+# What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean, share of
+# full. docs/import.md has the study.
 _LEAST_EXPLAINED, _MOST_LAG_S, _SCALES, _MOST_OFFSET = 0.9, 0.01, (0.9, 1.1), 0.01
-"""What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean,
-share of full. docs/import.md has the study."""
+# Root mean square of commands about an axis, share of full, below which the resolution of outputs hides them; lag up to
+# which the logged ones are on time; and how far apart stamps are that are of one step of the autopilot, s.
 _SMALLEST, _ON_TIME_S, _AT_ONCE_S = 2e-3, 5e-3, 1e-3
-"""Root mean square of commands about an axis, share of full, below which the resolution of outputs hides them; lag up
-to which the logged ones are on time; and how far apart stamps are that are of one step of the autopilot, s."""
+# Age that outputs may have that ArduPilot reads back from another processor, and the rate of what is mixed from which
+# on the moment of each of them can be found.
 _READ_BACK_S, _OFTEN_HZ = 0.08, 100.0
-"""Age that outputs may have that ArduPilot reads back from another processor, and the rate of what is mixed from which
-on the moment of each of them can be found."""
 _NOTHING: Final = "it lacks logged commands to compare with, what they are mixed from, or its frame"
-_FEWEST: Final = 30
-"""Logged samples in flight that are compared."""
-_FLIES: Final = 0.35
-"""Share of the usual mean command from which on the vehicle flies."""
+_FEWEST: Final = 30  # Logged samples in flight that are compared.
+_FLIES: Final = 0.35  # Share of the usual mean command from which on the vehicle flies.
 _LEAST_COMMAND: Final = 0.03
 _SHIFTS_S: Final = np.arange(-30, 31) * 2e-3
+# Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m.
 _DENSITY_AT_SEA, _GAS, _KELVIN, _LAPSE = 1.225, 287.26, 273.15, 0.0065
-"""Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m."""
 
 
 @result
@@ -153,13 +151,7 @@ def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebui
 def with_topic(
     topics: Topics, parameters: Parameters, system: str, settings: ImportSettings
 ) -> tuple[Topics, tuple[str, ...]]:
-    """Add the columns that a config asks for and that no log holds, and say how good they are.
-
-    Raises
-    ------
-    InputError
-        If they cannot be rebuilt, and no logged ones stand in for them.
-    """
+    """Add the columns that a config asks for and that no log holds, and say how good they are."""
     rebuilt = rebuilt_rotors(topics, parameters, system)
     command = settings.signals.get("rotor_command")
     others = command is not None and any(choice.columns[0].partition(".")[0] in topics for choice in command.otherwise)
@@ -280,9 +272,7 @@ def _of_ardupilot(log: LogTable, columns: SignalMap, parameters: Parameters) -> 
             gain, battery = 1 / np.interp(time, at, np.where(lift > 0, lift, 1.0)), held[:, None]
     gain = gain / _air_density(log, time)
     limits = Limits(
-        by="ardupilot",
-        yaw_headroom=1e-3 * of("YAW_HEADROOM", 200.0),
-        throttle_mean=0.5 * of("THST_HOVER", 0.35),
+        by="ardupilot", yaw_headroom=1e-3 * of("YAW_HEADROOM", 200.0), throttle_mean=0.5 * of("THST_HOVER", 0.35)
     )
     curve = ThrustCurve(of("THST_EXPO", 0.65), of("SPIN_MIN", 0.15), of("SPIN_MAX", 0.95))
     return _Mixed(
@@ -376,7 +366,10 @@ def _compared(mixed: _Mixed, commands: Array, slow: Array, logged: Array) -> _Co
     """
     time, late_s, axes = mixed.time, mixed.late_s, np.asarray(np.linalg.pinv(mixed.allocation.mix), dtype=float)[1:]
     reach = max(float(_SHIFTS_S[-1]), late_s)
-    flies = _flying(logged) & (slow >= time[0] + reach) & (slow <= time[-1] - reach)
+    mean = logged.mean(axis=1)
+    driven = mean[mean > _LEAST_COMMAND]
+    least = _FLIES * float(np.median(driven)) if len(driven) else np.inf
+    flies = (mean > least) & (slow >= time[0] + reach) & (slow <= time[-1] - reach)
     at, own = slow[flies], logged[flies]
     if len(at) < _FEWEST:
         return _Compared(len(at))
@@ -422,12 +415,6 @@ def _explained(axes: Array, own: Array, error: Array, lag_s: float) -> _Compared
 
 def _between(values: Array) -> Array:
     return np.asarray(values - values.mean(axis=1, keepdims=True))
-
-
-def _flying(logged: Array) -> BoolArray:
-    mean = logged.mean(axis=1)
-    driven = mean[mean > _LEAST_COMMAND]
-    return np.asarray(mean > _FLIES * float(np.median(driven))) if len(driven) else np.zeros(len(mean), dtype=bool)
 
 
 def _lowest(lost: list[float]) -> float:

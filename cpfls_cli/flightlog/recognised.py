@@ -1,41 +1,242 @@
-"""What a log is taken for, and what is told of it so far: signals, keys, the reason and the rivals of each guess."""
+"""A log's columns on their clocks, and what they are taken for so far, with the reason and the rivals of each guess."""
 
+import re
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
+
+import numpy as np
+from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.flown import FlownPart
-from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.nameless import OF_A_MATRIX
-from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.settings import ROTORS, SignalMap, SignalName
-from cpfls_cli.units import UnitName, known_unit
+from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
+from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, nameless_clock
+from cpfls_cli.flightlog.repair import increasing_rows
+from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
+from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
+from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
 
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
+_TIME_NAMES = [
+    "t",
+    "time",
+    "time_s",
+    "timestamp",
+    "time_us",
+    "timeus",
+    "time_ms",
+    "stamp",
+    "tick",
+    "seconds",
+    "sec",
+    "t_s",
+]
+_TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
+_SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
+_SLOWEST_HZ = 0.5  # Below which a signal tells nothing of a flight.
+_FEWEST_SAMPLES = 20  # For medians and rates.
+# Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
+_LARGEST_SPAN = 100
+_GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
+
+
+class LogTable:
+    """Columns of a log by name, each on its own clock, and all of them on one."""
+
+    def __init__(self, topics: Topics, units: Mapping[str, str]) -> None:
+        self.topics, self.units = topics, units
+        self.flat = set(topics) == {""}
+        self.names = column_names(topics)
+        samples = max(map(len, topics[""].values()), default=0) if self.flat else _FEWEST_SAMPLES
+        if samples < _FEWEST_SAMPLES:
+            raise InputError(f"holds only {samples} samples, too few for a flight")
+        self.time_column, self.time_unit, self.time_doubt = (
+            _flat_time(topics[""], units) if self.flat else ("", "s", None)
+        )
+        self.origin = float(self.clock("")[0]) if self.flat else 0.0
+        self.grid = np.empty(0)
+
+    def with_topic(self, topic: str, fields: Mapping[str, Array]) -> "LogTable":
+        """Give the same log with one more topic, which has stamps of its own."""
+        more = copy(self)
+        more.topics = {**self.topics, topic: fields}
+        more.names = column_names(more.topics)
+        return more
+
+    def require_long_enough(self, span_s: float) -> None:
+        """Refuse a log, or what of it holds a flight, that is too short to be one."""
+        if span_s < SHORTEST_FLIGHT_S:
+            raise InputError(f"holds {too_short(span_s)}")
+
+    def parts(self, column: str) -> tuple[str, str]:
+        """Split a column into topic and field."""
+        if self.flat:
+            return "", column
+        topic, _, name = column.partition(".")
+        return topic, name
+
+    def clock(self, topic: str) -> Array:
+        """Stamps of a topic, s."""
+        if self.flat:
+            factor = 1.0 if self.time_column in self.units else _TIME_UNITS[self.time_unit]
+            return np.asarray(self.topics[""][self.time_column] * factor, dtype=float)
+        return np.asarray(self.topics[topic].get(STAMP, np.empty(0)), dtype=float)
+
+    def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
+        """Stamps and values of columns, rows without a value left out; all on the clock of the first one's topic."""
+        topic = self.parts(columns[0])[0]
+        if all(self.parts(column)[0] == topic for column in columns):
+            return self._of_topic(topic, columns)
+        clocks = [self.values((column,)) for column in columns]
+        time = clocks[0][0]
+        if not all(len(own) for own, _ in clocks):
+            return np.empty(0), np.empty((0, len(columns)))
+        return time, np.column_stack([np.interp(time, own, values[:, 0]) for own, values in clocks])
+
+    def _of_topic(self, topic: str, columns: Sequence[str]) -> tuple[Array, Array]:
+        time = self.clock(topic)
+        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
+        if len(rows) != len(time):
+            return np.empty(0), np.empty((0, len(columns)))
+        kept, _ = increasing_rows(np.where(np.isfinite(rows).all(axis=1), time, np.nan))
+        return time[kept], rows[kept]
+
+    def without_spikes(self, columns: Sequence[str]) -> Array:
+        """Values of columns, each the median of five neighbours: what rotors do takes longer."""
+        return np.asarray(median_filter(self.values(columns)[1], size=(5, 1)), dtype=float)
+
+    def on_grid(self, columns: Sequence[str], *, spikes: bool = True) -> Array:
+        """Columns on the one clock; at its ends the nearest value."""
+        time, values = self.values(columns)
+        values = values if spikes else self.without_spikes(columns)
+        return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
+
+    def stated_unit(self, column: str, signal: SignalName) -> UnitName | None:
+        """Give the unit that the log states of a column, None where it states none or one that a signal cannot have."""
+        stated = self.units.get(column, "")
+        # Pulses in us are no time: their range makes them shares.
+        unit = next((known for known in get_args(UnitName) if known == stated and known != "us"), None)
+        return unit if unit is not None and KNOWN_UNITS[unit].si in UNITS_OF_SIGNAL[signal] else None
+
+    def rate_hz(self, columns: Sequence[str]) -> float:
+        """Median rate of the topic of a column."""
+        time, _ = self.values(columns[:1])
+        return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+
+
+def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str | None]:
+    """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
+    rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
+    rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
+    for name in rising:
+        if _time_rank(name) > 2:
+            break
+        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
+        if name in units:
+            return name, "s", None
+        ending = re.search(r"(?:[_ \[(]|time)([num]?s)[\])]?$", name.lower())
+        stated = [ending[1]] if ending else []
+        fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
+        if stated or fitting:
+            unit = (stated or fitting)[0]
+            doubt = None
+            if fitting and unit not in fitting:
+                doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
+            elif step == 1:
+                doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
+            return name, unit, doubt
+    clock = nameless_clock(fields)
+    if clock is not None:
+        return clock, "s", None
+    raise InputError(
+        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
+        " rename it, or write the config by hand (`cpfls config` prints every key)"
+    )
+
+
+def _time_rank(name: str) -> int:
+    lower = name.lower().strip()
+    if lower in _TIME_NAMES:
+        return lower not in _TIME_NAMES[:2]
+    return 2 if "time" in lower or "stamp" in lower else 3
+
+
+def _rises(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    enough = len(known) > 2 and len(known) > 0.5 * len(values)
+    return enough and bool((np.diff(known) >= 0).all() and np.ptp(known) > 0)
+
+
+def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
+    """Keep what has enough values that change, by signal."""
+    kept: dict[SignalName, list[Named]] = {}
+    for candidate in candidates:
+        # The unit that a log states wins over the one that its kind is known for.
+        unit = log.stated_unit(candidate.group.columns[0], candidate.signal)
+        named = candidate if unit is None else replace(candidate, unit=unit, scale=1.0)
+        time, values = log.values(named.group.columns)
+        if named.signal in ROTORS and len(time) < _FEWEST_SAMPLES:
+            # Outputs that are not there hold no numbers.
+            enough = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
+            named = replace(named, group=replace(named.group, columns=enough or named.group.columns))
+            time, values = log.values(named.group.columns)
+        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
+            continue
+        if float(np.ptp(values, axis=0).max()) > 0:
+            kept.setdefault(named.signal, []).append(named)
+    for found in kept.values():
+        # Columns that the same kind of log is known for, and that come several times as often, go first.
+        fastest = max((log.rate_hz(named.group.columns) for named in found if named.known), default=0.0)
+        slow = [bool(named.known) and log.rate_hz(named.group.columns) * _SEVERAL < fastest for named in found]
+        found[:] = [named for _, named in sorted(zip(slow, found, strict=True), key=lambda entry: entry[0])]
+    return kept
+
+
+def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
+    """Refuse a log whose rotors are all logged and never change: it is of a vehicle on the ground."""
+    if any(name in candidates for name in ROTORS):
+        return
+    dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
+    if dead is not None:
+        raise InputError(f"no flight in it: the rotors ({dead.group.pattern}) never change")
+
+
+def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
+    """Lay one uniform clock over all signals of motion and rotors."""
+    chosen = [found[0] for name, found in candidates.items() if name != "voltage"] or [
+        found[0] for found in candidates.values()
+    ]
+    clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
+    rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
+    begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
+    log.require_long_enough(end - begin)
+    rows = max(map(len, clocks))
+    if (end - begin) * rate > _LARGEST_SPAN * rows:
+        raise InputError(
+            f"its stamps span {end - begin:.3g} s, but {rows} rows at {rate:.3g} Hz are {rows / rate:.3g} s: damaged,"
+            " or not a clock; cut out the part that flies"
+        )
+    log.grid = np.arange(begin, end, 1 / rate)
+
+
+# Whether the data decided, a name or the kind of log says so, or neither does.
 Sure = Literal["data", "named", "guess"]
-"""Whether the data decided, a name or the kind of log says so, or neither does."""
 
 
 @dataclass(frozen=True)
 class Rival:
-    """Another guess that the data cannot part from the one that is taken.
+    """Another guess that the data cannot part from the one that is taken."""
 
-    Attributes
-    ----------
-    text : str
-        As it would stand in the config, such as ``unit: deg``.
-    reason : str
-        Why it is not ruled out.
-    """
-
-    text: str
-    reason: str
+    text: str  # As it would stand in the config, such as ``unit: deg``.
+    reason: str  # Why it is not ruled out.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,78 +267,41 @@ class KeyChoice:
 
 
 class Load(NamedTuple):
-    """What the rotors carry in flight.
+    """What the rotors carry in flight."""
 
-    Attributes
-    ----------
-    size : float
-        Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
-        propellers it is as the mass.
-    sensed : bool
-        Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
-    steady : bool
-        Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
-    voltage : float
-        Of the battery in flight, V; NaN where the log does not hold it.
-    """
-
+    # Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
+    # propellers it is as the mass.
     size: float
+    # Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
     sensed: bool
-    steady: bool
-    voltage: float = float("nan")
+    steady: bool  # Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
+    voltage: float = float("nan")  # Of the battery in flight, V; NaN where the log does not hold it.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recognition:
-    """What a log is taken for.
+    """What a log is taken for."""
 
-    Attributes
-    ----------
-    time_column, time_unit : str
-        As the section `import` takes them.
-    choices : tuple of Choice
-        Frames, the order of a quaternion, what a command is.
-    left_out : tuple of str
-        Sentences on columns that look like a signal and are not mapped.
-    unused : tuple of str
-        All columns that are mapped to nothing, stamps left out.
-    winged : bool
-        Whether it is of a VTOL and flies on the wing for a part, which is cut.
-    counted_from_s : float
-        Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
-    rebuilt : Rebuilt or None
-        Commands of the rotors that take the place of logged ones.
-    rate_hz : float
-        Of the clock.
-    slowest_s, slowest_but_voltage_s : float
-        Longest median step of a topic that is mapped, s; and without that of the voltage.
-    kind : str
-        Kind of log that is known for such columns of rotors; empty where none is.
-    moved : MovedBy or None
-        The rotors as the motion tells them.
-    speeds : array, shape (time, rotor), or None
-        Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
-    load : Load or None
-        None where no columns are those of rotors.
-    """
-
-    time_column: str
+    time_column: str  # As the section `import` takes them.
     time_unit: str
     signals: tuple[Guess, ...]
-    choices: tuple[KeyChoice, ...]
-    left_out: tuple[str, ...]
+    choices: tuple[KeyChoice, ...]  # Frames, the order of a quaternion, what a command is.
+    left_out: tuple[str, ...]  # Sentences on columns that look like a signal and are not mapped.
     flown: FlownPart
-    rate_hz: float
-    slowest_s: float
+    rate_hz: float  # Of the clock.
+    slowest_s: float  # Longest median step of a topic that is mapped, s; and without that of the voltage.
     slowest_but_voltage_s: float
-    kind: str
-    moved: MovedBy | None
+    kind: str  # Kind of log that is known for such columns of rotors; empty where none is.
+    moved: MovedBy | None  # The rotors as the motion tells them.
+    # Shape (time, rotor), or None; rotor speeds in flight in rad/s, or commands as shares of the largest speed.
     speeds: Array | None = field(repr=False)
-    load: Load | None = None
+    load: Load | None = None  # None where no columns are those of rotors.
     warnings: tuple[str, ...] = ()
-    unused: tuple[str, ...] = ()
-    winged: bool = False
+    unused: tuple[str, ...] = ()  # All columns that are mapped to nothing, stamps left out.
+    winged: bool = False  # Whether it is of a VTOL and flies on the wing for a part, which is cut.
+    # Where the stretches of `flown` are counted from, s from the first stamp of a flat log, or of all topics.
     counted_from_s: float = 0.0
+    # Commands of the rotors that take the place of logged ones.
     rebuilt: "Rebuilt | None" = field(default=None, repr=False)
 
     def signal(self, name: SignalName) -> Guess | None:
@@ -173,6 +337,12 @@ class Seen:
         """Of the one clock."""
         return 1 / float(self.log.grid[1] - self.log.grid[0])
 
+    @property
+    def quaternion_order(self) -> Literal["wxyz", "xyzw"]:
+        """Order of the columns of quaternions."""
+        choice = self.choices.get("quaternion_order")
+        return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
+
     def first(self, name: SignalName) -> Named | None:
         """Give the best candidate for a signal."""
         return next(iter(self.candidates.get(name, ())), None)
@@ -187,7 +357,7 @@ class Seen:
         values = self.log.on_grid(columns.columns, spikes=guess.signal not in ROTORS)[self.part]
         return known_unit(columns.unit).factor * as_mapped(values, columns)
 
-    def tell(
+    def take(
         self,
         named: Named,
         unit: UnitName,

@@ -10,45 +10,47 @@ from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
-from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
+from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
     position_by_velocity,
-    tell_acceleration,
-    tell_body_rate,
-    tell_places,
+    take_acceleration,
+    take_body_rate,
+    take_places,
 )
-from cpfls_cli.flightlog.nameless import nameless_signals
-from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
-from cpfls_cli.flightlog.readings import Reading
+from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
-from cpfls_cli.flightlog.recognised import Guess, Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.recognised import (
+    Load,
+    LogTable,
+    Recognition,
+    Rival,
+    Seen,
+    called,
+    holding_values,
+    make_grid,
+    refuse_dead_rotors,
+)
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
-from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
+from cpfls_cli.flightlog.setpoint_columns import take_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
+from cpfls_cli.flightlog.stated_vehicle import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vehicle_kind import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.words import some
 
 _DEGREES = 180 / np.pi
+# Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it.
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
-"""Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it."""
-
-_FASTEST_RAD_S = 40.0
-"""Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s."""
-
-_LATE_S = (0.0, 0.03, 0.06, 0.09)
-"""By which motors and propellers follow a command, s."""
-
+_FASTEST_RAD_S = 40.0  # Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s.
+_LATE_S = (0.0, 0.03, 0.06, 0.09)  # By which motors and propellers follow a command, s.
 _ORDER: Final[tuple[SignalName, ...]] = (
     "quaternion",
     "attitude",
@@ -62,17 +64,12 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
-_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
-"""What shows flight, with the rotors."""
-
+_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # What shows flight, with the rotors.
+# Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
+# specific force of a lean of 30 degrees is 15 % above gravity.
 _STEADY: Final = 0.15
-"""Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
-specific force of a lean of 30 degrees is 15 % above gravity."""
-
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
-_SHOWN = 4
-"""Groups of columns that are named where others are taken for the same."""
-
+_SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
 
@@ -102,7 +99,11 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     if not candidates and log.flat:
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
-        _refuse_unfit(log, named)
+        clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+        if clocks:
+            log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+            names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+            raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
         if system and not log.flat:
             raise InputError(f"holds only {some([*topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight")
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
@@ -110,7 +111,12 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     refuse_dead_rotors(log, named, candidates)
     log, candidates, ended = _live_part(log, candidates)
     make_grid(log, candidates)
-    rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
+    columns = {str(name): [(own, own.group.columns) for own in candidates.get(name, ())] for name in ROTORS}
+    found = {
+        name: [(own, log.values(each)[0], log.without_spikes(each)) for own, each in held]
+        for name, held in columns.items()
+    }
+    rotors = find_rotors(found, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = _shares(log, rotors)
@@ -124,24 +130,26 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
-    if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
+    if verdict is not None and gyroscope_first(
+        seen, verdict.best, rotors.speed or rotors.command, rotors.speed is None
+    ):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
-    tell_places(seen, reading)
-    tell_body_rate(seen, reading)
-    tell_acceleration(seen, reading)
-    _tell_frames(seen, reading)
+    take_places(seen, reading)
+    take_body_rate(seen, reading)
+    take_acceleration(seen, reading)
+    _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    _tell_voltage(seen)
-    speeds, moved = _tell_rotors(seen, rotors)
-    _tell_wrench(seen)
+    _take_voltage(seen)
+    speeds, moved = _take_rotors(seen, rotors)
+    _take_wrench(seen)
     _doubt_columns(seen)
-    tell_setpoints(seen, parameters, system)
+    take_setpoints(seen, parameters, system)
     _list_unused(seen)
     driving = rotors.speed or rotors.command
-    found = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
-    return replace(found, winged=winged, rebuilt=rebuilt)
+    taken = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+    return replace(taken, winged=winged, rebuilt=rebuilt)
 
 
 def _live_part(
@@ -156,26 +164,12 @@ def _live_part(
         for name, found in candidates.items()
     }
     clock = log.clock("")
-    live = live_rows(SignalTable(clock, {str(name): values for name, values in leading.items()}), float(clock[0]))
-    if not live.ended:
+    live, ended = live_rows(SignalTable(clock, {str(name): own for name, own in leading.items()}), float(clock[0]))
+    if not ended:
         return log, candidates, ""
-    part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)
+    part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
-    return part, holding_values(part, [named for found in candidates.values() for named in found]), live.ended
-
-
-def _refuse_unfit(log: LogTable, named: Sequence[Named]) -> None:
-    """Refuse a log that has columns of a flight by name, none of which holds one."""
-    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
-    if clocks:
-        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
-        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
-        raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
-
-
-def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
-    groups = [(named, named.group.columns) for named in candidates]
-    return [(named, log.values(columns)[0], log.without_spikes(columns)) for named, columns in groups]
+    return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
 
 
 def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
@@ -185,12 +179,6 @@ def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
     return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
-
-
-def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None:
-    """Give the speeds of the rotors in flight, shape (time, rotor), and whether they are commands."""
-    found = rotors.speed or rotors.command
-    return None if found is None else (seen.mapped(found.guess), rotors.speed is None)
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
@@ -247,7 +235,7 @@ def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
 # Frames.
 
 
-def _tell_frames(seen: Seen, reading: Reading | None) -> None:
+def _take_frames(seen: Seen, reading: Reading | None) -> None:
     """Choose the frames: from the lean, from the accelerometer, from the kind of log, or as usual."""
     leading = [found[0] for found in seen.candidates.values() if found]
     bodies = {BODY_OF.get(str(named.frame)) for named in leading} - {None}
@@ -276,7 +264,7 @@ def _tell_frames(seen: Seen, reading: Reading | None) -> None:
 # What drives it.
 
 
-def _tell_wrench(seen: Seen) -> None:
+def _take_wrench(seen: Seen) -> None:
     """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
     torque, thrust, rate = seen.first("body_torque"), seen.first("thrust"), seen.guesses.get("body_rate")
     if torque is None:
@@ -295,10 +283,10 @@ def _tell_wrench(seen: Seen) -> None:
         f" {share[1]:.2f} about pitch); a commanded torque is only what a controller asked for"
     )
     scale = () if torque.unit else (Rival("unit: N mm", "the scale follows from the inertia, which no log states"),)
-    seen.tell(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
+    seen.take(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
     if thrust is not None:
         level = f"{float(np.median(seen.grid(thrust))):.3g}"
-        seen.tell(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
+        seen.take(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
 
 
 def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> list[float]:
@@ -310,17 +298,17 @@ def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> li
     return [0.0 if still[axis] else float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
 
 
-def _tell_voltage(seen: Seen) -> None:
+def _take_voltage(seen: Seen) -> None:
     voltage = seen.first("voltage")
     if voltage is None:
         return
     level = float(np.median(seen.grid(voltage)))
     scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
     reason = f"{called(voltage)}; {level * scale:.3g} V in flight"
-    seen.tell(voltage, "V", reason, "named", scale=scale, required=False)
+    seen.take(voltage, "V", reason, "named", scale=scale, required=False)
 
 
-def _tell_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
+def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
     seen.left_out += rotors.left_out
     seen.warnings += rotors.warnings
     speeds = None
@@ -413,6 +401,8 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         # import.crop_s counts from the first stamp of the clock.
         off = float(log.grid[0]) - float(begin)
         flown = replace(flown, span_s=(max(0.0, round(flown.span_s[0] + off, 2)), round(flown.span_s[1] + off, 2)))
+    used = {time_column, *(column for guess in (*signals, *asked) for column in guess.columns.columns)}
+    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
     return Recognition(
         time_column=time_column,
         time_unit=unit,
@@ -428,13 +418,6 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         speeds=speeds,
         load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
         warnings=tuple(seen.warnings),
-        unused=_unused(log, (*signals, *asked), time_column),
+        unused=tuple(name for name in log.names if name not in used | stamps),
         counted_from_s=float(log.grid[0]) - log.origin,
     )
-
-
-def _unused(log: LogTable, guesses: Sequence[Guess], time_column: str) -> tuple[str, ...]:
-    """List the columns that are mapped to nothing."""
-    used = {time_column, *(column for guess in guesses for column in guess.columns.columns)}
-    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
-    return tuple(name for name in log.names if name not in used | stamps)

@@ -1,50 +1,33 @@
-"""Rows of a log on their way to a uniform clock: cropped, made continuous, spikes removed, absent values filled."""
+"""Rows of a log on their way to a uniform clock: stamps that increase, no impossible values, spikes or long gaps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import pi
+from math import floor, log10, pi
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import KNOWN_UNITS
 
+_LARGEST_SHARE_BEHIND = 0.05  # Of all rows, up to which packets merely come late.
+SMALLEST_SHARE_KEPT = 0.1  # Of a log, below which a crop that keeps it is not worth a word.
+_SAME_RATE = 1e-3
 # Measured, not derived: over 15 flights no gyroscope, torque or attitude has a value beyond 7, and 99 % of the single
 # spikes of five standard deviations of their channel lie beyond 10.
 _SUSPECTED_DEVIATIONS = 10.0
-_DEVIATION_OF_MEDIAN = 1.4826
-"""Standard deviation of normal noise over the median of its departures."""
-
+_DEVIATION_OF_MEDIAN = 1.4826  # Standard deviation of normal noise over the median of its departures.
 # Far beyond what flies, by SI unit: what is larger is a broken value, or the unit is wrong.
-_LARGEST = {
-    "rad": 1e6,
-    "rad/s": 1e5,
-    "m": 1e9,
-    "m/s": 1e5,
-    "m/s^2": 1e6,
-    "N m": 1e6,
-    "N": 1e8,
-    "V": 1e5,
-    "1": 1e9,
-    "s": 1e3,
-}
-_LARGEST_SHARE_BROKEN = 0.01
-"""Of values up to which some are broken, and not the unit wrong."""
+_LARGEST = {"rad": 1e6, "rad/s": 1e5, "m": 1e9, "m/s": 1e5, "m/s^2": 1e6, "N m": 1e6, "N": 1e8, "V": 1e5, "1": 1e9}
+_LARGEST |= {"s": 1e3}
+_LARGEST_SHARE_BROKEN = 0.01  # Of values up to which some are broken, and not the unit wrong.
 
 
 @dataclass(frozen=True)
 class SignalTable:
-    """Time stamps and the mapped signals at them, in SI, absent values NaN.
-
-    Attributes
-    ----------
-    time : array, shape (sample,), s
-    signals : dict from signal name to array, shape (sample, column)
-    """
+    """Time stamps, s, and by name the mapped signals at them, shape (sample, column), in SI, absent values NaN."""
 
     time: Array
     signals: dict[str, Array]
@@ -53,42 +36,46 @@ class SignalTable:
         """Select rows."""
         return SignalTable(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
 
-    def columns(self) -> Array:
-        """Join all signals to one array, shape (sample, column)."""
-        return np.hstack(list(self.signals.values()))
+
+# The clock.
+
+
+def same_rate(rates_hz: Sequence[float]) -> bool:
+    """Tell whether clocks are of one rate, so that one filter and one window suit them all."""
+    return max(rates_hz) - min(rates_hz) <= _SAME_RATE * min(rates_hz)
+
+
+def common_rate(rates_hz: Sequence[float]) -> float:
+    """Give a round rate, Hz, at which logs of several rates become flights of one and none is thinned much."""
+    slowest = (1 + _SAME_RATE) * min(rates_hz)
+    digit = 10.0 ** (floor(log10(slowest)) - 2)
+    return float(f"{floor(slowest / digit) * digit:.3g}")
+
+
+def increasing_rows(time: Array) -> tuple[IntArray, dict[str, int]]:
+    """Keep the rows whose stamp, shape (sample,), is later than every one before; count the others by reason."""
+    finite = np.isfinite(time)
+    latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
+    before = np.concatenate([[-np.inf], latest[:-1]])
+    with np.errstate(invalid="ignore"):
+        repeated, backward = finite & (time == before), finite & (time < before)
+        kept = np.flatnonzero(finite & (time > before))
+    dropped = {"time_not_finite": ~finite, "repeated_time": repeated, "backward_time": backward}
+    return kept, {reason: int(rows.sum()) for reason, rows in dropped.items()}
 
 
 def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, dict[str, int]]:
-    """Keep the rows that lie inside the crop, and of these the ones whose time stamps increase.
+    """Keep the rows inside `crop_s`, in numbers, and of these the ones whose stamps increase; count the others.
 
-    The crop comes first, so that it can cut off a part whose clock went wrong.
-
-    Parameters
-    ----------
-    settings : ImportSettings
-        `crop_s`, in numbers.
-
-    Returns
-    -------
-    table : Table
-        The rows that remain.
-    dropped : dict from str to int
-        Rows dropped, by reason.
-
-    Raises
-    ------
-    SettingError
-        If the crop leaves fewer than two rows.
-    InputError
-        If the time stamps do, or go backward and stay behind, or a mapped column has fewer than two values there.
+    The crop comes first, so that it can cut off a part whose clock went wrong. What leaves fewer than two rows, goes
+    backward and stays behind, or empties a mapped column is refused.
     """
     begin, end = settings.crop_s if isinstance(settings.crop_s, tuple) else (-np.inf, np.inf)
     outside = (table.time < begin) | (table.time > end)
     inside = np.isfinite(table.time) & ~outside
     if settings.crop_s is not None and inside.sum() < 2:
         raise SettingError(
-            "crop_s",
-            f"leaves {inside.sum()} rows of a log of {np.nanmax(table.time):.6g} s; check import.time_unit",
+            "crop_s", f"leaves {inside.sum()} rows of a log of {np.nanmax(table.time):.6g} s; check import.time_unit"
         )
     table = table.rows(~outside)
     refuse_restart(table.time, np.flatnonzero(~outside) + 1)
@@ -96,37 +83,147 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
     if len(kept) < 2:
         raise InputError("the log has fewer than two rows with increasing time stamps; check import.time_column")
     ordered = table.rows(kept)
-    _require_values(ordered, settings)
-    return ordered, dropped | {"crop": int(outside.sum())}
-
-
-def _require_values(table: SignalTable, settings: ImportSettings) -> None:
-    """Refuse columns that are empty in the part of the log that is read, by their names."""
     problems = [
         f"import.signals.{name}.columns: {column!r} has fewer than two values ({count}) in the"
-        f" {len(table.time)} rows that are read"
+        f" {len(kept)} rows that are read"
         for name, signal in settings.signals.items()
-        for column, count in zip(signal.names, np.isfinite(table.signals[name]).sum(axis=0).tolist(), strict=True)
+        for column, count in zip(signal.names, np.isfinite(ordered.signals[name]).sum(axis=0).tolist(), strict=True)
         if count < 2
     ]
     if problems:
         problems[-1] += "; map another column, or leave the signal out of import.signals"
         raise InputError("\n".join(problems))
+    return ordered, dropped | {"crop": int(outside.sum())}
 
 
-def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, tuple[str, ...]]:
-    """Take values that no flight has, and quaternions without a length, for absent ones.
+def refuse_restart(time: Array, rows: IntArray) -> None:
+    """Refuse stamps, s, that go backward and stay behind; a packet that comes late is behind alone, and dropped.
+
+    What counts are rows behind in runs of two or more, where they make up more than 5 % of all. The message says
+    where, by the number of each row in the log from 1, and offers a crop only where it leaves one part of the log.
+    """
+    finite = np.isfinite(time)
+    time, rows = time[finite], rows[finite]
+    behind = runs(_behind(time))
+    if not _too_many(behind, len(time)):
+        return
+    first, length = max(((begin, end - begin) for begin, end in behind), key=lambda run: run[1])
+    inside = {crop: time[(time >= crop[0]) & (time <= crop[1])] for crop in _crops(time)}
+    # A crop within which the clock goes back keeps nothing.
+    kept = {crop: len(own) for crop, own in inside.items() if not _too_many(runs(_behind(own)), len(own))}
+    kept = {crop: count for crop, count in kept.items() if count > SMALLEST_SHARE_KEPT * len(time)}
+    remedy = "split the log (import.crop_s cannot tell the parts apart: their time stamps overlap)"
+    if kept:
+        crop = max(kept, key=lambda own: kept[own])
+        remedy = f"split the log, or keep one part of {kept[crop]} rows with import.crop_s = [{crop[0]:g}, {crop[1]:g}]"
+    raise InputError(
+        f"time goes backward at row {rows[first]} (from {time[first - 1]:.6g} s to {time[first]:.6g} s after the first"
+        f" stamp) and stays behind for {length} rows: the clock was reset or logs were joined; {remedy}"
+    )
+
+
+def _crops(time: Array) -> Iterator[tuple[float, float]]:
+    """List the intervals of time that may hold one part of the log: before, beyond and among the stamps behind."""
+    behind = _behind(time)
+    last = float(time.max())
+    lowest, highest = float(time[behind].min()), float(time[behind].max())
+    earlier, later = time[~behind & (time < lowest)], time[~behind & (time > highest)]
+    stretches = [(0.0, max(0.0, highest)), (max(0.0, lowest), highest)]
+    stretches += [(0.0, float(earlier.max()))] if len(earlier) else []
+    stretches += [(max(0.0, float(later.min())), last)] if len(later) else []
+    yield from {(float(f"{begin:g}"), float(f"{end:g}")) for begin, end in stretches if begin < end}
+
+
+def _too_many(behind: list[tuple[int, int]], rows: int) -> bool:
+    """Tell whether more rows are behind than come late one by one."""
+    return sum(end - begin for begin, end in behind if end - begin > 1) > _LARGEST_SHARE_BEHIND * rows
+
+
+def _behind(time: Array) -> BoolArray:
+    return np.asarray(time < np.maximum.accumulate(time), dtype=bool)
+
+
+# Gaps.
+
+
+def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> tuple[slice, int, int]:
+    """Find the longest stretch in which no column lacks values for longer than `gap_s`, as `gap_rule` has it.
+
+    Parameters
+    ----------
+    time : array, shape (sample,), s
+        Increasing time stamps.
+    present : array of bool, shape (sample, column)
+        Where each column has a value.
 
     Returns
     -------
-    table : Table
-    warnings : tuple of str
-        One for each column that held any.
+    rows : slice
+    incomplete_ends, beyond_gap : int
+        Rows left out as a column has no value yet or any more, and beyond a gap.
+    """
+    if (present.sum(axis=0) < 2).any():
+        raise InputError("a mapped column has fewer than two values in the part of the log that is read")
+    # Between these rows every column has begun and none has ended.
+    first_full = int(np.argmax(present, axis=0).max())
+    last_full = len(present) - 1 - int(np.argmax(present[::-1], axis=0).max())
+    if first_full >= last_full:
+        raise InputError("the mapped columns of the log have no period of time in common")
+    gaps = _gap_steps(time, present, settings.gap_s)[first_full:last_full]
+    if gaps.any() and settings.gap_rule == "stop":
+        begin, end = (time[first_full + row] for row in runs(gaps)[0])
+        raise InputError(
+            _slow_log(time, present, settings)
+            or f"the log has a gap of {end - begin:.3g} s at {begin:.3f} s, longer than import.gap_s ="
+            f" {settings.gap_s:g}: raise it, crop with import.crop_s, or set import.gap_rule to longest-part"
+        )
+    stretches = [(first_full + begin, first_full + end) for begin, end in runs(~gaps)]
+    if not stretches:
+        raise InputError(
+            _slow_log(time, present, settings)
+            or "no part of the log has values in all mapped columns; check import.signals and import.gap_s"
+        )
+    first, last = max(stretches, key=lambda run: float(time[run[1]] - time[run[0]]))
+    incomplete = first_full + len(time) - 1 - last_full
+    return slice(first, last + 1), incomplete, len(time) - incomplete - (last + 1 - first)
 
-    Raises
-    ------
-    InputError
-        If a column holds many of them.
+
+def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:
+    """Describe a log whose median step, not a gap in it, exceeds the longest gap allowed; None if it does not."""
+    step = float(np.median(np.diff(time)))
+    if step > settings.gap_s:
+        return (
+            f"the median step is {step:.3g} s, longer than import.gap_s = {settings.gap_s:g}: check import.time_unit ="
+            f" {settings.time_unit}, or raise import.gap_s"
+        )
+    slowest = max(float(np.median(np.diff(time[column]))) for column in present.T)
+    if slowest > settings.gap_s:
+        return (
+            f"a mapped column has a value only every {slowest:.3g} s (median), longer than import.gap_s ="
+            f" {settings.gap_s:g}: raise import.gap_s, or leave its signal out of import.signals"
+        )
+    return None
+
+
+def _gap_steps(time: Array, present: BoolArray, gap_s: float) -> BoolArray:
+    """Mark the steps from row to row that lie inside a long gap of some column."""
+    depth = np.zeros(len(time), dtype=int)
+    for column in present.T:
+        known = np.flatnonzero(column)
+        # Stamps are rounded, so a gap of exactly the allowed length must pass.
+        long = np.flatnonzero(np.diff(time[known]) > gap_s * (1 + 1e-9))
+        depth[known[long]] += 1
+        depth[known[long + 1]] -= 1
+    return np.asarray(np.cumsum(depth)[:-1] > 0, dtype=bool)
+
+
+# Values.
+
+
+def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, tuple[str, ...]]:
+    """Take values that no flight has, and quaternions without a length, for absent ones; warn of each such column.
+
+    A column that holds many of them is refused.
     """
     warnings: list[str] = []
     signals = dict(table.signals)
@@ -136,7 +233,17 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
             broken = np.abs(values) > _LARGEST[unit]
         for column, (label, marked) in enumerate(zip(signal.names, broken.T, strict=True)):
             if marked.any():
-                warnings.append(_broken(name, label, unit, values[:, column], marked))
+                first = int(np.argmax(marked))
+                text = (
+                    f"column {label!r} holds {int(marked.sum())} of {len(values)} values that no flight has, the first"
+                    f" {values[first, column]:.3g} in row {first + 1}"
+                    f" (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
+                )
+                if marked.mean() > _LARGEST_SHARE_BROKEN:
+                    raise InputError(
+                        f"import.signals.{name}: {text}: check its unit, scale and offset, or leave it out"
+                    )
+                warnings.append(f"{name}: {text}: taken as missing")
         if name == "quaternion":
             without = ~np.any(values, axis=1, keepdims=True)
             broken = broken | without
@@ -146,34 +253,18 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
     return SignalTable(table.time, signals), tuple(warnings)
 
 
-def _broken(name: str, column: str, unit: str, values: Array, marked: BoolArray) -> str:
-    first = int(np.argmax(marked))
-    text = (
-        f"column {column!r} holds {int(marked.sum())} of {len(values)} values that no flight has, the first"
-        f" {values[first]:.3g} in row {first + 1} (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
-    )
-    if marked.mean() > _LARGEST_SHARE_BROKEN:
-        raise InputError(f"import.signals.{name}: {text}: check its unit, scale and offset, or leave it out")
-    return f"{name}: {text}: taken as missing"
-
-
 def make_continuous(table: SignalTable) -> SignalTable:
     """Remove jumps that are not motion, full turns of roll and yaw and signs of a quaternion, for interpolation."""
-    signals = dict(table.signals)
-    if "attitude" in signals:
-        roll, pitch, yaw = signals["attitude"].T
-        signals["attitude"] = np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
-    if "quaternion" in signals:
-        signals["quaternion"] = align_quaternion_signs(signals["quaternion"])
-    return SignalTable(table.time, signals)
+    ways = {"attitude": continuous_attitude, "quaternion": align_quaternion_signs}
+    return SignalTable(
+        table.time, {name: ways[name](own) if name in ways else own for name, own in table.signals.items()}
+    )
 
 
 def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
-    """Mark the spikes, or without `spike_deviations` what is suspected of it, of all but rotor commands, which jump.
+    """Mark spikes, shape (sample, column), or without `spike_deviations` what is suspected of being one.
 
-    Returns
-    -------
-    dict from signal name to array of bool, shape (sample, column)
+    Rotor commands have none: they jump.
     """
     deviations, window = settings.spike_deviations or _SUSPECTED_DEVIATIONS, settings.spike_window_samples
     spikes = {
@@ -183,12 +274,6 @@ def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str
     if "rotor_command" in spikes:
         spikes["rotor_command"][:] = False
     return spikes
-
-
-def mask_values(table: SignalTable, marked: Mapping[str, BoolArray]) -> SignalTable:
-    """Replace marked values, by signal, shape (sample, column), by NaN."""
-    signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
-    return SignalTable(table.time, signals)
 
 
 def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
@@ -208,11 +293,6 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     window : int
         Samples of the running median.
 
-    Returns
-    -------
-    array of bool, shape (sample,)
-        True at a spike.
-
     References
     ----------
     F. R. Hampel, The influence curve and its role in robust estimation, 1974.
@@ -221,13 +301,22 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 2:
         return spikes
-    around = _windows(values[known], window)
+    # Mirrored at the ends, where repetition would hide a spike.
+    padded = np.pad(values[known], (window // 2, window - 1 - window // 2), mode="reflect")
+    around = np.asarray(sliding_window_view(padded, window), dtype=float)
     median = _medians(around)
     departure = np.abs(values[known] - median)
     local = _medians(np.abs(around - median[:, None]))
     scale = _DEVIATION_OF_MEDIAN * np.maximum(local, np.median(departure))
     spikes[known] = departure > deviations * np.maximum(scale, np.abs(np.diff(values[known])).mean())
     return spikes
+
+
+def _medians(rows: Array) -> Array:
+    """Take the median of each row of finite values; a general one spends half its time on what is not finite."""
+    half, odd = divmod(rows.shape[1], 2)
+    ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
+    return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))
 
 
 def count_saturated(values: Array, samples: int, rest: float | None = None) -> int:
@@ -262,6 +351,12 @@ def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
     return continuous
 
 
+def continuous_attitude(attitude: Array) -> Array:
+    """Unwrap roll and yaw of angles, shape (sample, 3), rad; a pitch does not jump."""
+    roll, pitch, yaw = attitude.T
+    return np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
+
+
 def align_quaternion_signs(quaternion: Array) -> Array:
     """Give each quaternion, shape (sample, 4), the sign nearer to the previous one; q and -q are the same attitude."""
     known = np.isfinite(quaternion).all(axis=1)
@@ -270,17 +365,3 @@ def align_quaternion_signs(quaternion: Array) -> Array:
     flips = np.sign((present[1:] * present[:-1]).sum(axis=1))
     continuous[known] = present * np.cumprod(np.concatenate([[1.0], np.where(flips < 0, -1.0, 1.0)]))[:, None]
     return continuous
-
-
-def _windows(values: Array, window: int) -> Array:
-    """Collect the neighbours of each value; mirrored at the ends, where repetition would hide a spike."""
-    before = window // 2
-    padded = np.pad(values, (before, window - 1 - before), mode="reflect")
-    return np.asarray(sliding_window_view(padded, window), dtype=float)
-
-
-def _medians(rows: Array) -> Array:
-    """Take the median of each row of finite values; a general one spends half its time on what is not finite."""
-    half, odd = divmod(rows.shape[1], 2)
-    ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
-    return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))

@@ -1,161 +1,86 @@
 """Results of an import: the signals on one clock, the flight derived from them, and the report."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from math import nan
+from dataclasses import fields
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.result import about, part, result
 
 
-@dataclass(frozen=True)
+@result
 class DelayEstimate:
-    """Delay between the torque command and the motion.
+    """Delay between the torque command and the motion."""
 
-    Attributes
-    ----------
-    delay_s : float
-        The delay whose rigid-body regression explains most of the torque.
-    r2 : array, shape (3,)
-        Share of the torque explained about each body axis, at that delay.
-    pooled_r2 : float
-        All axes together: 1 minus the geometric mean of what stays unexplained about each.
-    inertia : array, shape (6,), kg m^2
-        Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay.
-    delays : array, shape (delay,), s
-        The delays tried.
-    curve : array, shape (delay,)
-        Pooled R2 at each of them.
-    at_bound : bool
-        True where the best delay is the longest one tried, so the true one may be longer.
-    """
-
-    delay_s: float
-    r2: Array
-    pooled_r2: float
-    inertia: Array
-    delays: Array
-    curve: Array
-    at_bound: bool
+    delay_s: float = about("the delay whose rigid-body regression explains most of the torque", unit="s")
+    r2: Array = about("share of the torque explained about each body axis, at that delay", "axis")
+    pooled_r2: float = about("of all axes: 1 minus the geometric mean of what stays unexplained about each")
+    inertia: Array = about("Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay", "moment", unit="kg m^2")
+    delays: Array = about("the delays tried", "delay", unit="s")
+    curve: Array = about("pooled R2 at each of them", "delay")
+    at_bound: bool = about("whether the best delay is the longest one tried, so the true one may be longer")
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class ImportReport:
     """Report of an import: rows read and dropped, values repaired, filter and delay.
 
-    Attributes
-    ----------
-    samples_read : int
-        Rows of the log.
-    samples : int
-        Samples of the result.
-    dropped : mapping from str to int
-        Rows dropped, by reason: `time_not_finite`, `repeated_time`, `backward_time`, `crop`, `incomplete_ends`
-        (before the first or after the last value of some column), `gap` (outside the part that is kept).
-    missing, spikes : mapping from str to int
-        Values of each column, in the part that is kept, that were absent or found to be spikes, and interpolated;
-        columns without are left out. A spike in the first or the last row drops that row instead.
-    suspected_spikes, saturated : mapping from str to int
-        Values of each column that look like spikes, where none are to be interpolated, and values in long runs at the
-        column's extremes; reported only, not changed.
-    gaps : int
-        Gaps in the time stamps (more than 1.5 times the median step) that were interpolated.
-    cut_off_hz : mapping from str to float
-        Cut-off of the low-pass filter that a signal of the log went through before it was logged, Hz, where one is
-        seen; by the name in `import.signals`.
-    updated_hz : mapping from str to float
-        Updates a second of the signals that are updated slower than the log has rows; by the name in `import.signals`.
-    longest_gap_s : float
-        Longest step between time stamps in the part that is kept, s.
-    span_s : tuple of float
-        Begin and end of what is kept, s from the log's first time stamp.
-    first_stamp_s : float
-        That stamp on the log's own clock, s.
-    crop_s : tuple of float or None
-        Begin and end of the crop, as asked for or found; None without one.
-    log_rate_hz, rate_hz : float
-        Median rate of the log, and rate of the result.
-    lowpass_hz : float or None
-        Cut-off of the zero-phase filter that all signals went through.
-    delay_s : float
-        Delay by which the commands were shifted.
-    delay : DelayEstimate or None
-        How the delay was found, where it was estimated.
-    warnings : tuple of str
-        Plain sentences for the user.
-    flown_at : float
-        When the log begins, s since 1970 began (UTC); NaN where it does not tell.
-    system : str
-        What wrote the log, and its version; empty where it does not say.
-    parameters : mapping from str to float
-        Of the control law that flew, by the autopilot's own names.
-    stated : mapping from str to str
-        What the log says of its vehicle, as `stated_vehicle`.
+    Values are counted by column in the part that is kept; columns without any are left out.
     """
 
-    samples_read: int
-    samples: int
-    dropped: Mapping[str, int]
-    missing: Mapping[str, int]
-    spikes: Mapping[str, int]
-    suspected_spikes: Mapping[str, int]
-    saturated: Mapping[str, int]
-    gaps: int
-    longest_gap_s: float
-    span_s: tuple[float, float]
-    first_stamp_s: float = 0.0
-    crop_s: tuple[float, float] | None = None
-    log_rate_hz: float
-    rate_hz: float
-    cut_off_hz: Mapping[str, float] = field(default_factory=dict)
-    updated_hz: Mapping[str, float] = field(default_factory=dict)
-    lowpass_hz: float | None = None
-    delay_s: float = 0.0
-    delay: DelayEstimate | None = None
-    warnings: tuple[str, ...] = ()
-    flown_at: float = nan
-    system: str = ""
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    stated: Mapping[str, str] = field(default_factory=dict)
+    samples_read: int = about("rows of the log")
+    samples: int = about("samples of the result")
+    dropped: Mapping[str, int] = about("rows dropped, by reason; the ends, where a column has no value, and gaps too")
+    missing: Mapping[str, int] = about("values that were absent, and interpolated")
+    spikes: Mapping[str, int] = about("spikes that were interpolated; one in the first or last row drops that row")
+    suspected_spikes: Mapping[str, int] = about("values that look like spikes, where none are to be interpolated")
+    saturated: Mapping[str, int] = about("values in long runs at the column's extremes; not changed")
+    gaps: int = about("gaps in the time stamps, of more than 1.5 times the median step, that were interpolated")
+    longest_gap_s: float = about("longest step between time stamps in the part that is kept", unit="s")
+    span_s: tuple[float, float] = about("begin and end of what is kept, from the log's first time stamp", unit="s")
+    first_stamp_s: float = about("that stamp on the log's own clock", unit="s")
+    crop_s: tuple[float, float] | None = about("begin and end of the crop, as asked for or found", unit="s")
+    log_rate_hz: float = about("median rate of the log", unit="Hz")
+    rate_hz: float = about("rate of the result", unit="Hz")
+    cut_off_hz: Mapping[str, float] = about("cut-off of the low-pass filter before the log, by signal", unit="Hz")
+    updated_hz: Mapping[str, float] = about("updates a second of signals slower than the log's rows", unit="Hz")
+    lowpass_hz: float | None = about("cut-off of the zero-phase filter of all signals", unit="Hz", default=None)
+    delay_s: float = about("delay by which the commands were shifted", unit="s", default=0.0)
+    delay: DelayEstimate | None = part(default=None)
+    warnings: tuple[str, ...] = about("plain sentences for the user", default=())
+    flown_at: float = about("when the log begins, since 1970 began (UTC)", unit="s", gaps=True, default=float("nan"))
+    system: str = about("what wrote the log, and its version; empty where it does not say", default="")
+    parameters: Mapping[str, float] = about("of the control law that flew, by the autopilot's own names")
+    stated: Mapping[str, str] = about("what the log says of its vehicle, as `stated_vehicle`")
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class LogSignals:
-    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU.
+    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU; None where the log lacks one."""
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-        Uniform, from 0.
-    attitude : array, shape (time, 3), rad, or None
-        Roll, pitch, yaw; roll and yaw without jumps of a full turn.
-    body_rate : array, shape (time, 3), rad/s, body frame, or None
-    body_torque : array, shape (time, 3), N m, body frame, or None
-    thrust : array, shape (time,), N, along body z, or None
-    position, velocity, acceleration : array, shape (time, 3), m, m/s, m/s^2, world frame, or None
-    specific_force : array, shape (time, 3), m/s^2, body frame, or None
-        What an accelerometer senses, `R^T (a + g e_z)`.
-    rotor_speed : array, shape (time, rotor), rad/s, or None
-    rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
-    voltage : array, shape (time,), V, or 1 as a share of the full battery's, or None
-    setpoints : mapping of str to array, shape (time, column)
-        What was asked for, by the names of `SETPOINTS`, neither shifted nor filtered; NaN where nothing was. Position,
-        velocity, attitude and body rate as those above; thrust in N or as a share, and sticks, as logged.
-    """
-
-    time: Array
-    attitude: Array | None = None
-    body_rate: Array | None = None
-    body_torque: Array | None = None
-    thrust: Array | None = None
-    position: Array | None = None
-    velocity: Array | None = None
-    acceleration: Array | None = None
-    specific_force: Array | None = None
-    rotor_speed: Array | None = None
-    rotor_command: Array | None = None
-    voltage: Array | None = None
-    setpoints: Mapping[str, Array] = field(default_factory=dict)
-    report: ImportReport = field(repr=False)
+    time: Array = about("uniform, from 0", "time", unit="s")
+    attitude: Array | None = about(
+        "roll, pitch, yaw; roll and yaw without jumps of a full turn", "time", "axis", unit="rad", default=None
+    )
+    body_rate: Array | None = about("body rate", "time", "axis", unit="rad/s", frame="body", default=None)
+    body_torque: Array | None = about("body torque", "time", "axis", unit="N m", frame="body", default=None)
+    thrust: Array | None = about("along body z", "time", unit="N", frame="body", default=None)
+    position: Array | None = about("position", "time", "axis", unit="m", frame="world", default=None)
+    velocity: Array | None = about("velocity", "time", "axis", unit="m/s", frame="world", default=None)
+    acceleration: Array | None = about(
+        "acceleration over ground", "time", "axis", unit="m/s^2", frame="world", default=None
+    )
+    specific_force: Array | None = about(
+        "what an accelerometer senses, R^T (a + g e_z)", "time", "axis", unit="m/s^2", frame="body", default=None
+    )
+    rotor_speed: Array | None = about("rotor speeds", "time", "rotor", unit="rad/s", default=None)
+    rotor_command: Array | None = about("in the SI unit of the signal's `unit`", "time", "rotor", default=None)
+    voltage: Array | None = about("V, or 1 as a share of the full battery's", "time", default=None)
+    setpoints: Mapping[str, Array] = about(
+        "what was asked for, by the names of `SETPOINTS`, neither shifted nor filtered; NaN where nothing was",
+        "time",
+        "column",
+    )
+    report: ImportReport = part()
 
     @property
     def arrays(self) -> dict[str, Array]:
@@ -164,20 +89,14 @@ class LogSignals:
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class ImportedFlight(LogSignals):
-    """A flight: the signals of the log, aligned and filtered, and what is derived from them.
+    """A flight: the signals of the log, aligned and filtered, and what is derived from them with an attitude."""
 
-    Attributes
-    ----------
-    attitude_rate : array, shape (time, 3), rad/s, or None
-        Euler rates, ``W^-1 omega``; None without attitude.
-    attitude_acceleration : array, shape (time, 3), rad/s^2, or None
-        Derivative of the Euler rates.
-    torque : array, shape (time, 3), N m, or None
-        Generalised torque on the Euler coordinates, ``W^T tau_body``; None without attitude.
-    """
-
-    attitude_rate: Array | None = None
-    attitude_acceleration: Array | None = None
-    torque: Array | None = None
+    attitude_rate: Array | None = about("Euler rates, W^-1 omega", "time", "axis", unit="rad/s", default=None)
+    attitude_acceleration: Array | None = about(
+        "derivative of the Euler rates", "time", "axis", unit="rad/s^2", default=None
+    )
+    torque: Array | None = about(
+        "generalised torque on the Euler coordinates, W^T tau_body", "time", "axis", unit="N m", default=None
+    )

@@ -10,55 +10,37 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
-from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, MOTORS, SLOW_HZ, VTOL_TYPES, log_faster
 from cpfls_cli.flightlog.topics import logged_hz
-from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined
 
-_FEWEST = 3
-"""Rotors of a multirotor."""
-
+_FEWEST = 3  # Rotors of a multirotor.
+# Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones.
 FASTER = 2.0
-"""Times as often that commands have to come to be preferred to measured speeds, or rebuilt ones to logged ones."""
-
 _USUAL_POLE_PAIRS = 7
-_RPM_FROM = 4000.0
-"""Faster than rotors turn in rad/s; the smallest reach 3000."""
-
-_FEWEST_SAMPLES = 20
-"""For medians and rates."""
-
+_RPM_FROM = 4000.0  # Faster than rotors turn in rad/s; the smallest reach 3000.
+_FEWEST_SAMPLES = 20  # For medians and rates.
 _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
+# Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
-"""Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware."""
-
-_SAME = 0.02
-"""Part of the largest one's spread below which an output is not connected to a motor."""
+_SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 
 
+# Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
-"""Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller."""
-
+# Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
+# to stand for it to be known from which on, s, and the share away from it that no motor has then.
 _AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
-"""Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
-to stand for it to be known from which on, s, and the share away from it that no motor has then."""
-
+# Correlation with the others below which an output does not rise with them, and how many times as far as the others it
+# swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another.
 _RISES, _SWINGS, _SWING_S = 0.3, 2.5, 0.25
-"""Correlation with the others below which an output does not rise with them, and how many times as far as the others it
-swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another."""
-
-_FEWEST_BESIDE = 4
-"""Rotors of those whose columns hold more."""
-
-_PX4_MOTORS = range(101, 113)
-"""Values of *_FUNCn of PX4 that are its motors."""
-
+_FEWEST_BESIDE = 4  # Rotors of those whose columns hold more.
+_PX4_MOTORS = range(101, 113)  # Values of *_FUNCn of PX4 that are its motors.
 _RANGES = (
     ("MOT_PWM_MIN", "MOT_PWM_MAX"),
     ("Q_M_PWM_MIN", "Q_M_PWM_MAX"),
@@ -82,20 +64,12 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class RotorGuess:
-    """A signal of the rotors.
-
-    Attributes
-    ----------
-    kind : str
-        Kind of log that is known for such columns; empty where none is.
-    left_out : tuple of str
-        Sentences on outputs beside them that move and drive no motor.
-    """
+    """A signal of the rotors."""
 
     guess: Guess
     rate_hz: float
-    kind: str
-    left_out: tuple[str, ...] = ()
+    kind: str  # Kind of log that is known for such columns; empty where none is.
+    left_out: tuple[str, ...] = ()  # Sentences on outputs beside them that move and drive no motor.
 
     @property
     def columns(self) -> SignalMap:
@@ -105,35 +79,20 @@ class RotorGuess:
 
 @dataclass(frozen=True, kw_only=True)
 class RotorColumns:
-    """All that a log says of its rotors.
-
-    Attributes
-    ----------
-    command_is : Choice or None
-        What a command of unit 1 is a share of; None without one.
-    """
+    """All that a log says of its rotors."""
 
     speed: RotorGuess | None
     command: RotorGuess | None
-    command_is: KeyChoice | None
+    command_is: KeyChoice | None  # What a command of unit 1 is a share of; None without one.
     left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
-Found = tuple[Named, Array, Array]
-"""A candidate, its stamps in s and its values, shape (sample, rotor)."""
+Found = tuple[Named, Array, Array]  # A candidate, its stamps in s and its values, shape (sample, rotor).
 
 
 def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, system: str) -> RotorColumns:
-    """Choose the columns of rotor speeds and of rotor commands.
-
-    Parameters
-    ----------
-    found : mapping
-        Candidates for ``rotor_speed`` and ``rotor_command``, the best first.
-    parameters : mapping
-        Of the autopilot, or of a header.
-    """
+    """Choose the columns of rotor speeds and of rotor commands, from candidates for both, the best first."""
     # Electric speeds, whose pole pairs have to be known, come behind mechanical ones.
     speeds = sorted(found["rotor_speed"], key=lambda entry: _is_electric(entry[0]))
     speed, command = (
@@ -170,13 +129,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
 
 
 def find_mixed(log: LogTable) -> RotorColumns | None:
-    """Take what goes into the mixer of a Crazyflie for the commands of its motors; None where a log lacks it.
-
-    Parameters
-    ----------
-    log : LogTable
-        Without columns of rotors.
-    """
+    """Take what goes into the mixer of a Crazyflie for the commands of its motors; None where a log lacks it."""
     ending = _MIXED[0]
     begin = next((name.removesuffix(ending) for name in log.names if name.endswith(ending)), None)
     columns = tuple(f"{begin}{name}" for name in _MIXED)
@@ -269,25 +222,14 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
 
 
 class _Connected(NamedTuple):
-    """The outputs that drive motors, in the order of the motors.
-
-    Attributes
-    ----------
-    stated : bool
-        Whether parameters name them.
-    others : dict from column to str
-        What moves and is no motor, and why.
-    span : tuple of float and str, or None
-        Range of the outputs that their own parameters state, and the names of these.
-    doubtful : tuple of str
-        Outputs of `others` that may be motors all the same.
-    """
+    """The outputs that drive motors, in the order of the motors."""
 
     outputs: list[int]
-    stated: bool
-    others: dict[str, str]
+    stated: bool  # Whether parameters name them.
+    others: dict[str, str]  # By column; what moves and is no motor, and why.
+    # Range of the outputs that their own parameters state, and the names of these.
     span: tuple[float, float, str] | None = None
-    doubtful: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
 def _connected(found: Found, parameters: Parameters) -> _Connected:
@@ -447,7 +389,8 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     called = f"called {named.group.pattern}, up to {high:.4g}"
     stated = chosen.span or _stated_range(named, parameters)
     # Pulses are stated of outputs that send numbers in another way too, such as DShot.
-    if stated is not None and _holds(stated[0], stated[1], values):
+    driven = values[values > 0]
+    if stated is not None and len(driven) and stated[0] <= float(np.median(driven)) <= stated[1]:
         begin, end, where = stated
         reason = f"{called}: {begin:g} to {end:g} by {where}"
         sure: Sure = "guess" if where == _USUAL_PULSES else "named"
@@ -473,12 +416,6 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     return None
 
 
-def _holds(low: float, high: float, values: Array) -> bool:
-    """Tell whether a range is that of most of the commands that are not 0."""
-    own = values[values > 0]
-    return bool(len(own) and low <= float(np.median(own)) <= high)
-
-
 def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, str] | None:
     """Give the range of outputs that the log's parameters state."""
     if named.known == "Betaflight" and "motorOutput" in parameters:
@@ -492,12 +429,9 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
         # Where both are 0, and before they were, motors have the range of the throttle's stick.
         stick = whole(parameters, "RCMAP_THROTTLE") or 3
         low, high = (float(parameters.get(f"RC{stick}_{end}", 0) or 0) for end in ("MIN", "MAX"))
+        where = f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set"
         if 500 < low < high:
-            return (
-                low,
-                high,
-                f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set",
-            )
+            return low, high, where
         return 1000.0, 2000.0, _USUAL_PULSES
     return None
 
@@ -513,15 +447,15 @@ def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> KeyCho
             older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
             return choose("thrust", "motor.m* of a Crazyflie are thrusts, before it compensates for the battery", older)
         return choose("speed", "pwm.* of a Crazyflie is what the motors get")
-    factor = parameters.get("THR_MDL_FAC")
-    if factor is not None:
-        value = float(factor)
+    if parameters.get("THR_MDL_FAC") is not None:
+        value = float(parameters["THR_MDL_FAC"])
+        said = f"THR_MDL_FAC is {value:g}"
         if value >= 0.9:
-            return choose("thrust", f"THR_MDL_FAC is {value:g}: the autopilot treats commands as shares of thrust")
+            return choose("thrust", f"{said}: the autopilot treats commands as shares of thrust")
         if value <= 0.1:
-            return choose("speed", f"THR_MDL_FAC is {value:g}: the autopilot passes commands on as they are")
-        rival = Rival("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two")
-        return choose("speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", rival, sure="guess")
+            return choose("speed", f"{said}: the autopilot passes commands on as they are")
+        rival = Rival("rotor_command_is: thrust", f"{said}, which lies between the two")
+        return choose("speed", f"{said}, between speed (0) and thrust (1)", rival, sure="guess")
     if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
         return choose("speed", "RCOU is what the motors get, after the autopilot's own thrust curve")
     rival = Rival("rotor_command_is: thrust", "the log does not say which")

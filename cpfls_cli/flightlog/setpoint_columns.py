@@ -2,102 +2,75 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.flightlog.agreement import slow
-from cpfls_cli.flightlog.conversion import attitude_from_quaternion
+from cpfls_cli.flightlog.conversion import as_mapped, attitude_from_quaternion
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.log_table import LogTable
-from cpfls_cli.flightlog.names import Named, column_groups, is_of, wished_signals
-from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
+from cpfls_cli.flightlog.names import column_groups, is_of, wished_signals
+from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN_SETPOINTS, PX4, KnownSetpoint
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN, PX4
 from cpfls_cli.units import UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
-_FEWEST_COMPARED = 100
-"""Of the one clock, a second of flight."""
-
+_FEWEST_COMPARED = 100  # Of the one clock, a second of flight.
+# Correlations from which on what is measured follows what is asked for, and runs against it.
 _FOLLOWS, _OPPOSES = 0.6, -0.8
-"""Correlations from which on what is measured follows what is asked for, and runs against it."""
-
-_MOVES = 0.25
-"""As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift."""
-
-_LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""By which a vehicle follows, s."""
-
-_MOTION_HZ = 5.0
-"""Below which a vehicle follows anything; above there is the noise of sensors."""
-
+_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift.
+_LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)  # By which a vehicle follows, s.
+_MOTION_HZ = 5.0  # Below which a vehicle follows anything; above there is the noise of sensors.
 _HELD_S = 0.1
+# As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor.
 _TIMES, _TIMES_BY_WORDS = 3.0, 1.6
-"""As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor."""
-
-_LARGEST_ANGLE = 4 * np.pi
-"""In rad; larger ones are degrees."""
-
-_BOUND = 0.15
-"""Of a turn that an error spreads at most; one that is drawn at random does over 0.29."""
-
-_FULL = 1.05
-"""Share of full deflection, or of the largest thrust, up to which one is believed."""
-
+_LARGEST_ANGLE = 4 * np.pi  # In rad; larger ones are degrees.
+_BOUND = 0.15  # Of a turn that an error spreads at most; one that is drawn at random does over 0.29.
+_FULL = 1.05  # Share of full deflection, or of the largest thrust, up to which one is believed.
+# What setpoints may be in where no name says it.
 _UNITS: Final[dict[SignalName, tuple[UnitName, ...]]] = {
     "setpoint_position": ("m", "mm"),
     "setpoint_velocity": ("m/s", "mm/s"),
     "setpoint_attitude": ("rad", "deg"),
     "setpoint_body_rate": ("rad/s", "deg/s"),
 }
-"""What setpoints may be in where no name says it."""
-
 _REFERENCE: Final = "a reference may be a second measurement instead of a setpoint"
 _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Columns that may be a setpoint.
-
-    Attributes
-    ----------
-    signal : str
-        Of `SETPOINTS`.
-    columns : SignalMap
-        As they would be mapped.
-    called : str
-        Why they may be, in words.
-    known : bool
-        Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
-    states_unit : bool
-        Whether the unit is known.
-    doubts : tuple of str
-        Why they may be something else, however well they are followed.
-    """
+    """Columns that may be a setpoint, as they would be mapped, and why they may be, in words."""
 
     signal: SignalName
     columns: SignalMap
     called: str
+    # Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
     known: bool
-    states_unit: bool
-    doubts: tuple[str, ...] = ()
+    states_unit: bool  # Whether the unit is known.
+    doubts: tuple[str, ...] = ()  # Why they may be something else, however well they are followed.
+
+    @property
+    def what(self) -> str:
+        """What it is a setpoint of, in words."""
+        return SETPOINTS[self.signal].replace("_", " ")
+
+    @property
+    def units(self) -> tuple[float, ...]:
+        """Factors that may make SI units of what is asked for."""
+        return (1.0,) if self.states_unit else tuple(known_unit(unit).factor for unit in _UNITS[self.signal])
+
+    def guess(self, columns: SignalMap, reason: str, sure: Sure, rivals: tuple[Rival, ...] = ()) -> Guess:
+        """Take columns for the setpoint."""
+        return Guess(signal=self.signal, columns=columns, reason=reason, sure=sure, rivals=rivals)
 
 
-def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
-    """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Of the autopilot: the channels of its sticks.
-    system : str
-        What wrote the log; empty where that is not known.
-    """
+def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
+    """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs."""
     candidates = list(_of_known_logs(seen.log, parameters, system))
     if not any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that is asked for is in the list.
@@ -119,30 +92,26 @@ def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
 def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterator[_Candidate]:
     # On its card a Crazyflie puts the name of an event before that of a variable.
     events = tuple(f"{topic}." for topic in log.topics) if system.startswith(CRAZYFLIE) else ("",)
-    names = frozenset(log.names)
-    for row in KNOWN_SETPOINTS:
+    rows = ((name, row) for row in KNOWN for name in SETPOINTS if name == row.signal)
+    for name, row in rows:
+        own = row.columns
+        if row.system == ARDUPILOT and name == "sticks":
+            # On the channels that its parameters name.
+            given = zip((parameters.get(key) for key in _RC_MAP), own, strict=True)
+            own = tuple(usual if stated is None else f"RCIN.C{int(float(stated))}" for stated, usual in given)
         for event in () if system and not is_of(system, row.system) else events:
-            columns = tuple(f"{event}{column}" for column in _channels(row, parameters))
-            if names.issuperset(columns):
+            columns = tuple(f"{event}{column}" for column in own)
+            if {*columns} <= {*log.names}:
                 mapped = SignalMap(
                     columns=columns,
-                    unit=row.unit,
+                    unit=row.unit or "1",
                     scale=row.scale,
                     offset=row.offset,
                     sign=row.sign,
                     required=False,
                 )
                 called = f"a log of {row.system} calls it so"
-                yield _Candidate(row.signal, _in_stated_unit(log, row.signal, mapped), called, True, True)
-
-
-def _channels(row: KnownSetpoint, parameters: Parameters) -> tuple[str, ...]:
-    """Give the columns of a kind of log; of ArduPilot's sticks those of the channels that its parameters name."""
-    if row.system != ARDUPILOT or row.signal != "sticks":
-        return row.columns
-    stated = [parameters.get(name) for name in _RC_MAP]
-    given = zip(stated, row.columns, strict=True)
-    return tuple(usual if own is None else f"RCIN.C{int(float(own))}" for own, usual in given)
+                yield _Candidate(name, _in_stated_unit(log, name, mapped), called, True, True)
 
 
 def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> SignalMap:
@@ -155,7 +124,9 @@ def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> Sig
 
 def _by_words(seen: Seen) -> Iterator[_Candidate]:
     for named in wished_signals(column_groups(seen.log.names)):
-        columns, unit = _in_order(seen, named), named.unit
+        columns, unit = named.group.columns, named.unit
+        if named.group.kind == "wxyz" and seen.quaternion_order == "xyzw":
+            columns = (*columns[1:], columns[0])
         usual = next(iter(_UNITS.get(named.signal, ())), None)
         if unit is None and usual is None:
             seen.left_out.append(f"{named.group.pattern}: looks like a commanded thrust, but in no stated unit")
@@ -165,19 +136,6 @@ def _by_words(seen: Seen) -> Iterator[_Candidate]:
         known = unit is not None or mapped.columns[0] in seen.log.units
         doubts = (_REFERENCE,) if {"ref", "reference"} & {*named.group.words} else ()
         yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, known, doubts)
-
-
-def _in_order(seen: Seen, named: Named) -> tuple[str, ...]:
-    """Give the columns in the order in which quaternions of the log are read."""
-    columns = named.group.columns
-    if named.group.kind == "wxyz" and _quaternion_order(seen) == "xyzw":
-        return (*columns[1:], columns[0])
-    return columns
-
-
-def _quaternion_order(seen: Seen) -> Literal["wxyz", "xyzw"]:
-    choice = seen.choices.get("quaternion_order")
-    return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
 
 
 def _changes(log: LogTable, own: _Candidate) -> bool:
@@ -196,16 +154,16 @@ def _judged(seen: Seen, own: _Candidate) -> Guess | str:
     measured = _measured(seen, own.signal)
     columns = ", ".join(own.columns.columns)
     if measured is None:
-        against = f"there is no {_words(own.signal)} to compare it with"
+        against = f"there is no {own.what} to compare it with"
         if not own.known:
-            return f"{columns}: looks like a setpoint of the {_words(own.signal)}, but {against}"
-        return _guess(own, own.columns, f"{own.called}; {against}", "named")
+            return f"{columns}: looks like a setpoint of the {own.what}, but {against}"
+        return own.guess(own.columns, f"{own.called}; {against}", "named")
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked, measured)
-    fit = _Following.of(measured, asked, seen.rate_hz, _units(own))
+    fit = _follow(measured, asked, seen.rate_hz, own.units)
     if not fit.followed.any():
         return (
-            f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it; if gusts are "
+            f"{columns}: looks like a setpoint of the {own.what}, which does not follow it; if gusts are "
             f"why, state it as import.signals.{own.signal}"
         )
     return _by_motion(own, fit)
@@ -223,70 +181,54 @@ def _by_range(own: _Candidate, asked: Array) -> Guess | str:
     if own.signal == "setpoint_thrust" and not float(np.median(known)) > 0:
         return f"{columns}: {own.called}, but it does not lift"
     unit = f"shares of {what}" if own.columns.unit == "1" else f"in {own.columns.unit}"
-    return _guess(own, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named")
+    return own.guess(own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named")
 
 
 def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     """Judge a setpoint that is followed: its unit by the size, its signs by the direction."""
-    columns, what = own.columns.columns, _words(own.signal)
+    columns, mapped, gain = own.columns.columns, own.columns, fit.gain
     axes = columns if len(columns) == len(fit.along) else ("roll", "pitch", "yaw")
     opposed = [axis for axis, against in zip(axes, fit.opposed, strict=True) if against]
     if opposed and (own.known or axes is not columns):
-        return f"{', '.join(columns)}: {own.called}, but the {what} runs against {', '.join(opposed)}"
-    mapped, gain = own.columns, fit.gain
+        return f"{', '.join(columns)}: {own.called}, but the {own.what} runs against {', '.join(opposed)}"
     if not own.states_unit:
-        factor = _nearest(gain, _units(own))
+        factor = _nearest(gain, own.units)
         unit = next(each for each in _UNITS[own.signal] if known_unit(each).factor == factor)
         mapped, gain = replace(mapped, unit=unit), gain / factor
     most = _TIMES if own.known else _TIMES_BY_WORDS
     if not 1 / most < gain < most:
-        return f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit explains"
+        size = f"the {own.what} is {gain:.2g} times as large, which no unit explains"
+        return f"{', '.join(columns)}: {own.called}; {size}"
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
     share = f"{float(np.mean(np.abs(fit.along[fit.followed | fit.opposed]))):.2f}"
     turned = f" with {', '.join(opposed)} reversed" if opposed else ""
     size = "" if own.states_unit else f", in {mapped.unit} by its size"
-    loose = [axis for axis, not_told in zip(axes, fit.loose, strict=True) if not_told]
+    free = fit.moves & ~fit.followed & ~fit.opposed
+    loose = [axis for axis, neither in zip(axes, free, strict=True) if neither]
     doubts = [*own.doubts, *([f"the measured motion does not follow {', '.join(loose)}"] if loose else [])]
     rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
-    reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
-    sure: Sure = "guess" if rivals else "data"
-    return _guess(own, mapped, reason, sure, rivals)
-
-
-def _units(own: _Candidate) -> tuple[float, ...]:
-    """Give the factors that may make SI units of what is asked for."""
-    return (1.0,) if own.states_unit else tuple(known_unit(unit).factor for unit in _UNITS[own.signal])
+    reason = f"{own.called}; the {own.what} follows it{turned} (correlation {share}){size}"
+    return own.guess(mapped, reason, "guess" if rivals else "data", rivals)
 
 
 def _nearest(gain: float, factors: tuple[float, ...]) -> float:
     return min(factors, key=lambda factor: abs(np.log(gain / factor)))
 
 
-def _guess(own: _Candidate, columns: SignalMap, reason: str, sure: Sure, rivals: tuple[Rival, ...] = ()) -> Guess:
-    return Guess(signal=own.signal, columns=columns, reason=reason, sure=sure, rivals=rivals)
-
-
-def _words(signal: SignalName) -> str:
-    return SETPOINTS[signal].replace("_", " ")
-
-
 def _asked(seen: Seen, columns: SignalMap) -> Array:
     """Give the columns of a candidate in the part that is flown, as they would be mapped, in SI; NaN where absent."""
     grid = seen.log.grid[seen.part]
-    held = []
-    for column in columns.columns:
-        time, values = seen.log.values((column,))
-        held.append(hold_asked(time, values[:, 0], grid, _HELD_S))
-    values = columns.scale * np.column_stack(held) + columns.offset
-    return np.asarray(known_unit(columns.unit).factor * np.asarray(columns.sign or 1.0) * values)
+    samples = (seen.log.values((column,)) for column in columns.columns)
+    held = [hold_asked(time, values[:, 0], grid, _HELD_S) for time, values in samples]
+    return known_unit(columns.unit).factor * as_mapped(np.column_stack(held), columns)
 
 
 def _measured(seen: Seen, signal: SignalName) -> Array | None:
     """Give what a setpoint is one of in the part that is flown, in SI and the axes of the log."""
     quaternion = seen.guesses.get("quaternion")
     if signal == "setpoint_attitude" and quaternion is not None:
-        return attitude_from_quaternion(seen.mapped(quaternion), _quaternion_order(seen))
+        return attitude_from_quaternion(seen.mapped(quaternion), seen.quaternion_order)
     guess = seen.guesses.get(SETPOINTS[signal])
     if guess is None:
         return None
@@ -301,12 +243,9 @@ def _as_angles(seen: Seen, own: _Candidate, asked: Array, measured: Array) -> Ar
     angles, turn = np.full_like(measured, np.nan), 2 * np.pi
     if not known.any():
         return angles
-    if is_quaternion:
-        angles[known] = attitude_from_quaternion(asked[known], _quaternion_order(seen))
-    else:
-        angles[known] = asked[known]
-        if not own.states_unit and float(np.max(np.abs(asked[known]))) > _LARGEST_ANGLE:
-            turn = 360.0
+    angles[known] = attitude_from_quaternion(asked[known], seen.quaternion_order) if is_quaternion else asked[known]
+    if not (is_quaternion or own.states_unit) and float(np.max(np.abs(asked[known]))) > _LARGEST_ANGLE:
+        turn = 360.0
     near = measured * turn / (2 * np.pi)
     error = np.mod(angles - near + turn / 2, turn) - turn / 2
     # What has nothing to do with an attitude that turns round and round is within half a turn of it as well.
@@ -315,23 +254,12 @@ def _as_angles(seen: Seen, own: _Candidate, asked: Array, measured: Array) -> Ar
     return np.asarray(np.where(bound, near + error, free))
 
 
-@dataclass(frozen=True)
-class _Following:
-    """How what is measured follows what was asked for, axis by axis.
+class _Following(NamedTuple):
+    """How what is measured follows what was asked for, axis by axis."""
 
-    Attributes
-    ----------
-    along : array, shape (3,)
-        Correlation; 0 where one of the two does not move.
-    moves : array of bool, shape (3,)
-        Whether the setpoint does.
-    gain : float
-        Measured over asked for, of the axes that are followed; of others that oppose, its size.
-    """
-
-    along: Array
-    moves: BoolArray
-    gain: float
+    along: Array = np.zeros(3)  # Shape (3,); correlation; 0 where one of the two does not move.
+    moves: BoolArray = np.zeros(3, dtype=bool)  # Shape (3,); whether the setpoint does.
+    gain: float = 1.0  # Measured over asked for, of the axes that are followed; of others that oppose, its size.
 
     @property
     def followed(self) -> BoolArray:
@@ -343,46 +271,33 @@ class _Following:
         """Axes that run the other way, shape (3,)."""
         return np.asarray(self.along < _OPPOSES, dtype=bool)
 
-    @property
-    def loose(self) -> BoolArray:
-        """Axes that move and do neither, shape (3,)."""
-        return np.asarray(self.moves & ~self.followed & ~self.opposed, dtype=bool)
 
-    @classmethod
-    def of(cls, measured: Array, asked: Array, rate_hz: float, factors: tuple[float, ...]) -> "_Following":
-        """Correlate what is measured with what was asked for some time before, as late as it follows best.
+def _follow(measured: Array, asked: Array, rate_hz: float, factors: tuple[float, ...]) -> _Following:
+    """Correlate what is measured with what was asked for some time before, as late as it follows best.
 
-        Parameters
-        ----------
-        measured, asked : array, shape (time, 3)
-            The latter NaN where nothing is.
-        rate_hz : float
-            Of both, Hz.
-        factors : tuple of float
-            One of which makes the latter as large as the former.
-        """
-        smooth = slow(measured, rate_hz, _MOTION_HZ)
-        edge = (len(asked) - len(smooth)) // 2
-        within = asked[edge : edge + len(smooth)]
-        tried = [_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S]
-        return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
+    Both are of shape (time, 3), the latter NaN where nothing is; one of the factors makes it as large as the former.
+    """
+    smooth = slow(measured, rate_hz, _MOTION_HZ)
+    edge = (len(asked) - len(smooth)) // 2
+    within = asked[edge : edge + len(smooth)]
+    tried = [_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S]
+    return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
 
 
 def _at_delay(measured: Array, asked: Array, steps: int, factors: tuple[float, ...]) -> _Following:
     late, earlier = measured[steps:], asked[: len(asked) - steps]
     known = np.isfinite(earlier).all(axis=1)
     if known.sum() < _FEWEST_COMPARED:
-        return _Following(np.zeros(3), np.zeros(3, dtype=bool), 1.0)
+        return _Following()
     late, earlier = (own[known] - own[known].mean(axis=0) for own in (late, earlier))
     spread, flown, shared = ((a * b).mean(axis=0) for a, b in ((earlier, earlier), (late, late), (late, earlier)))
     size = np.sqrt(spread * flown)
     along = np.where(size > 0, shared / np.where(size > 0, size, 1.0), 0.0)
     best = int(np.argmax(along))
     if not along[best] > 0:
-        return _Following(np.zeros(3), np.asarray(spread > 0, dtype=bool), 1.0)
+        return _Following(moves=np.asarray(spread > 0, dtype=bool))
     factor = _nearest(float(shared[best] / spread[best]), factors)
     moves = np.asarray(factor**2 * spread > _MOVES**2 * flown, dtype=bool)
-    along = np.where(moves, along, 0.0)
-    told = (along > _FOLLOWS) | (along < _OPPOSES)
-    gain = float(np.abs(shared[told]).sum() / spread[told].sum()) if told.any() else 1.0
-    return _Following(along, moves, gain)
+    found = _Following(np.where(moves, along, 0.0), moves)
+    sure = found.followed | found.opposed
+    return found._replace(gain=float(np.abs(shared[sure]).sum() / spread[sure].sum()) if sure.any() else 1.0)

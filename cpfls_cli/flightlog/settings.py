@@ -1,5 +1,6 @@
 """Settings of the section `import`: how the columns of a log map to signals, and how these become a flight."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -33,28 +34,15 @@ SignalName = Literal[
     "setpoint_thrust",
     "sticks",
 ]
+_UNITS: Final = """
+    attitude: rad           quaternion: 1             body_rate: rad/s            attitude_rate: rad/s
+    position: m             velocity: m/s             acceleration: m/s^2         voltage: V or 1
+    torque: N m             body_torque: N m          thrust: N                   setpoint_thrust: N or 1
+    rotor_speed: rad/s      rotor_command: 1 or s or rad/s                        sticks: 1
+    setpoint_position: m    setpoint_velocity: m/s    setpoint_body_rate: rad/s   setpoint_attitude: rad or 1
+"""
 UNITS_OF_SIGNAL: Final = MappingProxyType(
-    {
-        "attitude": ("rad",),
-        "quaternion": ("1",),
-        "body_rate": ("rad/s",),
-        "attitude_rate": ("rad/s",),
-        "position": ("m",),
-        "velocity": ("m/s",),
-        "acceleration": ("m/s^2",),
-        "torque": ("N m",),
-        "body_torque": ("N m",),
-        "thrust": ("N",),
-        "rotor_speed": ("rad/s",),
-        "rotor_command": ("1", "s", "rad/s"),
-        "voltage": ("V", "1"),
-        "setpoint_position": ("m",),
-        "setpoint_velocity": ("m/s",),
-        "setpoint_attitude": ("rad", "1"),
-        "setpoint_body_rate": ("rad/s",),
-        "setpoint_thrust": ("N", "1"),
-        "sticks": ("1",),
-    }
+    {name: tuple(units.strip().split(" or ")) for name, units in re.findall(r"(\w+): (.+?)(?=  |\n)", _UNITS)}
 )
 SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
     {
@@ -67,15 +55,12 @@ SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
     }
 )
 """Signals that say what was asked of the autopilot and of its loops, and the name of each among the setpoints."""
-ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
-"""Signals with a column for each rotor."""
+ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")  # Signals with a column for each rotor.
+# Signals that keep their value until the next one.
 COMMANDS: Final = ("torque", "body_torque", "thrust", "rotor_command")
-"""Signals that keep their value until the next one."""
-
 _COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1})
 _COLUMNS_OF_VECTOR, _COLUMNS_OF_QUATERNION = 3, 4
-_COLUMNS_OF_STICKS = (3, 4)
-"""Roll, pitch, yaw, and the throttle where it counts in the same way."""
+_COLUMNS_OF_STICKS = (3, 4)  # Roll, pitch, yaw, and the throttle where it counts in the same way.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,8 +143,7 @@ class ImportSettings(Settings):
     """Settings of the import of a flight log."""
 
     time_column: Annotated[
-        str | None,
-        Doc("name of the column of time stamps; null: those of the fastest mapped topic of a log of topics"),
+        str | None, Doc("name of the column of time stamps; null: those of the fastest mapped topic of a log of topics")
     ] = "t"
     time_unit: Annotated[Literal["s", "ms", "us", "ns"], Doc("unit of the time stamps")] = "s"
     signals: Annotated[

@@ -1,29 +1,203 @@
-"""What logs say of their vehicles, by which logs of two vehicles are told apart."""
+"""What a log states: what flies, which vehicle it is, and how its autopilot logs faster."""
 
-from collections.abc import Mapping
-from typing import Final
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.layouts import Parameters, numbered, whole
+from cpfls_cli.flightlog.topics import STAMP, Topics, previous_rows
+from cpfls_cli.words import joined
+
+AIRPLANE, GROUND, HELICOPTER, VTOL = "an airplane", "a ground vehicle", "a helicopter", "a VTOL"
+_FIRMWARE: Final = {
+    "ArduPlane": AIRPLANE,
+    **dict.fromkeys(("ArduRover", "ArduAPMrover2"), f"{GROUND} or a boat"),
+    "ArduSub": "a submarine",
+    "ArduAntennaTracker": "an antenna tracker",
+    "ArduBlimp": "a blimp",
+    **dict.fromkeys(("ArduHeli", "Rotorflight"), HELICOPTER),
+}
+_HELICOPTER_PARAMETERS: Final = ("H_RSC_MODE", "H_COL_MIN", "H_SWASH_TYPE", "H_SV_MAN", "H_SW_TYPE", "H_SWASH_PLATE")
+VTOL_TYPES: Final = range(20, 26)  # MAV_TYPE of vehicles that hover on three rotors or more.
+# Numbers of parameters that stand for no multirotor.
+_NUMBERS: Final = {
+    "FRAME_CLASS": numbered(
+        "6: a helicopter; 8: a single copter with flaps; 9: a coaxial copter with flaps; 10: a bicopter or tail-sitter,"
+        " whose two rotors tilt; 11: a helicopter with two rotors; 13: a helicopter with four rotors"
+    ),
+    "CA_AIRFRAME": numbered(
+        "1: an airplane; 2: a VTOL; 3: a VTOL; 4: a VTOL; 5: a ground vehicle; 6: a ground vehicle; 10: a helicopter;"
+        " 11: a helicopter; 12: a coaxial helicopter; 13: a ground vehicle; 14: a spacecraft; 15: a spacecraft"
+    ),
+    "MAV_TYPE": numbered(
+        "1: an airplane; 3: a coaxial helicopter; 4: a helicopter; 5: an antenna tracker; 7: a blimp; 8: a balloon;"
+        " 9: a rocket; 10: a ground vehicle; 11: a boat; 12: a submarine; 16: a flapping wing; 17: a kite;"
+        " 19: a tail-sitter with two rotors"
+    )
+    | dict.fromkeys(VTOL_TYPES, VTOL),
+}
+_AUTOSTART: Final = (
+    # First and last SYS_AUTOSTART of PX4's airframes of a kind.
+    *((1002, 1002, VTOL), (1003, 1003, AIRPLANE), (1101, 1101, AIRPLANE), (1102, 1103, VTOL), (2000, 2499, AIRPLANE)),
+    *((2500, 2599, "a blimp"), (3000, 3999, AIRPLANE), (13000, 13999, VTOL), (15000, 15999, "a coaxial helicopter")),
+    *((16000, 16999, HELICOPTER), (17000, 17999, "an autogyro"), (18000, 18999, "a balloon")),
+    *((50000, 59999, GROUND), (60000, 60999, "a submarine")),
+)
+# Mixers of Betaflight and its kin, of which 3 to 6 motors alone have any other; platforms of INAV; and their words.
+_MIXERS: Final = numbered("8: an airplane; 14: an airplane; 15: a helicopter; 16: a helicopter; 24: an airplane")
+_PLATFORMS: Final = numbered("1: an airplane; 2: a helicopter; 4: a ground vehicle; 5: a boat")
+_WORDS: Final = {"AIRPLANE": AIRPLANE, "WING": AIRPLANE, "HELI": HELICOPTER, "ROVER": GROUND, "BOAT": "a boat"}
+# SERVOn_FUNCTION of ArduPilot, what it drives, and of what vehicle.
+_FUNCTIONS: Final = {
+    number: (word, what)
+    for what, words in (
+        (
+            AIRPLANE,
+            "4: aileron; 16: aileron; 19: elevator; 21: rudder; 24: flaperon; 25: flaperon; 77: elevon; 78: elevon;"
+            " 79: V-tail; 80: V-tail",
+        ),
+        (GROUND, "26: ground steering; 73: left throttle of a rover; 74: right throttle of a rover"),
+        (HELICOPTER, "31: rotor head of a helicopter; 32: tail of a helicopter"),
+    )
+    for number, word in numbered(words).items()
+}
+MOTORS: Final = (*range(33, 41), *range(82, 86))  # SERVOn_FUNCTION of ArduPilot that are its motors 1 to 12.
+_FEWEST_MOTORS, _FEWEST_SURFACES, _OUTPUTS = 3, 2, 32
+# Flight modes of ArduPlane in which its rotors carry it: QSTABILIZE to QACRO, and landing on them.
+_HOVER_MODES: Final = (*range(17, 24), 25)
+_FORWARD_VTOL_STATES: Final = (1, 2, 4)  # Of PX4's vtol_vehicle_status: transitions, and flight on the wing.
+_STATES: Final = (
+    # Topic and field, and the states that are forward flight, or that are not.
+    ("vtol_vehicle_status", "vehicle_vtol_state", _FORWARD_VTOL_STATES, True),
+    ("vtol_vehicle_status", "vtol_in_rw_mode", (0,), True),
+    ("vehicle_status", "vehicle_type", (1,), False),
+    ("vehicle_status", "is_rotary_wing", (0,), True),
+    ("MODE", "ModeNum", _HOVER_MODES, False),
+    ("MODE", "Mode", _HOVER_MODES, False),
+)
+
+
+class VehicleKind(NamedTuple):
+    """What flies, and how a log says so."""
+
+    what: str
+    reason: str
+
+    @property
+    def hovers(self) -> bool:
+        """Whether rotors carry it for a part of its flight."""
+        return self.what == VTOL
+
+
+def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
+    """Name what a log flies by its states, parameters and columns; None for a multirotor, and where they do not say."""
+    return next(_evidence(topics, parameters, system), None)
+
+
+def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
+    """Refuse a log of something that no rotors carry; a VTOL is given back, which hovers as a multirotor."""
+    found = other_vehicle(topics, parameters, system)
+    if found is not None and not found.hovers:
+        raise InputError(
+            f"a log of {found.what} ({found.reason}), not of a multirotor: only vehicles that rotors carry are modelled"
+        )
+    return found
+
+
+def _evidence(topics: Topics, parameters: Parameters, system: str) -> Iterator[VehicleKind]:
+    name = system.partition(" ")[0]
+    lifted = next((own for own in ("Q_ENABLE", "Q_TAILSIT_ENABLE") if whole(parameters, own)), None)
+    if lifted is not None:
+        yield VehicleKind(VTOL, f"{lifted} = {whole(parameters, lifted)}")
+    if name in _FIRMWARE:
+        yield VehicleKind(_FIRMWARE[name], f"written by {system}")
+    heads = [own for own in _HELICOPTER_PARAMETERS if own in parameters]
+    if heads and not name.startswith("ArduPlane"):
+        yield VehicleKind(HELICOPTER, f"it has the parameter {heads[0]}")
+    for key, kinds in _NUMBERS.items():
+        number = whole(parameters, key)
+        if number in kinds:
+            yield VehicleKind(kinds[number], f"{key} = {number}")
+    start = whole(parameters, "SYS_AUTOSTART") or 0
+    yield from (VehicleKind(what, f"SYS_AUTOSTART = {start}") for low, high, what in _AUTOSTART if low <= start <= high)
+    yield from _by_status(topics)
+    yield from _by_outputs(parameters)
+    yield from _by_header(topics, parameters)
+
+
+def _by_status(topics: Topics) -> Iterator[VehicleKind]:
+    """Look at what PX4 says of its vehicle again and again."""
+    status = topics.get("vehicle_status", {})
+    if len(status.get("is_vtol", ())) and np.any(status["is_vtol"]):
+        yield VehicleKind(VTOL, "vehicle_status.is_vtol")
+    kind = np.asarray(status.get("vehicle_type", ()), dtype=float)
+    for number, what in ((2, AIRPLANE), (3, GROUND), (4, "a blimp")):
+        if len(kind) and (kind == number).all():
+            yield VehicleKind(what, f"vehicle_status.vehicle_type = {number}")
+    rotary = np.asarray(status.get("is_rotary_wing", ()), dtype=float)
+    if len(rotary) and not rotary.any():
+        yield VehicleKind("something without rotors that carry it", "vehicle_status.is_rotary_wing = 0")
+
+
+def _by_outputs(parameters: Parameters) -> Iterator[VehicleKind]:
+    """Look at what the outputs of an ArduPilot drive."""
+    named = {
+        f"{prefix}{output}_FUNCTION": whole(parameters, f"{prefix}{output}_FUNCTION")
+        for output in range(1, _OUTPUTS + 1)
+        for prefix in ("SERVO", "RC")
+    }
+    motors = sum(number in MOTORS for number in named.values())
+    surfaces = {key: _FUNCTIONS[number] for key, number in named.items() if number in _FUNCTIONS}
+    if motors < _FEWEST_MOTORS and len(surfaces) >= _FEWEST_SURFACES:
+        shown = ", ".join(f"{key} = {named[key]}: {word}" for key, (word, _) in list(surfaces.items())[:2])
+        yield VehicleKind(next(iter(surfaces.values()))[1], shown)
+
+
+def _by_header(topics: Topics, parameters: Parameters) -> Iterator[VehicleKind]:
+    """Look at the header and the columns of a blackbox log."""
+    for key, kinds in (("platform_type", _PLATFORMS), ("mixer", _MIXERS), ("mixer_mode", _MIXERS)):
+        said, number = str(parameters.get(key, "")).upper(), whole(parameters, key)
+        by_word = next((what for word, what in _WORDS.items() if word in said), None)
+        what = by_word or kinds.get(-1 if number is None else number)
+        if what is not None:
+            yield VehicleKind(what, f"{key} = {said.lower() if number is None else number} in its header")
+    columns = topics.get("", {})
+    if "fwAltP" in columns and "mcPosAxisP[0]" not in columns:
+        yield VehicleKind(AIRPLANE, "it logs the altitude control of a fixed wing, fwAltP")
+    motors = sum(name.startswith("motor[") for name in columns)
+    if "gyroADC[0]" in columns and 0 < motors < _FEWEST_MOTORS and any(own.startswith("servo[") for own in columns):
+        yield VehicleKind(f"{AIRPLANE} or its like", f"it logs {motors} of motor[*] and servos")
+
+
+def forward_flight(topics: Topics, grid: Array) -> BoolArray | None:
+    """Mark when, on a grid in s, a VTOL is not carried by rotors alone; None where the log does not say."""
+    for topic, field, states, inside in _STATES:
+        values, time = (np.asarray(topics.get(topic, {}).get(name, ()), dtype=float) for name in (field, STAMP))
+        if len(values) and len(values) == len(time):
+            return np.asarray(np.isin(values[previous_rows(time, grid)], states) == inside, dtype=bool)
+    return None
+
 
 _GEOMETRY: Final = ("CA_ROTOR", "CA_AIRFRAME", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "MAV_TYPE")
-_NO_GEOMETRY: Final = ("_CT", "_SLEW")
-"""Ends of names of what is tuned in flight."""
-_OLD_FRAME, _FRAME = "FRAME", "FRAME_TYPE"
-"""Of ArduCopter before 3.5, with the same numbers."""
-
+_NO_GEOMETRY: Final = ("_CT", "_SLEW")  # Ends of names of what is tuned in flight.
+_OLD_FRAME, _FRAME = "FRAME", "FRAME_TYPE"  # Of ArduCopter before 3.5, with the same numbers.
+# What besides belongs to a vehicle, as Betaflight, ArduPilot and PX4 call it.
 _OTHERS: Final = ("Craft name", "motor_poles", "SERVO_BLH_POLES", "MOT_POLE_COUNT")
-"""What besides belongs to a vehicle, as Betaflight, ArduPilot and PX4 call it."""
-
-WRITTEN_BY: Final = "written by"
-"""Name of the fact that says which autopilot wrote a log."""
-
+WRITTEN_BY: Final = "written by"  # Name of the fact that says which autopilot wrote a log.
 _VERSION: Final = "version"
 _BOARD: Final = ("Board information", "BRD_TYPE")
+# Outputs that stop and full throttle stand for.
 _RANGES: Final = ("motorOutput", "MOT_PWM_MIN", "MOT_PWM_MAX", "THR_MIN", "PWM_MIN", "PWM_MAX", "RC3_MIN", "RC3_MAX")
-"""Outputs that stop and full throttle stand for."""
-_OF_INPUT: Final = ("RC3_MIN", "RC3_MAX")
-"""Of the outputs too in ArduCopter, where MOT_PWM_MAX is 0 or not there."""
-
+_OF_INPUT: Final = ("RC3_MIN", "RC3_MAX")  # Of the outputs too in ArduCopter, where MOT_PWM_MAX is 0 or not there.
+# Share by which an end of a range differs that moves no load by more than flights of one vehicle differ.
 _SAME_RANGE: Final = 0.002
-"""Share by which an end of a range differs that moves no load by more than flights of one vehicle differ."""
 
 
 def stated_vehicle(system: str, parameters: Mapping[str, float | str]) -> dict[str, str]:
@@ -70,3 +244,77 @@ def _apart(first: Mapping[str, str], other: Mapping[str, str]) -> list[tuple[str
 def _nearly(first: str, other: str) -> bool:
     one, two = ([float(part) for part in each.split(",")] for each in (first, other))
     return len(one) == len(two) and all(abs(a - b) <= _SAME_RANGE * abs(a) for a, b in zip(one, two, strict=True))
+
+
+FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 50 ms.
+# Below which they are logged too slowly for what they drive to be told from what drives them: two samples in the 50 ms
+# within which they follow, and a half.
+SLOW_HZ = 25.0
+_DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
+# By the beginning of what a log names as its writer: from which version on what is to be set, the newest first.
+_SETTINGS: Final[Mapping[str, tuple[tuple[tuple[int, int], str], ...]]] = {
+    "PX4": (((0, 0), "SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate), then restart"),),
+    "Betaflight": (
+        ((4, 3), f"blackbox_sample_rate = 1/4 {_DEVICE}"),
+        ((3, 2), f"blackbox_p_ratio = 32 {_DEVICE}"),
+        ((0, 0), f"blackbox_rate_num = 1, blackbox_rate_denom = 4 {_DEVICE}"),
+    ),
+    "INAV": (((0, 0), "blackbox_rate_num = 1 and blackbox_rate_denom = 4"),),
+    "ArduPlane": (((0, 0), "LOG_BITMASK with bit 0 (fast attitude)"),),
+    "Crazyflie": (((0, 0), "period_in_ms = 10 of the LogConfig, or a frequency of 100 or more on the card"),),
+}
+_COPTER = ("ArduCopter", "ArduPilot")
+_FAST_IMU, _WITH_FAST_IMU = 18, (3, 3)
+_WITH_DSHOT = (4, 0)
+# Of LOG_BITMASK of ArduCopter; the last is newer than others.
+_BITS: Final[Mapping[int, str]] = {0: "fast attitude", 10: "outputs", _FAST_IMU: "fast IMU, from 3.3 on"}
+_USUAL_BITS = 176126  # LOG_BITMASK of ArduCopter 4 by default.
+_NONE: Final[Parameters] = MappingProxyType({})
+
+
+def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters = _NONE) -> str:
+    """Ask for what is logged too slowly faster, and say what to set in the autopilots that wrote the logs.
+
+    Parameters
+    ----------
+    *systems : str
+        What the logs name as their writers, with versions.
+    """
+    asked = f"log {what} at {least_hz:g} Hz or more"
+    known = dict.fromkeys(
+        f"{begin}: {next(cure for since, cure in cures if version is None or version >= since)}"
+        for system, version in ((own, _version(own)) for own in systems)
+        for begin, cures in _SETTINGS.items()
+        if system.startswith(begin)
+    )
+    said = [f"{asked} ({joined(known)})"] if known else []
+    ours = (system for system in systems if system.startswith(_COPTER))
+    said += dict.fromkeys(_of_copter(system, parameters) for system in ours)
+    return "; ".join(said) or asked
+
+
+def _version(system: str) -> tuple[int, int] | None:
+    """Read the version that a log names, None where it names none."""
+    found = re.search(r" v?(\d+)\.(\d+)", system)
+    return None if found is None else (int(found[1]), int(found[2]))
+
+
+def _of_copter(system: str, parameters: Parameters) -> str:
+    """Say what ArduPilot's copters can log: outputs are slow, whatever is set; what came later is asked of no other."""
+    version, has = _version(system), parameters.get("LOG_BITMASK")
+    new = version is not None and version >= _WITH_DSHOT
+    bits = [bit for bit in _BITS if bit != _FAST_IMU or version is None or version >= _WITH_FAST_IMU]
+    if has is None and new:
+        has = _USUAL_BITS
+    if isinstance(has, int | float) and has >= 0:
+        own = int(has)
+        named = f"= {own | sum(1 << bit for bit in bits)}, which is {own} with"
+    else:
+        named = "with"
+    names = joined(f"{bit} ({_BITS[bit]})" for bit in bits)
+    return (
+        f"log motor speeds with bidirectional DShot ({'' if new else 'ArduPilot 4: '}SERVO_BLH_BDMASK), for {system} "
+        f"logs outputs (RCOU) 10 times a second at most; body rates, and RATE from which outputs are rebuilt, come"
+        f" faster with "
+        f"{'LOG_FILE_RATEMAX = 0 and ' if new else ''}LOG_BITMASK {named} bits {names}"
+    )

@@ -1,7 +1,6 @@
 """Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import ceil, floor, pi
 from typing import Any
 
@@ -9,15 +8,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.clock import SMALLEST_SHARE_KEPT
-from cpfls_cli.flightlog.repair import SignalTable, count_saturated
+from cpfls_cli.flightlog.repair import SMALLEST_SHARE_KEPT, SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
 from cpfls_cli.words import joined
 
-_SHORTEST_REST_S = 0.5
-"""Shorter ones are those of a throttle that is cut in flight."""
-
+_SHORTEST_REST_S = 0.5  # Shorter ones are those of a throttle that is cut in flight.
 # A speed that is measured, or a command that was filtered, may undershoot zero a little.
 _UNDERSHOOT = 0.01
 _MOST_LISTED = 3
@@ -30,25 +26,16 @@ _LOWEST_LIMIT = {"body_rate": 1.0, "attitude_rate": 1.0, "acceleration": 15.0, "
 _MEASURED = frozenset(
     {"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration", "rotor_speed"}
 )
-_SHORTEST_PAUSE_S = 0.5
-"""Shorter ones are bridged like gaps."""
-
+_SHORTEST_PAUSE_S = 0.5  # Shorter ones are bridged like gaps.
 _FEWEST_IN_PAUSE = 20
-_USUAL_STEPS = 10
-"""Times the usual step between updates, and so many rows, from which on a source was silent."""
-
+_USUAL_STEPS = 10  # Times the usual step between updates, and so many rows, from which on a source was silent.
+# Signals that are never straight lines while they are measured.
 _WITNESSES = {"body_rate", "acceleration", "rotor_speed", "rotor_command"}
-"""Signals that are never straight lines while they are measured."""
-
-_STRAIGHT = 1e-3
-"""Bend of a straight line by the rounding of a file, as a share of the largest."""
-
+_STRAIGHT = 1e-3  # Bend of a straight line by the rounding of a file, as a share of the largest.
 _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
-_FULL_TURN = 7.0
-"""Somewhat more than a full turn, rad."""
-
+_FULL_TURN = 7.0  # Somewhat more than a full turn, rad.
 _ANGLE_QUANTILE = 0.99
 
 
@@ -75,28 +62,26 @@ def _at_rest(time: Array, values: Array, samples: int) -> BoolArray:
 def warn_of_rest(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> Iterator[str]:
     """Say where rotors rest by `rotors_at_rest`, which crop leaves the longest flight, and where they turn backward."""
     for name, signal in settings.signals.items():
-        if name in resting:
-            yield from _warn_of_rest(name, signal, table, resting[name])
-
-
-def _warn_of_rest(name: str, signal: SignalMap, table: SignalTable, rest: BoolArray) -> Iterator[str]:
-    time, values = table.time, table.signals[name]
-    if rest.any():
-        low, high = float(np.nanmin(values[rest])), float(np.nanmax(values[rest]))
-        level = _shown(low, signal) if low == high else f"{low:.4g} to {_shown(high, signal)}"
-        yield (
-            f"{name} stands at {level} on all rotors {_when(time, rest)}: on the ground, or falling, and not part of a"
-            f" flight; {_crop(time, rest)}"
-        )
-    backward = (values < -_UNDERSHOOT * np.nanmax(np.abs(values))).any(axis=1)
-    if backward.any():
-        lowest = np.nanmin(values, axis=0)
-        column = signal.names[int(np.argmin(lowest))]
-        yield (
-            f"{name} is below zero in {backward.sum()} of {len(backward)} rows, down to"
-            f" {_shown(float(lowest.min()), signal)} in column {column}, but no rotor turns backward: where the vehicle"
-            f" rests, cut it off with import.crop_s; otherwise check import.signals.{name}.scale, offset and sign"
-        )
+        if name not in resting:
+            continue
+        time, values, rest = table.time, table.signals[name], resting[name]
+        if rest.any():
+            low, high = float(np.nanmin(values[rest])), float(np.nanmax(values[rest]))
+            level = _shown(low, signal) if low == high else f"{low:.4g} to {_shown(high, signal)}"
+            yield (
+                f"{name} stands at {level} on all rotors {_when(time, rest)}: on the ground, or falling, and not part"
+                f" of a flight; {_crop(time, rest)}"
+            )
+        backward = (values < -_UNDERSHOOT * np.nanmax(np.abs(values))).any(axis=1)
+        if backward.any():
+            lowest = np.nanmin(values, axis=0)
+            column = signal.names[int(np.argmin(lowest))]
+            yield (
+                f"{name} is below zero in {backward.sum()} of {len(backward)} rows, down to"
+                f" {_shown(float(lowest.min()), signal)} in column {column}, but no rotor turns backward: where the"
+                f" vehicle rests, cut it off with import.crop_s; otherwise check import.signals.{name}.scale, offset"
+                " and sign"
+            )
 
 
 def _shown(value: float, signal: SignalMap) -> str:
@@ -132,9 +117,13 @@ def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSetti
                 " dead, or never updated; map what changes, or leave the signal out"
             )
         for column in (each for each in by_column if each not in {*constant, *known}):
-            limit = _limit(name, by_column[column])
+            own = by_column[column]
+            # A rotor's command has no lower limit.
+            signs = () if name not in _LOWEST_LIMIT else (1.0,) if name in ROTORS else (1.0, -1.0)
+            limits = (sign * np.nanmax(sign * own) for sign in signs if clipped(sign * own, _LOWEST_LIMIT[name]))
+            limit = next(limits, None)
             if limit is not None:
-                count = int((by_column[column] == limit).sum())
+                count = int((own == limit).sum())
                 yield f"column {column} is clipped at {_shown(limit, signal)}, for {count} samples: the rest is lost"
         if name in _MEASURED and len(constant) < len(by_column):
             known_rest = name in ROTORS and _at_rest(table.time, values, settings.saturation_samples)
@@ -142,25 +131,8 @@ def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSetti
             yield from _warn_of_pause(name, table.time[moves], values[moves])
 
 
-def _limit(name: str, values: Array) -> float | None:
-    """Find the limit at which a channel is clipped; a rotor's command has no lower one."""
-    if name not in _LOWEST_LIMIT:
-        return None
-    signs = (1.0,) if name in ROTORS else (1.0, -1.0)
-    return next(
-        (sign * np.nanmax(sign * values) for sign in signs if clipped(sign * values, _LOWEST_LIMIT[name])), None
-    )
-
-
 def clipped(values: Array, lowest_limit: float) -> bool:
-    """Tell whether a channel is clipped at its largest value.
-
-    Parameters
-    ----------
-    values : array, shape (sample,)
-    lowest_limit : float
-        In their unit, from which a limit is believed.
-    """
+    """Tell whether a channel, shape (sample,), is clipped at its largest value, believed from a limit on."""
     levels = np.unique(values[np.isfinite(values)])
     if len(levels) < 2 or levels[-1] < lowest_limit:
         return False
@@ -190,26 +162,12 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True)
-class LiveRows:
-    """The rows in which sources of a log measure, and what the others hold.
+def live_rows(table: SignalTable, origin: float) -> tuple[slice, str]:
+    """Find the rows in which sources measure, and say which end or begin there; empty where all rows are live.
 
-    Attributes
-    ----------
-    rows : slice
-    ended : str
-        Which signals end or begin there, and when; empty where all rows are live.
-    """
-
-    rows: slice
-    ended: str = ""
-
-
-def live_rows(table: SignalTable, origin: float) -> LiveRows:
-    """Find where a source ended and its columns were extrapolated: straight lines, which noise never draws.
-
-    Signals of sensors and rotors are asked; what a slow source draws from update to update is as short everywhere.
-    Times are said from an origin on.
+    Columns of a source that has ended may be extrapolated: straight lines, which noise never draws. Signals of sensors
+    and rotors are asked; what a slow source draws from update to update is as short everywhere. Times are said from an
+    origin on.
     """
     first, after, ends, begins = 0, len(table.time), [], []
     for name in _WITNESSES & table.signals.keys():
@@ -218,7 +176,7 @@ def live_rows(table: SignalTable, origin: float) -> LiveRows:
         ends += [name] if end < len(table.time) else []
         first, after = max(first, begin), min(after, end)
     if after - first < _FEWEST_IN_PAUSE or not (ends or begins):
-        return LiveRows(slice(0, len(table.time)))
+        return slice(0, len(table.time)), ""
     words = [
         f"{joined(sorted(names))} run in straight lines {side}, where their source was silent"
         for names, side in (
@@ -227,7 +185,7 @@ def live_rows(table: SignalTable, origin: float) -> LiveRows:
         )
         if names
     ]
-    return LiveRows(slice(first, after), "; ".join(words))
+    return slice(first, after), "; ".join(words)
 
 
 def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]:
@@ -249,113 +207,66 @@ def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]
         )
         moves = bool((np.abs(slopes[first:after]).max(axis=0) > 0).all())
         # The corner itself is the last row that was measured.
-        rest = values[after + 1 :] if side == 0 else values[: first + 1]
-        if at_edge and long and moves and len(rest) and (alone or _leaves(values[first : after + 2], rest)):
-            found[side] = after + 1 if side == 0 else first + 1
+        rest, line = values[after + 1 :] if side == 0 else values[: first + 1], values[first : after + 2]
+        if at_edge and long and moves and len(rest):
+            leaves = (np.abs(line - rest.mean(axis=0)).max(axis=0) > 2 * np.ptp(rest, axis=0)).any()
+            found[side] = (after + 1 if side == 0 else first + 1) if alone or leaves else found[side]
     return found[0], found[1]
-
-
-def _leaves(line: Array, rest: Array) -> bool:
-    return bool((np.abs(line - rest.mean(axis=0)).max(axis=0) > 2 * np.ptp(rest, axis=0)).any())
-
-
-@dataclass(frozen=True)
-class ValueCounts:
-    """Bad values by column of the log; columns without are left out.
-
-    Attributes
-    ----------
-    missing : dict from str to int
-        Absent.
-    spikes, suspected_spikes : dict from str to int
-        Spikes that are interpolated, and spikes that are left alone; one of the two is empty.
-    saturated : dict from str to int
-        In long runs at an extreme; not of a quaternion or a voltage, and not of rotors at rest.
-    """
-
-    missing: dict[str, int]
-    spikes: dict[str, int]
-    suspected_spikes: dict[str, int]
-    saturated: dict[str, int]
 
 
 def count_values(
     table: SignalTable, spikes: Mapping[str, BoolArray], resting: Mapping[str, BoolArray], settings: ImportSettings
-) -> ValueCounts:
-    """Count the bad values of each column of the log.
+) -> dict[str, dict[str, int]]:
+    """Count bad values of each column of the log, by what they are in an `ImportReport`; columns without are left out.
 
     Parameters
     ----------
-    table : Table
+    table : SignalTable
         The part that is kept, as logged.
     spikes : mapping from signal name to array of bool, shape (sample, column)
-        Where its spikes are.
     resting : mapping from signal name to array of bool, shape (sample,)
-        Where no rotor turns, which is not saturated.
-    settings : ImportSettings
-        The names of the columns, `spike_deviations` and `saturation_samples`.
+        Where no rotor turns, which is not saturated; nor is a quaternion at hover (1), or a coarse voltage.
     """
-    counts = _by_column(spikes, settings, lambda column: int(column.sum()))
-    repaired = settings.spike_deviations is not None
-    return ValueCounts(
-        missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
-        spikes=counts if repaired else {},
-        suspected_spikes={} if repaired else counts,
-        saturated=_saturated(table, resting, settings),
-    )
 
+    def by_column(signals: Mapping[str, Array | BoolArray], count: Callable[[Any], int]) -> dict[str, int]:
+        counts = {
+            column: count(values)
+            for name, signal in settings.signals.items()
+            if name in signals
+            for column, values in zip(signal.names, signals[name].T, strict=True)
+        }
+        return {column: number for column, number in counts.items() if number}
 
-def _saturated(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> dict[str, int]:
-    """Count saturated values, but not a quaternion at hover (1), parked rotors (0), or a coarse voltage."""
-    length = settings.saturation_samples
+    length, repaired = settings.saturation_samples, settings.spike_deviations is not None
     rotors = {name: np.where(rest[:, None], np.nan, table.signals[name]) for name, rest in resting.items()}
     others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
-    return _by_column(rotors, settings, lambda column: count_saturated(column, length, rest=0.0)) | _by_column(
-        others, settings, lambda column: count_saturated(column, length)
-    )
+    found = by_column(spikes, lambda column: int(column.sum()))
+    return {
+        "missing": by_column(table.signals, lambda column: int(np.isnan(column).sum())),
+        "spikes": found if repaired else {},
+        "suspected_spikes": {} if repaired else found,
+        "saturated": by_column(rotors, lambda column: count_saturated(column, length, rest=0.0))
+        | by_column(others, lambda column: count_saturated(column, length)),
+    }
 
 
-def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
+def warn_of_values(counts: Mapping[str, Mapping[str, int]]) -> tuple[str, ...]:
     """Describe the columns whose suspicious values are used unchanged."""
     saturated = (
         f"column {column} stays at its extreme for {count} samples in all: saturated?"
-        for column, count in counts.saturated.items()
+        for column, count in counts["saturated"].items()
     )
     suspected = (
         f"{count} suspected {'spike' if count == 1 else 'spikes'} in column {column}, used as logged: set"
         " import.spike_deviations to interpolate"
-        for column, count in counts.suspected_spikes.items()
+        for column, count in counts["suspected_spikes"].items()
     )
     return (*saturated, *suspected)
 
 
-def _by_column(
-    signals: Mapping[str, Array | BoolArray], settings: ImportSettings, count: Callable[[Any], int]
-) -> dict[str, int]:
-    counts = {
-        column: count(values)
-        for name, signal in settings.signals.items()
-        if name in signals
-        for column, values in zip(signal.names, signals[name].T, strict=True)
-    }
-    return {column: number for column, number in counts.items() if number}
-
-
 def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
-    """Refuse an attitude whose pitch exceeds a quarter turn, which roll, pitch, yaw angles cannot.
-
-    Parameters
-    ----------
-    signals : mapping from signal name to array, shape (time, column), SI
-        Repaired, in the frames of the log.
-
-    Raises
-    ------
-    InputError
-    """
-    if "attitude" not in signals:
-        return
-    largest = float(np.abs(signals["attitude"][:, 1]).max())
+    """Refuse an attitude, shape (time, 3), rad, whose pitch exceeds a quarter turn, which such angles cannot."""
+    largest = float(np.abs(signals["attitude"][:, 1]).max()) if "attitude" in signals else 0.0
     if largest > _LARGEST_PITCH:
         raise InputError(
             f"attitude reaches {largest:.3g} rad of pitch, but no pitch is larger than a quarter turn, 1.57 rad: is"
@@ -365,13 +276,7 @@ def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
 
 
 def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
-    """Warn of roll or yaw beyond a full turn where no gyroscope confirms their unit.
-
-    Parameters
-    ----------
-    signals : mapping from signal name to array, shape (sample, column), SI
-        As logged; absent values are NaN.
-    """
+    """Warn of roll or yaw, rad, beyond a full turn where no gyroscope confirms their unit; absent values are NaN."""
     if "attitude" not in signals or {"body_rate", "attitude_rate"} & signals.keys():
         return ()
     # A single spike says nothing about the unit.

@@ -7,30 +7,23 @@ from math import inf, pi
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
-from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
+from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, unwrap_angles
 from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
-STAMP = "timestamp"
-"""The field of a topic that holds its time stamps."""
-REBUILT = "rebuilt"
-"""The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`)."""
+STAMP = "timestamp"  # The field of a topic that holds its time stamps.
+REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`).
 _ANGLES_THAT_JUMP = (0, 2)
+# Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3
-"""Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
-
+# Share of the steps that none of the others is so many times as long as, unless it is a pause.
 _MOST_STEPS, _PAUSE_STEPS = 0.9, 2.5
-"""Share of the steps that none of the others is so many times as long as, unless it is a pause."""
-
 _ON_TIME = 0.01
-_THINNED = 1.5
-"""Times as fast that a topic has to be for its thinning to matter."""
-
+_THINNED = 1.5  # Times as fast that a topic has to be for its thinning to matter.
 # Stamps are rounded, so a pause of exactly the allowed length must pass.
 _ROUNDING = 1 + 1e-9
 
@@ -65,28 +58,30 @@ def on_one_clock(
     Returns
     -------
     columns : dict from str to array, shape (row,)
-        The mapped columns that exist, by the names that the settings use, stamps in `time_unit`; the others by name
-        only, as empty arrays.
+        The mapped columns that exist, stamps in `time_unit`; the others by name only, as empty arrays.
     settings : ImportSettings
         With the columns that the log has, of those that stand in for each other, and the name of the clock.
     warnings : tuple of str
-
-    Raises
-    ------
-    InputError
-        If `time_column` names no stamps, or a topic is always slower than `gap_s`.
     """
     if "" in topics:
-        return _flat(topics[""], units, settings)
+        columns, time = topics[""], settings.time_column
+        if time is None:
+            raise InputError(
+                "import.time_column = null takes the stamps of a topic, but this log has no topics: name the column of"
+                f" its stamps; {columns_in_words(columns)}"
+            )
+        converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
+        chosen = present_choices(columns, settings)
+        return {**columns, **converted}, chosen, _say_choices(settings, chosen)
     mapped = [(column, *topic_and_field(column)) for column in settings.mapped_columns]
     chosen = present_choices({column for column, topic, field in mapped if field in topics.get(topic, {})}, settings)
     chosen = _with_clock(topics, chosen)
-    columns, warnings = _resampled(topics, chosen)
-    columns[str(chosen.time_column)] /= known_unit(settings.time_unit).factor
-    return columns, chosen, (*_tell_of_choices(settings, chosen), *warnings)
+    resampled, warnings = _resampled(topics, chosen)
+    resampled[str(chosen.time_column)] /= known_unit(settings.time_unit).factor
+    return resampled, chosen, (*_say_choices(settings, chosen), *warnings)
 
 
-def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
+def _say_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
     """Say which signals are not of the columns that are named first."""
     first = {name: signal.columns[0] for name, signal in settings.signals.items()}
     return tuple(
@@ -94,20 +89,6 @@ def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[
         for name, signal in chosen.signals.items()
         if signal.columns[0] != first[name]
     )
-
-
-def _flat(
-    columns: Mapping[str, Array], units: Mapping[str, str], settings: ImportSettings
-) -> tuple[dict[str, Array], ImportSettings, tuple[str, ...]]:
-    time = settings.time_column
-    if time is None:
-        raise InputError(
-            "import.time_column = null takes the stamps of a topic, but this log has no topics: name the column of its"
-            f" stamps; {columns_in_words(columns)}"
-        )
-    converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
-    chosen = present_choices(columns, settings)
-    return {**columns, **converted}, chosen, _tell_of_choices(settings, chosen)
 
 
 def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
@@ -162,8 +143,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 if _step(clocks[topic]) > settings.gap_s:
                     slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                between = hold_previous if name in COMMANDS else interpolate
-                values = between(clocks[topic], values, target, settings.gap_s)
+                values = interpolate(clocks[topic], values, target, settings.gap_s, hold=name in COMMANDS)
             columns[column] = values
     return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
 
@@ -211,10 +191,7 @@ def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]
 def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
     """Count how often a second each mapped signal was logged, by the stamps of its own topic, lost samples left out.
 
-    Parameters
-    ----------
-    settings : ImportSettings
-        As `on_one_clock` gives them back; a flat log has one clock, and no rates.
+    A flat log has one clock, and no rates.
     """
     rates: dict[str, float] = {}
     for name, signal in settings.signals.items():
@@ -227,12 +204,9 @@ def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
 
 
 def logged_hz(time: Array) -> float:
-    """Count how often a second there is a sample, lost ones and pauses left out; 0 where there are fewer than two.
+    """Count how often a second there is a sample, by stamps, s; lost ones, and pauses as before arming, are left out.
 
-    Parameters
-    ----------
-    time : array, shape (sample,), s
-        A pause, such as before arming, is far longer than most steps.
+    A pause is far longer than most steps; of fewer than two stamps the rate is 0.
     """
     steps = np.diff(time)
     if not len(steps):
@@ -245,8 +219,8 @@ def _step(time: Array) -> float:
     return float(np.median(np.diff(time))) if len(time) > 1 else float("inf")
 
 
-def interpolate(time: Array, values: Array, target: Array, longest_s: float) -> Array:
-    """Interpolate linearly between samples that are near enough.
+def interpolate(time: Array, values: Array, target: Array, longest_s: float, *, hold: bool = False) -> Array:
+    """Interpolate linearly, or hold the previous value, between samples that are near enough.
 
     Parameters
     ----------
@@ -265,16 +239,13 @@ def interpolate(time: Array, values: Array, target: Array, longest_s: float) -> 
     time, values = _present(time, values)
     if not len(time):
         return np.full(len(target), np.nan)
-    return np.where(_bridged(time, target, longest_s), np.interp(target, time, values), np.nan)
-
-
-def hold_previous(time: Array, values: Array, target: Array, longest_s: float) -> Array:
-    """Hold the previous value between samples that are near enough; arguments and result are those of `interpolate`."""
-    time, values = _present(time, values)
-    if not len(time):
-        return np.full(len(target), np.nan)
+    after = np.searchsorted(time, target, side="left")
+    nearest = np.minimum(after, len(time) - 1)
+    between = (after > 0) & (after < len(time))
+    near = np.diff(time, prepend=time[0])[nearest] <= longest_s * _ROUNDING
     previous = np.maximum(np.searchsorted(time, target, side="right") - 1, 0)
-    return np.where(_bridged(time, target, longest_s), values[previous], np.nan)
+    found = values[previous] if hold else np.interp(target, time, values)
+    return np.where((time[nearest] == target) | (between & near), found, np.nan)
 
 
 def hold_asked(time: Array, values: Array, target: Array, gap_s: float) -> Array:
@@ -292,13 +263,9 @@ def hold_asked(time: Array, values: Array, target: Array, gap_s: float) -> Array
 
 
 def previous_rows(time: Array, target: Array) -> IntArray:
-    """Find the last row at each target or before it, the first row before them all.
+    """Find the last row of stamps, s, at each target, s, or before it, the first row before them all.
 
-    Parameters
-    ----------
-    time : array, shape (row,), s
-    target : array, shape (time,), s
-        Its clock may have been computed: what is a hundredth of its step late counts as on time.
+    A target's clock may have been computed: what is a hundredth of its step late counts as on time.
     """
     late = _ON_TIME * _step(target) if len(target) > 1 else 0.0
     return np.asarray(np.maximum(np.searchsorted(time, target + late, side="right") - 1, 0))
@@ -308,12 +275,3 @@ def _present(time: Array, values: Array) -> tuple[Array, Array]:
     finite = np.isfinite(values)
     rows, _ = increasing_rows(time[finite])
     return time[finite][rows], values[finite][rows]
-
-
-def _bridged(time: Array, target: Array, longest_s: float) -> BoolArray:
-    """Mark the targets at a sample, or between two that are near enough."""
-    after = np.searchsorted(time, target, side="left")
-    nearest = np.minimum(after, len(time) - 1)
-    between = (after > 0) & (after < len(time))
-    near = np.diff(time, prepend=time[0])[nearest] <= longest_s * _ROUNDING
-    return np.asarray((time[nearest] == target) | (between & near), dtype=bool)

@@ -16,7 +16,7 @@ from cpfls_cli.consistency.findings import contradictions, doubts
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, InputError
-from cpfls_cli.flightlog.clock import common_rate, same_rate
+from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.imported import imported

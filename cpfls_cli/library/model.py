@@ -91,7 +91,7 @@ def stated_vehicle(config: str | os.PathLike[str]) -> Model:
 class Model:
     """A model of a multirotor.
 
-    Besides the methods listed, ``to_c(path)``, ``to_python(path)`` and so on export it, one for each of `formats`.
+    Besides the methods listed, ``to_c(path)``, ``to_jax(path)`` and so on export it, one for each of `formats`.
 
     Attributes
     ----------

@@ -19,9 +19,8 @@ from cpfls_cli.logs.records import bytes_of, date
 
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
-
+# Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths.
 _MOST_CELLS, _HUNDREDTHS = 15, 100
-"""Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths."""
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -59,7 +58,12 @@ def flights(path: Path) -> list[LogContents]:
 def _contents(content: bytes) -> LogContents:
     header, rows, slow, broken = _flight(content)
     columns, units = _scaled_columns(header, rows)
-    columns |= {name: held for name, held in _slow_columns(header, slow, len(rows)).items() if name not in columns}
+    if len(slow):
+        # What is logged as it changes, such as modes, at each main frame.
+        latest = np.maximum(np.searchsorted(slow[:, 0], np.arange(len(rows)), side="right") - 1, 0)
+        names = header["Field S name"].split(",")
+        held = {name: slow[latest, 1 + place].astype(float) for place, name in enumerate(names)}
+        columns |= {name: own for name, own in held.items() if name not in columns}
     kept = _in_order(columns["time"])
     if len(kept) < len(rows):
         broken += len(rows) - len(kept)
@@ -125,15 +129,6 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, IntArray, int]:
 
 def _tables(lengths: tuple[int, int], widths: tuple[int, int]) -> tuple[IntArray, IntArray]:
     return np.empty((lengths[0], widths[0]), dtype=np.int64), np.empty((lengths[1], widths[1]), dtype=np.int64)
-
-
-def _slow_columns(header: Mapping[str, str], slow: IntArray, rows: int) -> dict[str, Array]:
-    """Give what is logged as it changes, such as modes, at each main frame."""
-    if not len(slow):
-        return {}
-    latest = np.maximum(np.searchsorted(slow[:, 0], np.arange(rows), side="right") - 1, 0)
-    names = header["Field S name"].split(",")
-    return {name: slow[latest, 1 + place].astype(float) for place, name in enumerate(names)}
 
 
 def _integers(header: Mapping[str, str], key: str, otherwise: str | None = None) -> list[int]:

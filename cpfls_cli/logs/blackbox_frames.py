@@ -13,12 +13,10 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.compiling import compiled, part
 
 Bytes = np.ndarray
-KINDS = "IPGHS"
-"""Kinds of frames with fields: main, those between, GPS, home, slow."""
+KINDS = "IPGHS"  # Kinds of frames with fields: main, those between, GPS, home, slow.
 MAIN = 0
 SLOW = KINDS.index("S")
-ROLLOVER = 1 << 32
-"""Stamps have 32 bits, microseconds."""
+ROLLOVER = 1 << 32  # Stamps have 32 bits, microseconds.
 _SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE = 0, 1, 3, 6, 7, 8, 9, 10
 ENCODINGS = (_SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE)
 _PREVIOUS, _STRAIGHT, _AVERAGE, _MINIMUM, _FIRST_MOTOR, _MIDDLE, _BATTERY, _MOTOR_MINIMUM = 1, 2, 3, 4, 5, 8, 9, 11
@@ -37,17 +35,10 @@ _FIXED_EVENTS = ((10, 5), (11, 4), (12, 8))
 
 
 class Fields(NamedTuple):
-    """How the fields of each kind of frame are written.
+    """How the fields of each kind of frame are written."""
 
-    Attributes
-    ----------
-    counts : array of int, shape (kind,)
-        Kinds in the order of `KINDS`.
-    encoding, predictor, is_signed : array of int, shape (kind, field)
-    """
-
-    counts: IntArray
-    encoding: IntArray
+    counts: IntArray  # Shape (kind,); kinds in the order of `KINDS`.
+    encoding: IntArray  # Shape (kind, field)
     predictor: IntArray
     is_signed: IntArray
 

@@ -13,12 +13,11 @@ from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.logs.records import bytes_of, numbers, seconds, table
 
+# Type of the stamps and how many there are in a second, by version of the format.
 _STAMPS = {1: ("<u4", 10**3), 2: ("<u8", 10**6)}
-"""Type of the stamps and how many there are in a second, by version of the format."""
 _NUMBER = 2
 _CHECK_SUM = 4
-_LETTERS = "BbHhIiQqefd"
-"""Types of numbers that a log may hold."""
+_LETTERS = "BbHhIiQqefd"  # Types of numbers that a log may hold.
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,11 @@ from cpfls_cli.files import most_held
 from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.words import some
 
+# Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory.
 _LONGEST_LINE = 1 << 20
-"""Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory."""
-
-_REMARKS: Final = ("#", "%", "//")
-"""With which a remark before the column names begins."""
-
+_REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
+# A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
-"""A number as it is written in much of Europe, where semicolons separate columns."""
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:

@@ -12,8 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.foreign import SDLOG2
-from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, LogContents
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, table
 
 _HEAD = b"\xa3\x95"
@@ -112,7 +111,6 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         for each, unit in stated.get(topic.partition("[")[0], {}).items()
         if each in fields and unit != _INSTANCE
     }
-    flown_at = _flown_at(topics.get("GPS", {}))
     parameters: dict[str, float | str] = {}
     for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
@@ -122,7 +120,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
     said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
     lost_bytes = broken if lost else ()
-    return LogContents(topics, units, parameters, _system(tables), lost_bytes, flown_at, begins, tuple(said))
+    return LogContents(
+        topics, units, parameters, _system(tables), lost_bytes, _flown_at(topics.get("GPS", {})), begins, tuple(said)
+    )
 
 
 def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:
@@ -156,23 +156,29 @@ def _find_messages(content: bytes, place: int) -> tuple[dict[int, _Kind], int]:
             break
         kind.begins.append(place)
         if kind.name == "FMT":
-            _describe(content[place:end], kinds)
+            (own,) = np.frombuffer(content[place:end], _FORMAT)
+            letters, names = own["types"].decode("latin-1"), own["fields"].decode("latin-1").split(",")
+            described = _described(own["name"].decode("latin-1"), letters, names, text=False)
+            if own["kind"] not in kinds and described is not None and described.record.itemsize == own["length"]:
+                kinds[int(own["kind"])] = described
         place = end
     return kinds, lost
 
 
-def _describe(message: bytes, kinds: dict[int, _Kind]) -> None:
-    """Take up the kind that a message describes; one that contradicts itself is left out."""
-    (own,) = np.frombuffer(message, _FORMAT)
-    letters, names = own["types"].decode("latin-1"), own["fields"].decode("latin-1").split(",")
-    if own["kind"] in kinds or len(names) != len(letters) or len({"", _BEFORE, *names}) != len(names) + 2:
-        return
+def _described(name: str, letters: str, names: list[str], *, text: bool) -> _Kind | None:
+    """Make a kind of message of its description; None of one that contradicts itself."""
+    if len(names) != len(letters) or len({"", _BEFORE, *names}) != len(names) + 2:
+        return None
     if not set(letters) <= {*_NUMBERS, *_OTHERS}:
-        return
-    places = [_NUMBERS[letter][0] if letter in _NUMBERS else _OTHERS[letter] for letter in letters]
-    record = np.dtype([(_BEFORE, "V3"), *((name, f"<{kind}") for name, kind in zip(names, places, strict=True))])
-    if record.itemsize == own["length"]:
-        kinds[int(own["kind"])] = _Kind(own["name"].decode("latin-1"), dict(zip(names, letters, strict=True)), record)
+        return None
+    if text:
+        # A mode is written as its name.
+        places = ["S64" if letter in {*_OTHERS, "M"} else "i8" if letter in _WHOLE else "f8" for letter in letters]
+        fields = list(zip(names, places, strict=True))
+    else:
+        places = [f"<{_NUMBERS[letter][0] if letter in _NUMBERS else _OTHERS[letter]}" for letter in letters]
+        fields = [(_BEFORE, "V3"), *zip(names, places, strict=True)]
+    return _Kind(name, dict(zip(names, letters, strict=True)), np.dtype(fields), text=text)
 
 
 def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray], int]:
@@ -185,8 +191,8 @@ def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray]
         name, *fields = (each.strip() for each in line.split(","))
         kind = named.get(name)
         if name == "FMT" and len(fields) > 4 and fields[0].isdecimal():
-            described = _described(int(fields[0]), fields[2], fields[3], fields[4:])
-            if described is not None and described.name not in named:
+            described = _described(fields[2], fields[3], fields[4:], text=True)
+            if described is not None and int(fields[0]) != _OF_FORMATS and described.name not in named:
                 kinds[int(fields[0])] = named[described.name] = described
         elif kind is None or (values := _values(kind, fields)) is None:
             lost += len(line)
@@ -195,19 +201,6 @@ def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray]
             kind.begins.append(place)
     tables = {name: np.array(own, dtype=named[name].record) for name, own in rows.items()}
     return kinds, tables, lost
-
-
-def _described(number: int, name: str, letters: str, names: list[str]) -> _Kind | None:
-    """Take up the kind of message that a line describes; none for the description itself, or a wrong one."""
-    if number == _OF_FORMATS or len(names) != len(letters) or not set(letters) <= {*_NUMBERS, *_OTHERS}:
-        return None
-    if len({"", *names}) != len(names) + 1:
-        return None
-    # A mode is written as its name.
-    places = ["S64" if letter in {*_OTHERS, "M"} else "i8" if letter in _WHOLE else "f8" for letter in letters]
-    return _Kind(
-        name, dict(zip(names, letters, strict=True)), np.dtype(list(zip(names, places, strict=True))), text=True
-    )
 
 
 def _values(kind: _Kind, fields: list[str]) -> tuple[float | bytes, ...] | None:

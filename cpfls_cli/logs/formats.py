@@ -12,7 +12,7 @@ from importlib import import_module
 from math import nan
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from cpfls_cli.errors import InputError, about, install_command
 
@@ -34,95 +34,57 @@ MOST_LISTED = 20
 
 @dataclass(frozen=True)
 class LogContents:
-    """What a log holds.
+    """What a log holds."""
 
-    Attributes
-    ----------
-    topics : dict from topic to dict from field to array, shape (sample,)
-        The fields that were wanted; others may be there by name only, as empty arrays, so that a message can suggest
-        them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log. A flat log, whose
-        columns share one clock, is one topic with an empty name.
-    units : dict from column to str
-        Units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one are in s.
-    parameters : dict from str to float or str
-        What the log knows of the vehicle: parameters of the autopilot, lines of a header.
-    system : str
-        What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
-    warnings : tuple of str
-        Faults of the file as a whole.
-    flown_at : float
-        When it begins, s since 1970 began (UTC); NaN where the log does not tell.
-    begins : dict from column to float
-        Stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there; an empty
-        name is that of all stamps.
-    messages : tuple of (float, str, str)
-        Messages of the autopilot to its pilot: when, s, how bad, empty where that is not said, and the text.
-    """
-
+    # Shape (sample,); the fields that were wanted; others may be there by name only, as empty arrays, so that a
+    # message can suggest them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log.
+    # A flat log, whose columns share one clock, is one topic with an empty name.
     topics: dict[str, dict[str, "Array"]]
+    # By column; units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one
+    # are in s.
     units: dict[str, str] = field(default_factory=dict)
+    # What the log knows of the vehicle: parameters of the autopilot, lines of a header.
     parameters: dict[str, float | str] = field(default_factory=dict)
-    system: str = ""
-    warnings: tuple[str, ...] = ()
-    flown_at: float = nan
+    system: str = ""  # What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
+    warnings: tuple[str, ...] = ()  # Faults of the file as a whole.
+    flown_at: float = nan  # When it begins, s since 1970 began (UTC); NaN where the log does not tell.
+    # By column; stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there;
+    # an empty name is that of all stamps.
     begins: dict[str, float] = field(default_factory=dict)
+    # Messages of the autopilot to its pilot: when, s, how bad, empty where that is not
+    # said, and the text.
     messages: tuple[tuple[float, str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class LogColumns:
-    """Columns of a log that a config maps, all on one clock.
+    """Columns of a log that a config maps, all on one clock."""
 
-    Attributes
-    ----------
-    columns : dict from str to array, shape (sample,)
-        The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
-    settings : ImportSettings
-        The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
-    begins : float
-        Stamp on the log's own clock at 0 of the column that is the clock, s.
-    parameters, system
-        As in `LogContents`.
-    stamped_hz : dict from str to float
-        How often a second signals were logged that have stamps of their own.
-    """
-
+    # Shape (sample,); the mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
     columns: dict[str, "Array"]
+    # The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
     settings: "ImportSettings"
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
-    begins: float = 0.0
-    parameters: dict[str, float | str] = field(default_factory=dict)
+    begins: float = 0.0  # Stamp on the log's own clock at 0 of the column that is the clock, s.
+    parameters: dict[str, float | str] = field(default_factory=dict)  # As in `LogContents`.
     system: str = ""
+    # How often a second signals were logged that have stamps of their own.
     stamped_hz: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogFormat:
-    """One format of flight logs.
+    """One format of flight logs."""
 
-    Attributes
-    ----------
-    suffix : str
-        End of a file's name, in lower case; empty where such files have none.
-    content : str
-        What a file that begins in this way holds, in messages.
-    magic : bytes
-        First bytes of every such file; none for text, which begins with a line of column names.
-    shared : bool
-        Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
-    reader : str
-        Module with ``contents(path, wanted)``, which returns `LogContents`.
-    packages, extra : tuple of str, str
-        Modules of the optional package that the reader needs, and the extra of this program that installs it.
-    """
-
-    suffix: str
+    suffix: str  # End of a file's name, in lower case; empty where such files have none.
     name: str
-    content: str
-    magic: bytes = b""
+    content: str  # What a file that begins in this way holds, in messages.
+    magic: bytes = b""  # First bytes of every such file; none for text, which begins with a line of column names.
+    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
     shared: bool = False
-    reader: str
+    reader: str  # Module with ``contents(path, wanted)``, which returns `LogContents`.
+    # Modules of the optional package that the reader needs, and the extra of this program that installs it.
     packages: tuple[str, ...] = ()
     extra: str = ""
 
@@ -136,9 +98,8 @@ class LogFormat:
         return line.startswith(self.magic) if self.magic else _is_header(line)
 
 
+# A count of names, and the first of them with the letter of its type.
 _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
-"""A count of names, and the first of them with the letter of its type."""
-
 _PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
 _ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
 _OURS_TOO = {"shared": True}
@@ -224,7 +185,7 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     rebuilding = import_module("cpfls_cli.flightlog.rebuilt") if rebuilds else None
     contents = log_contents(path, mapped if rebuilding is None else (*mapped, *rebuilding.SOURCES))
     topics = contents.topics
-    refuse_other_vehicle = import_module("cpfls_cli.flightlog.vehicle_kind").refuse_other_vehicle
+    refuse_other_vehicle = import_module("cpfls_cli.flightlog.stated_vehicle").refuse_other_vehicle
     with about(path, InputError):
         refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
         if rebuilding is not None:
@@ -250,8 +211,7 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     known = any(other.magic and other.begins(first) for other in LOG_FORMATS)
     if form is not None and (known or not (first or form.magic)):
         return None
-    named: str | None = import_module("cpfls_cli.logs.foreign").named_foreign(path)
-    return named
+    return named_foreign(path)
 
 
 def _format_of(path: Path) -> LogFormat | None:
@@ -303,3 +263,95 @@ def _require_packages(path: Path, form: LogFormat) -> None:
             raise InputError(
                 f"{path}: reading {path.suffix} needs the package {package}; {install_command(form.extra)}"
             ) from None
+
+
+_FIRST_BYTES = 1024
+
+
+class _Foreign(NamedTuple):
+    """A kind of file: what it begins with, at which place, what it is called, and the way to a log."""
+
+    begins: bytes
+    what: str
+    way: str
+    at: int = 0
+
+
+_UNPACK: Final = "unpack it first, and give the log inside"
+_CONVERT_TLOG: Final = (
+    "telemetry is too slow for a model; give the log that the autopilot writes itself (.bin of ArduPilot, .ulg of PX4)"
+)
+_SLOW: Final = (
+    "it comes twice a second or so, which is too slow; give the log that the flight controller writes itself (.bbl,"
+    " .bin, .ulg)"
+)
+_CONVERT_SDLOG2: Final = (
+    "convert it to CSV with sdlog2_dump.py of that firmware, or update the firmware, which then writes .ulg"
+)
+_FOREIGN: Final = (
+    _Foreign(b"#ROSBAG V", "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
+    _Foreign(b"PK\x03\x04", "a zip archive", _UNPACK),
+    _Foreign(b"\x1f\x8b", "data compressed by gzip", _UNPACK),
+    _Foreign(b"BZh", "data compressed by bzip2", _UNPACK),
+    _Foreign(b"\xfd7zXZ\x00", "data compressed by xz", _UNPACK),
+    _Foreign(b"7z\xbc\xaf\x27\x1c", "a 7z archive", _UNPACK),
+    _Foreign(b"Rar!", "a rar archive", _UNPACK),
+    _Foreign(b"\x28\xb5\x2f\xfd", "data compressed by zstd", _UNPACK),
+    _Foreign(b"ustar", "a tar archive", _UNPACK, 257),
+    _Foreign(b"\x93NUMPY", "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
+    _Foreign(b"version https://git-lfs", "a pointer of Git LFS", "fetch it with `git lfs pull`"),
+    _Foreign(b"BUILD", "a .DAT of DJI", "convert it to CSV with DatCon or its like", 16),
+    _Foreign(b"\xa3\x95\x80", "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
+    _Foreign(b"%PDF", "a PDF", "give the log that it shows"),
+    _Foreign(b"\x89PNG", "a picture", "give the log that it shows"),
+    _Foreign(b"\xff\xd8\xff", "a picture", "give the log that it shows"),
+)
+_TRACK: Final = "a track of positions holds no motion of the body; give the log of the autopilot"
+_AS_CSV: Final = "write its numbers as CSV, with a line of column names"
+_TEXTS: Final = (
+    # What the first letters of a text hold, of markup anywhere.
+    (rb"(?s:<.*)?<gpx\b", "a GPX track", _TRACK),
+    (rb"(?s:<.*)?<kml\b", "a KML track", _TRACK),
+    (rb"<!doctype html|<html\b", "a web page", "the download gave a page in the place of the log; save the log itself"),
+    (rb"<\?xml", "XML", _AS_CSV),
+    (rb"\[\d{4}-\d\d-\d\d[ t]", "text with a stamp in brackets before each line", _AS_CSV),
+    (rb"[{\[]", "JSON", _AS_CSV),
+    (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
+    (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
+)
+_SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
+# A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
+_TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
+_MAVLINK, _STAMP_BYTES, _STAMPS_US = b"\xfe\xfd", 8, (10**15, 4 * 10**15)
+
+
+def named_foreign(path: Path) -> str | None:
+    """Say what a file is that is no log, and how to get a log from it; None for one that is not known."""
+    try:
+        with path.open("rb") as stream:
+            first = stream.read(_FIRST_BYTES)
+    except OSError:
+        return None
+    if not first:
+        return "an empty file: nothing was logged, or the copy failed"
+    found = _by_bytes(first, path.suffix.lower())
+    return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
+
+
+def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
+    if first.startswith(b"PK\x03\x04") and (suffix in (".xlsx", ".ods") or any(own in first for own in _SPREADSHEET)):
+        return "a spreadsheet", "save its table as CSV, with a line of column names"
+    if first.startswith(b"PK\x03\x04") and _NPY in first:
+        return "arrays of NumPy", "write them as CSV, HDF5 or .mat, with a name for each column"
+    known = next((own for own in _FOREIGN if first.startswith(own.begins, own.at)), None)
+    if known is not None:
+        return known.what, known.way
+    stamped = _STAMPS_US[0] < int.from_bytes(first[:_STAMP_BYTES], "big") < _STAMPS_US[1]
+    frame = first[_STAMP_BYTES : _STAMP_BYTES + 1] if stamped else first[:1] if suffix in _TELEMETRY else b""
+    if frame and frame in _MAVLINK:
+        return "telemetry of MAVLink", _CONVERT_TLOG
+    text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)
+
+
+SDLOG2: Final = f"a log of PX4 before ULog (sdlog2), and no log that can be read: {_CONVERT_SDLOG2}"

@@ -24,20 +24,16 @@ from cpfls_cli.words import some
 _MOST_COLUMNS = 64
 _PROBE = """
 import sys, h5py
-
 states = 0
-
 def count(name, own):
     global states
     # Of one byte each or of eight, they are read as numbers of eight.
     states += max(own.nbytes, 8 * (own.size or 0)) if isinstance(own, h5py.Dataset) else 0
-
 def read(name, own):
     if isinstance(own, h5py.Dataset) and own.dtype.kind in "iufb" and own.ndim and own.size:
         rows = max(1, (1 << 20) * len(own) // own.size)
         for start in range(0, len(own), rows):
             own[start : start + rows]
-
 with h5py.File(sys.argv[1], "r") as file:
     name = file.attrs.get("format")
     print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
@@ -47,8 +43,8 @@ with h5py.File(sys.argv[1], "r") as file:
         sys.exit(3)
     file.visititems(read)
 """
+# Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much.
 _COMPRESSED, _INFLATED = 15, 3
-"""Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much."""
 _TIME_UNITS = ("s", "ms", "us", "ns")
 
 
@@ -66,7 +62,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        columns, units, names = _of_hdf5(path, wanted) if hdf5 else _of_matlab(path, wanted)
+        columns, units, names = _read(_of_hdf5(path) if hdf5 else _of_mat(path), wanted)
     except InputError:
         raise
     except Exception as error:
@@ -118,45 +114,41 @@ def _probed(state: FileState) -> _Probed:
     return _Probed(True, done.stdout.strip())
 
 
-def _of_matlab(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str], list[str]]:
-    arrays = list(_of_mat(path))
-    return dict(_named(arrays, wanted)), {}, [name for name, array in arrays if array.size > 1]
-
-
-def _of_hdf5(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str], list[str]]:
+def _read(
+    arrays: Iterable[tuple[str, Any, str]], wanted: Collection[str] | None
+) -> tuple[dict[str, Array], dict[str, str], list[str]]:
+    """Name the columns of arrays and read those that are wanted; give their units, and the names of all arrays too."""
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
-    with h5py.File(path, "r") as file:
-        found = _datasets(file)
-        names = [name for name, dataset in found if (dataset.size or 0) > 1]
-        for name, dataset in found:
-            own = dict(_named([(name, dataset)], wanted))
-            unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
-            unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
-            factor = known_unit(unit).factor if unit in _TIME_UNITS else 1.0
-            columns |= {column: factor * values for column, values in own.items()}
-            units |= {column: "s" if unit in _TIME_UNITS else unit for column in own if isinstance(unit, str) and unit}
+    names = []
+    for name, array, unit in arrays:
+        names += [name] if (array.size or 0) > 1 else []
+        own = dict(_named(name, array, wanted))
+        factor = known_unit(unit).factor if unit in _TIME_UNITS else 1.0
+        columns |= {column: factor * values for column, values in own.items()} if factor != 1.0 else own
+        units |= {column: "s" if unit in _TIME_UNITS else unit for column in own if unit}
     return columns, units, names
 
 
-def _datasets(file: h5py.File) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    # MATLAB keeps the insides of its cells and references below this name.
-    file.visititems(
-        lambda name, own: (
-            found.append((name, own)) if isinstance(own, h5py.Dataset) and not name.startswith("#refs#") else None
-        )
-    )
-    return found
+def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
+    found: dict[str, Any] = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, own: found.update({name: own}) if isinstance(own, h5py.Dataset) else None)
+        for name, dataset in found.items():
+            # MATLAB keeps the insides of its cells and references below this name.
+            if not name.startswith("#refs#"):
+                unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
+                unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+                yield name, dataset, unit if isinstance(unit, str) else ""
 
 
-def _of_mat(path: Path) -> Iterator[tuple[str, Any]]:
-    def within(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
+    def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
         if isinstance(value, dict):
             for name, own in value.items():
                 yield from within(f"{prefix}/{name}" if prefix else name, own)
         elif isinstance(value, np.ndarray):
-            yield prefix, value
+            yield prefix, value, ""
 
     _refuse_inflated(path)
     variables = scipy.io.loadmat(str(path), simplify_cells=True)
@@ -193,18 +185,17 @@ def _require_held(path: Path, total: int, size: int) -> None:
         )
 
 
-def _named(arrays: Iterable[tuple[str, Any]], wanted: Collection[str] | None) -> Iterator[tuple[str, Array]]:
-    """Name the columns of arrays, and read those that are wanted."""
-    for name, array in arrays:
-        shape = tuple(size for size in array.shape if size != 1)
-        count = min(shape) if len(shape) == 2 else 1
-        # Integers, floats and booleans.
-        if array.dtype.kind not in "iufb" or len(shape) not in (1, 2) or count > _MOST_COLUMNS:
-            continue
-        names = [name] if len(shape) == 1 else [f"{name}[{column}]" for column in range(count)]
-        if wanted is not None and not set(names) & set(wanted):
-            yield from ((each, np.empty(0)) for each in names)
-            continue
-        values = np.asarray(array[()], dtype=float).reshape(shape)
-        columns = values if len(shape) == 2 and shape[0] < shape[1] else values.reshape(-1, count).T
-        yield from zip(names, columns, strict=True)
+def _named(name: str, array: Any, wanted: Collection[str] | None) -> Iterator[tuple[str, Array]]:
+    """Name the columns of an array, and read those that are wanted."""
+    shape = tuple(size for size in array.shape if size != 1)
+    count = min(shape) if len(shape) == 2 else 1
+    # Integers, floats and booleans.
+    if array.dtype.kind not in "iufb" or len(shape) not in (1, 2) or count > _MOST_COLUMNS:
+        return
+    names = [name] if len(shape) == 1 else [f"{name}[{column}]" for column in range(count)]
+    if wanted is not None and not set(names) & set(wanted):
+        yield from ((each, np.empty(0)) for each in names)
+        return
+    values = np.asarray(array[()], dtype=float).reshape(shape)
+    columns = values if len(shape) == 2 and shape[0] < shape[1] else values.reshape(-1, count).T
+    yield from zip(names, columns, strict=True)

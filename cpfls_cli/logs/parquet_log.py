@@ -17,9 +17,7 @@ from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.words import some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-
-_LONGEST = 200
-"""Characters of a message of the library, which may list all columns."""
+_LONGEST = 200  # Characters of a message of the library, which may list all columns.
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -50,7 +48,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         columns[name] = _numbers_of_column(path, name, table.column(name))
     warnings = (f"columns that hold no numbers are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
-    return LogContents({"": columns}, units, warnings=warnings, begins={name: _begins(table, name) for name in units})
+    begins = {}
+    for name in units:
+        stamps, known = _stamps(table.column(name))
+        begins[name] = float(stamps[known][0]) / _PER_SECOND[table.column(name).type.unit] if known.any() else 0.0
+    return LogContents({"": columns}, units, warnings=warnings, begins=begins)
 
 
 def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
@@ -60,7 +62,10 @@ def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
             "or write this one as numbers"
         )
     if _states_unit(column.type):
-        return _seconds(column)
+        # Whole numbers of their unit, whose difference is exact.
+        stamps, known = _stamps(column)
+        since = (stamps - stamps[known][0] if known.any() else stamps) / _PER_SECOND[column.type.unit]
+        return np.where(known, since, np.nan)
     if pyarrow.types.is_boolean(_kind(column.type)):
         column = column.cast(pyarrow.int8())
     return np.asarray(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)
@@ -78,20 +83,6 @@ def _is_numeric(kind: Any) -> bool:
 
 def _states_unit(kind: Any) -> bool:
     return bool(pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind) or pyarrow.types.is_time(kind))
-
-
-def _seconds(column: Any) -> Array:
-    """Convert stamps, whole numbers of their unit, to seconds from the first one; their difference is exact."""
-    numbers, known = _stamps(column)
-    if not known.any():
-        return np.full(len(numbers), np.nan)
-    return np.where(known, (numbers - numbers[known][0]) / _PER_SECOND[column.type.unit], np.nan)
-
-
-def _begins(table: Any, name: str) -> float:
-    """Give the first stamp of a column, s."""
-    numbers, known = _stamps(table.column(name))
-    return float(numbers[known][0]) / _PER_SECOND[table.column(name).type.unit] if known.any() else 0.0
 
 
 def _stamps(column: Any) -> tuple[IntArray, BoolArray]:

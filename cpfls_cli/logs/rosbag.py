@@ -33,7 +33,6 @@ _UNITS = (
     (re.compile(r"(position|point|translation)\.[xyz]$"), "m"),
     (re.compile(r"^voltage$"), "V"),
 )
-
 _Path = tuple[str | int, ...]
 
 

@@ -31,7 +31,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     origin = int(log.start_timestamp)
     topics = {
         f"{data.name}[{data.multi_id}]" if data.multi_id else data.name: {
-            field: _field(field, values, origin) for field, values in data.data.items()
+            name: seconds(own, origin, _PER_SECOND)
+            if name.startswith(STAMP) and own.dtype.kind in "iu"
+            else numbers(own)
+            for name, own in data.data.items()
         }
         for data in log.data_list
     }
@@ -52,6 +55,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     return LogContents(
         topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics), begins, said
     )
+
+
+def _is_stamp(field: str, values: Any) -> bool:
+    return field.startswith(STAMP) and values.dtype.kind in "iu"
 
 
 def _parsed(path: Path) -> Any:
@@ -113,12 +120,6 @@ def _flown_at(topics: Mapping[str, Mapping[str, Array]]) -> float:
             # Before it receives anything it says 0.
             return next((at for at in map(date, begins) if np.isfinite(at)), nan)
     return nan
-
-
-def _field(field: str, values: Any, origin: int) -> Array:
-    if field.startswith(STAMP) and values.dtype.kind in "iu":
-        return seconds(values, origin, _PER_SECOND)
-    return numbers(values)
 
 
 def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.look.balance import Balance
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES, LogFlight

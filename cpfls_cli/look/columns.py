@@ -1,61 +1,21 @@
-"""Signals that only `look` asks of a log: what moves the vehicle, its filters, its battery. One row a column."""
+"""Columns of a log as `look` takes them: on their own clocks, in SI and in axes forward, right, down."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from fractions import Fraction
-from math import pi
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import is_of
+from cpfls_cli.flightlog.recognised import LogTable
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.vocabulary import KNOWN
 from cpfls_cli.look.flight import Samples
+from cpfls_cli.units import known_unit
 
-_TABLE: Final = """
-    # What, whose, columns, factor to SI, signs in axes forward, right, down; the first that a log holds is taken
-    rate      PX4         vehicle_angular_velocity.xyz[{0,1,2}]   1        +++
-    rate      PX4         vehicle_attitude.{roll,pitch,yaw}speed  1        +++
-    rate      ArduPilot   RATE.{R,P,Y}                            deg      +++
-    rate      ArduPilot   RATE.{Rll,Pit,Yaw}                      deg      +++
-    raw       PX4         sensor_gyro.{x,y,z}                     1        +++
-    raw       PX4         sensor_combined.gyro_rad[{0,1,2}]       1        +++
-    raw       ArduPilot   GYR.Gyr{X,Y,Z}                          1        +++
-    raw       Betaflight  gyroUnfilt[{0,1,2}]                     deg      +--
-    output    PX4         vehicle_torque_setpoint.xyz[{0,1,2}]    1        +++
-    output    PX4         actuator_controls_0.control[{0,1,2}]    1        +++
-    output    ArduPilot   RATE.{R,P,Y}Out                         1        +++
-    output    ArduPilot   RATE.{Rll,Pit,Yaw}Out                   1        +++
-    # A pitch is positive with the nose up here, unlike in the gyroscope's axes.
-    output    Crazyflie   controller.cmd_{roll,pitch,yaw}         1/65536  +++
-    thrust    PX4         vehicle_thrust_setpoint.xyz[{2}]        1        -
-    thrust    PX4         actuator_controls_0.control[{3}]        1        +
-    thrust    ArduPilot   RATE.{AOut}                             1        +
-    thrust    ArduPilot   CTUN.{ThO}                              1        +
-    thrust    ArduPilot   CTUN.{ThrOut}                           1/1000   +
-    thrust    Crazyflie   controller.{cmd_thrust}                 1/65536  +
-    setpoint  PX4         vehicle_rates_setpoint.{roll,pitch,yaw} 1        +++
-    setpoint  ArduPilot   RATE.{R,P,Y}Des                         deg      +++
-    setpoint  ArduPilot   RATE.{Rll,Pit,Yaw}Des                   deg      +++
-    setpoint  Betaflight  setpoint[{0,1,2}]                       deg      +--
-    setpoint  Betaflight  axisRate[{0,1,2}]                       deg      +--
-    current   PX4         battery_status.{current_a}              1        +
-    current   ArduPilot   BAT.{Curr}                              1        +
-    current   ArduPilot   CURR.{Curr}                             1        +
-    current   Betaflight  {amperageLatest}                        1/100    +
-    current   Betaflight  {amperage}                              1/100    +
-    voltage   PX4         battery_status.{voltage_filtered_v}     1        +
-    voltage   ArduPilot   CURR.{Volt}                             1        +
-    height    ArduPilot   CTUN.{Alt}                              1        +
-    height    ArduPilot   BARO.{Alt}                              1        +
-    height    ArduPilot   CTUN.{BAlt}                             1        +
-    height    ArduPilot   CTUN.{BarAlt}                           1        +
-    height    Betaflight  {baroAlt}                               1/100    +
-"""
 FRD: Final = np.array([1.0, -1.0, -1.0])
 """Signs that make axes forward, right, down of forward, left, up, and the other way round."""
 
@@ -73,28 +33,6 @@ _BRIDGED_STEPS, _BRIDGED_S = 5.0, 0.25
 """Steps of a signal, and s, up to which it is known between two samples."""
 
 
-class Row(NamedTuple):
-    """Columns in which a kind of log has a signal."""
-
-    what: str
-    system: str
-    columns: tuple[str, ...]
-    factor: float
-    sign: tuple[float, ...]
-
-
-def _row(text: str) -> Row:
-    what, system, pattern, factor, signs = text.split()
-    before, _, rest = pattern.partition("{")
-    axes, _, after = rest.partition("}")
-    columns = tuple(f"{before}{axis}{after}" for axis in axes.split(","))
-    own = pi / 180 if factor == "deg" else float(Fraction(factor))
-    return Row(what, system, columns, own, tuple(1.0 if sign == "+" else -1.0 for sign in signs))
-
-
-ROWS: Final = tuple(_row(text) for text in _TABLE.splitlines() if text.strip() and "#" not in text)
-
-
 class LookedLog:
     """A log by columns, times of samples in s from its first stamp."""
 
@@ -109,13 +47,15 @@ class LookedLog:
         time, values = self.table.values(columns)
         return Samples(time - self.table.origin, values, in_words(columns)) if len(time) > 1 else None
 
-    def found(self, what: str) -> Iterator[Samples]:
-        """Give what the rows of a kind name, in SI and in axes forward, right, down, the first row first."""
-        for row in ROWS:
-            if row.what == what and is_of(self.system, row.system):
+    def found(self, *signals: str) -> Iterator[Samples]:
+        """Give what the rows of `KNOWN` name, in SI and in axes forward, right, down, the first row first."""
+        for row in KNOWN:
+            if row.signal in signals and is_of(self.system, row.system):
                 samples = self.samples(row.columns)
                 if samples is not None:
-                    yield samples._replace(values=row.factor * np.array(row.sign) * samples.values)
+                    factor = row.scale * (known_unit(row.unit).factor if row.unit else 1.0)
+                    signs = np.array(row.sign or (1.0,)) * (FRD if row.frame == "FLU" else 1.0)
+                    yield samples._replace(values=factor * signs * samples.values)
 
 
 def in_words(columns: Sequence[str]) -> str:

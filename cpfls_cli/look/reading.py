@@ -23,14 +23,13 @@ from cpfls_cli.flightlog.conversion import (
 )
 from cpfls_cli.flightlog.crash import ALIVE
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
 from cpfls_cli.flightlog.recognised import Guess, Recognition
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, forward_flight, log_faster
 from cpfls_cli.flightlog.topics import Topics, column_names
-from cpfls_cli.flightlog.vehicle_kind import forward_flight
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
@@ -116,7 +115,7 @@ class _Reader:
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
         attitude, asked = self._attitudes()
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
-        thrust = rotors.samples or next(self.log.found("thrust"), None) or rotors.thrusts(ThrustCurve())
+        thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             raise InputError(self._nothing_asked())
         if thrust is not None and float(thrust.values.max()) < ALIVE:
@@ -227,7 +226,7 @@ class _Reader:
         found = self.signal("setpoint_body_rate")
         if found is not None:
             return found
-        found = next(self.log.found("setpoint"), None)
+        found = next(self.log.found("setpoint_body_rate", "setpoint"), None)
         if found is not None:
             return self._in_unit_of_rates(found, gyroscope) if found.source.startswith("RATE.") else found
         return self._setpoint_of_p_term(gyroscope)
@@ -256,7 +255,7 @@ class _Reader:
 
     def _battery(self) -> tuple[Samples | None, Samples | None]:
         """Give voltage and current; old logs have hundredths of both, and what is not measured is about 0."""
-        voltage = self.signal("voltage") or next(self.log.found("voltage"), None)
+        voltage = self.signal("voltage") or next(self.log.found("battery_voltage"), None)
         current = next(self.log.found("current"), None)
         level = np.nan if voltage is None else float(np.median(voltage.values))
         if level < _LEAST_V or (current is not None and not float(current.values.max()) > 0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
-from cpfls_cli.report.canvas import line, plot, stacked, style_of
+from cpfls_cli.report.canvas import legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, count, number, plain, whole_percent
 from cpfls_cli.units import SPEED_UNITS
@@ -37,6 +37,7 @@ _NO_TORQUE_BUT_ROTORS = (
     "the flight has rotors and no torque: cpfls vehicle and replay take it as it is; identify will refuse it until"
     " import.torque_source names rotor-speed or rotor-command, which needs the factors of the rotors as numbers"
 )
+_TURN = 360.0
 _ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "with"}
 
 
@@ -149,11 +150,55 @@ def flight_blocks(flight: Source[FlightRecord], index: int, sources: Sources) ->
     if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
         # On the circle where angles go round it: they would run off any other figure.
         if record.turns and record.attitude_rate is not None:
-            yield rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
+            yield rotation_figure(name, label, record)
         else:
-            yield attitude_figure(name, label, record.time, record.attitude)
+            yield attitude_figure(name, label, record)
     if record.torque is not None:
         yield torque_figure(f"figure-4-torque-{index}", label, record.time, record.torque)
+
+
+def attitude_figure(name: str, label: str, flown: Any) -> Plot:
+    """Show roll and pitch of a flight."""
+    largest = np.degrees(np.abs(flown.attitude[:, :2]).max(axis=0))
+    caption = f"Figure 3. Roll and pitch of {label}; they stay within ±{largest[0]:.1f}° and ±{largest[1]:.1f}°."
+    return plot(name, caption, "Roll and pitch angle over time", 2.7, partial(draw_attitude, flown))
+
+
+def rotation_figure(name: str, label: str, flown: Any) -> Plot:
+    """Show attitude and Euler rates of full rotations."""
+    degrees = np.degrees(flown.attitude)
+    turns = ", ".join(f"{axis} {np.ptp(degrees[:, index]) / _TURN:.1f}" for index, axis in enumerate(AXES))
+    caption = f"Attitude and Euler rates of {label}; range in turns: {turns}."
+    description = "Roll, pitch and yaw on the circle, and their rates, over time"
+    return plot(name, caption, description, 4.6, partial(draw_rotation, flown))
+
+
+def draw_attitude(r: Any, figure: Figure) -> None:
+    """Draw roll and pitch of a path or a flight: Figure 3 of the paper."""
+    axes = figure.subplots()
+    for index, axis in enumerate(AXES[:2]):
+        line(axes, r.time, np.degrees(r.attitude[:, index]), label=axis, **style_of(index))
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("angle, °")
+    legend_above(axes)
+
+
+def draw_rotation(r: Any, figure: Figure) -> None:
+    """Draw attitude and Euler rates of full rotations, angles on the circle."""
+    angles, rates = stacked(figure, 2)
+    for index, axis in enumerate(AXES):
+        style = style_of(index)
+        wrapped = np.mod(np.degrees(r.attitude[:, index]), _TURN)
+        # Without the strokes where an angle goes round.
+        seams = np.flatnonzero(np.abs(np.diff(wrapped)) > _TURN / 2) + 1
+        for part_number, part in enumerate(np.split(np.arange(len(r.time)), seams)):
+            line(angles, r.time[part], wrapped[part], label=axis if part_number == 0 else None, **style)
+        line(rates, r.time, r.attitude_rate[:, index], **style)
+    angles.set_yticks([0, 90, 180, 270, 360])
+    angles.set_ylabel("angle on the circle, °")
+    rates.set_ylabel("Euler rate, rad/s")
+    rates.set_xlabel("time, s")
+    legend_above(angles)
 
 
 def torque_figure(name: str, label: str, time: Array, torque: Array) -> Plot:

@@ -27,7 +27,6 @@ from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
-from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
@@ -88,7 +87,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     sensors_section,
     unseen_section,
     vehicle_section,
-    _of_each("path", "Training path", attrgetter("trajectories"), path_blocks),
+    _of_stage("trajectory"),
     _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),
     _of_stage("reduce"),
     identification_section,

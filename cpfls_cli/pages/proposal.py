@@ -13,10 +13,10 @@ from typing import Any, Final
 from cpfls_cli.config.load import ASK, how_to_fill_in
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
 from cpfls_cli.flightlog.layouts import USUAL
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import capitalised, joined

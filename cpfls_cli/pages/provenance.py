@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import Block, Listing, Section, Table
@@ -54,7 +54,7 @@ def _inputs(source: Source, sources: Sources) -> list[list[str]]:
 
 _Lack = tuple[type, str, str]
 _LACKS: tuple[_Lack, ...] = (
-    (TrajectoryRecord, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
+    (PlannedPath, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
     (
         FlightRecord,
         "Figure 4 and the quality of the flight",

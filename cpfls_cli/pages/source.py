@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import Vehicle
+    from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
@@ -61,7 +61,7 @@ class Sources:
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    trajectories: ClassVar[_OfFormat[TrajectoryRecord]] = _OfFormat("cpfls/trajectory")
+    trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
     flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")

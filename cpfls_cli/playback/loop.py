@@ -16,7 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
-from cpfls_cli.flightlog.logging_rates import SLOW_HZ
+from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel

@@ -41,7 +41,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
-from cpfls_cli.flightlog.logging_rates import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
@@ -271,6 +271,8 @@ def remainder_curves(r: Vehicle) -> tuple[Array, Array, Array]:
     words=WORDS,
     study=True,
     resumes=True,
+    # The file holds it with its config.
+    overrides=lambda anyway=False, **_: ["playback.anyway=true"] if anyway else [],
 )
 def vehicle(
     run: Run,
@@ -281,9 +283,6 @@ def vehicle(
     anyway: AnywayOption = False,
 ) -> Vehicle | None:
     """Find a vehicle in flights, and judge it on those held out."""
-    if anyway:
-        # The file holds it with its config.
-        run.study = run.study.model_copy(update={"playback": replace(run.study.playback, anyway=True)})
     others = held_out or []
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
     checkpoint, kept = begin_vehicle_search(run, learned | unseen, resume=resume)
@@ -311,11 +310,11 @@ def vehicle(
     made = _judged(run, found, read, list(_learned([run.files[role] for role in learned], training)), warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
-        run.text = _config_copy(run, write_config, made)
+        run.texts |= _config_copy(run, write_config, made)
         run.afterwards.append(checkpoint.remove)
     run.next += next_commands(run, made, flights, others)
     note, run.exit_code = stop_note("generations" if made.complete else "interrupted", signal, run.output)
-    run.notes += [] if note is None else [note]
+    run.said += [] if note is None else [note]
     return made
 
 
@@ -337,15 +336,13 @@ def next_commands(
     return page, ("cpfls", "export", job.output, "-o", job.output.with_suffix(".c"))
 
 
-def _config_copy(run: Run, copy: Path | None, made: Vehicle) -> tuple[Path, str] | None:
+def _config_copy(run: Run, copy: Path | None, made: Vehicle) -> dict[Path, str]:
     """Write the config again with the numbers that were found in the place of its section `vehicle`."""
     if copy is None:
-        return None
+        return {}
     run.last_words = f"{copy}: written, the config with these constants"
     data = run.data() | {"vehicle": vehicle_section(made)}
-    if run.study.playback.anyway:
-        data["playback"] = {**data.get("playback", {}), "anyway": True}
-    return copy, f"# {run.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}"
+    return {copy: f"# {run.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}"}
 
 
 def _what_can_come(

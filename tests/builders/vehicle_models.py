@@ -112,7 +112,13 @@ def vehicle_of(model, **changed):
         "correlation": np.eye(len(changed.get("numbers", "ab"))),
         "structures": tuple(
             TriedStructure(
-                name, () if name == "nothing" else ("inertia", "linear_damping"), 0.5 + worse, worse, 0.01, numbers, 30.0
+                name,
+                () if name == "nothing" else ("inertia", "linear_damping"),
+                0.5 + worse,
+                worse,
+                0.01,
+                numbers,
+                30.0,
             )
             for name, worse, numbers in rows
         ),

@@ -3,8 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from cpfls_cli.flightlog.clock import increasing_rows
-from cpfls_cli.flightlog.repair import count_saturated, fill, find_spikes
+from cpfls_cli.flightlog.repair import count_saturated, fill, find_spikes, increasing_rows
 
 STAMPS = hnp.arrays(float, st.integers(2, 40), elements=st.one_of(st.integers(0, 20).map(float), st.just(np.nan)))
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cpfls_cli.flightlog.logging_rates import log_faster
+from cpfls_cli.flightlog.stated_vehicle import log_faster
 
 
 @pytest.mark.parametrize(

@@ -86,12 +86,7 @@ def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
 def test_a_kind_of_log_knows_its_columns_before_their_words_are_read():
     names = "vehicle_angular_velocity.xyz[0] vehicle_angular_velocity.xyz[1] vehicle_angular_velocity.xyz[2]"
     named = first(f"{names} sensor_gyro.x sensor_gyro.y sensor_gyro.z", "body_rate", "PX4 1.14.0")
-    assert (named.group.columns, named.unit, named.frame, named.known) == (
-        tuple(names.split()),
-        "rad/s",
-        "FRD",
-        "PX4",
-    )
+    assert (named.group.columns, named.unit, named.frame, named.known) == (tuple(names.split()), "rad/s", "FRD", "PX4")
 
 
 def test_of_an_autopilot_only_known_columns_drive_rotors():

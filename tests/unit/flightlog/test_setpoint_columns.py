@@ -84,7 +84,7 @@ def px4(own, asked):
 def test_setpoints_of_px4(own, asked):
     known, proposal = found(px4(own, asked), "PX4 1.15.0")
     assert list(known) == [
-        *("setpoint_position", "setpoint_attitude", "setpoint_body_rate", "setpoint_thrust", "sticks"),
+        *("setpoint_position", "setpoint_attitude", "setpoint_body_rate", "setpoint_thrust", "sticks")
     ]
     assert known["setpoint_attitude"].columns.columns == tuple(f"vehicle_attitude_setpoint.q_d[{i}]" for i in range(4))
     assert known["setpoint_attitude"].columns.unit == "1"

@@ -84,10 +84,7 @@ def test_what_is_nowhere_asked_for_drops_no_sample():
     flight = read_signals(
         log(x=wished, q=np.full((SAMPLES, 1), np.nan)),
         settings(
-            {
-                "setpoint_position": mapped("m", *columns_of("x")),
-                "setpoint_thrust": mapped("1", "q0", required=False),
-            }
+            {"setpoint_position": mapped("m", *columns_of("x")), "setpoint_thrust": mapped("1", "q0", required=False)}
         ),
     )
     assert len(flight.time) == SAMPLES

@@ -1,13 +1,14 @@
 """Topics with clocks of their own, put on the clock of one: what is interpolated, what is held, what is absent."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
-from cpfls_cli.flightlog.topics import hold_previous, interpolate, on_one_clock, stamped_rates, topic_and_field
+from cpfls_cli.flightlog.topics import interpolate, on_one_clock, stamped_rates, topic_and_field
 
 GYRO = 0.004 * np.arange(500)
 SLOW = 0.001 + 0.02 * np.arange(100)
@@ -215,7 +216,7 @@ def test_clock_that_is_too_slow_is_warned_of():
     assert warnings[0].startswith("topic gyro (250 Hz) is downsampled to the clock of slow (50 Hz)")
 
 
-@pytest.mark.parametrize("between", [interpolate, hold_previous])
+@pytest.mark.parametrize("between", [interpolate, partial(interpolate, hold=True)])
 def test_pauses_are_absent_and_absent_values_are_passed_over(between):
     time = np.array([0.0, 0.1, 0.2, 0.9, 1.0, 1.1])
     values = np.array([1.0, np.nan, 3.0, 4.0, 5.0, 5.0])
@@ -226,7 +227,7 @@ def test_pauses_are_absent_and_absent_values_are_passed_over(between):
     assert result[6] == pytest.approx(4.5 if between is interpolate else 4.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("between", [interpolate, hold_previous])
+@pytest.mark.parametrize("between", [interpolate, partial(interpolate, hold=True)])
 def test_stamps_that_go_back_or_repeat_are_passed_over_and_nothing_gives_nothing(between):
     time = np.array([0.0, 0.1, 0.1, 0.05, 0.2])
     values = np.array([0.0, 1.0, 9.0, 9.0, 2.0])

@@ -8,10 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.airframe import airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import _angle_unit, doubt_reading
-from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import column_groups, named_signals
 from cpfls_cli.flightlog.proposal import known_log, propose
-from cpfls_cli.flightlog.recognised import Seen
+from cpfls_cli.flightlog.recognised import LogTable, Seen
 from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion
 
 GYRO, ACC = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z")
@@ -226,11 +225,7 @@ def test_what_is_chosen_is_no_rival_of_itself():
 
 
 @pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        ([0, 1, 1], "gyro_y and gyro_z have the same values"),
-        ([0, 1, 3], "gyro_z never changes"),
-    ],
+    ("columns", "said"), [([0, 1, 1], "gyro_y and gyro_z have the same values"), ([0, 1, 3], "gyro_z never changes")]
 )
 def test_a_column_that_is_another_one_or_nothing_makes_a_guess(columns, said):
     rate = np.column_stack([OWN.rate, np.zeros(len(OWN.time))])[:, columns]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.vehicle_kind import forward_flight, other_vehicle, refuse_other_vehicle
+from cpfls_cli.flightlog.stated_vehicle import forward_flight, other_vehicle, refuse_other_vehicle
 
 SURFACES = {"SERVO1_FUNCTION": 4.0, "SERVO2_FUNCTION": 19.0, "SERVO3_FUNCTION": 70.0, "SERVO4_FUNCTION": 21.0}
 MOTORS = {f"SERVO{output}_FUNCTION": 32.0 + output for output in range(1, 5)}

@@ -7,19 +7,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents, log_flights
-from tests.builders.blackbox_logs import (
-    BATTERY,
-    BEEP,
-    END,
-    FACTS,
-    FIELDS,
-    NAMES,
-    RESUMED,
-    SLOW,
-    flight,
-    frames,
-    header,
-)
+from tests.builders.blackbox_logs import BATTERY, BEEP, END, FACTS, FIELDS, NAMES, RESUMED, SLOW, flight, frames, header
 
 
 @pytest.fixture

@@ -93,11 +93,7 @@ def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
             "cannot be read as MATLAB: ",
         ),
         ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
-        (
-            "log.h5",
-            b"MATLAB 5.0 MAT-file".ljust(126),
-            "cannot be read as MATLAB: ",
-        ),
+        ("log.h5", b"MATLAB 5.0 MAT-file".ljust(126), "cannot be read as MATLAB: "),
     ],
     ids=["empty", "broken", "cut", "under another ending"],
 )

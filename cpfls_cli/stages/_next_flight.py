@@ -1,8 +1,8 @@
-"""Command `trajectory` for a next flight: plan what settles a diagnosis, or tells named effects apart."""
+"""The next flight of `trajectory`: plan what settles a diagnosis, or separates named effects."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,18 +10,14 @@ import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.gap_flights import TRAINING
-from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
-from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
-from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
 from cpfls_cli.commands.numbers import with_numbers
-from cpfls_cli.commands.trajectory import figure_paths, to_simulate
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
-from cpfls_cli.export.mission import waypoint_lines
+from cpfls_cli.flights.path import PathQuestion, PlannedPath
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
@@ -39,12 +35,11 @@ from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between,
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
-from cpfls_cli.pages.next_flight import advice_words, notes_blocks, size_words
-from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.trajectory import answer, demand_sentences, figure_names, path_figures, plan_blocks
-from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.pages.effects import unit_words
+from cpfls_cli.report.numbers import number
 from cpfls_cli.simulation.inverse import flyability
+from cpfls_cli.stage import Run
+from cpfls_cli.stages._demand import demand_sentences
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.weak_form.windows import common_windows
@@ -77,38 +72,34 @@ class Case:
     notes: tuple[str, ...]
 
 
-def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
-    """Plan the flight that tells most, and write it with waypoints for an autopilot."""
-    study = job.study
-    job = with_numbers(job, "trajectory", None)
-    inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})
-    waypoints = job.output.with_name(f"{job.output.stem}-waypoints.csv")
-    figures = figure_paths(job, figure_names(held=False) if plot else ())
-    check_outputs(job, waypoints, *figures)
+def waypoints_path(run: Run) -> dict[Path, str]:
+    """Name the file of waypoints that an autopilot flies, with its form."""
+    return {run.output.with_name(f"{run.output.stem}-waypoints.csv"): "csv"}
+
+
+def planned(run: Run, diagnosis: Path | None = None) -> PlannedPath | None:
+    """Plan the flight that decides most; None in a dry run."""
+    study = run.study
+    with_numbers(run, "trajectory", None)
+    run.take({"diagnosis": diagnosis} if diagnosis else {})
     with settings_of("trajectory", study):
         period = min(_PERIOD, study.gap.window_s / _SAMPLES_IN_A_WINDOW)
         room = room_of(study.trajectory, study.vehicle, study.gap.ground_height_m, period)
     case = _named(study, room) if diagnosis is None else _left_open(study, diagnosis)
-    if job.dry_run:
-        return nothing_written(job)
+    if run.dry_run:
+        return None
     asked = goal(case.questions, case.flights, room, case.logging)
-    flight = next_flight(asked, generator(study, "next-flight"), job.progress)
-    planned = room.planned(flight.path, study.trajectory.sample_time_s)
-    demand = flyability(vars(planned), study.vehicle, study.trajectory.tilt_max_rad)
-    problems = demand_sentences(demand, planned)
+    flight = next_flight(asked, generator(study, "next-flight"), run.progress)
+    path = room.planned(flight.path, study.trajectory.sample_time_s)
+    demand = flyability(vars(path), study.vehicle, study.trajectory.tilt_max_rad)
+    problems = demand_sentences(demand, path)
     if problems:
-        raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; lower trajectory.limits"]))
-    questions, notes = _told(study, asked, flight, planned)
-    planned = repeated(planned, study.trajectory, study.vehicle.gravity_m_s2)
-    record = finish(job, TrajectoryRecord.of(planned, questions), inputs)
-    write_text(waypoints, waypoint_lines(record))
-    source = source_of(job, record)
-    for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
-        write_text(path, drawn.picture.svg)
-    blocks = [*plan_blocks(planned, demand, None), *answer(source), *notes_blocks([*case.notes, *notes])]
-    blocks += [Text(f"written beside it: {', '.join(map(str, (waypoints, *figures)))}")]
-    files = {"waypoints": str(waypoints), "figures": [str(path) for path in figures]}
-    return Outcome(record.summary | files | {"duration_s": planned.duration}, tuple(blocks), next=(to_simulate(job),))
+        raise ComputationError("\n".join([*problems, f"{run.output}: no path was written; lower trajectory.limits"]))
+    questions, notes = _questions(study, asked, flight, path)
+    for note in dict.fromkeys((*case.notes, *notes)):
+        run.note(note)
+    path = repeated(path, study.trajectory, study.vehicle.gravity_m_s2)
+    return PlannedPath.of(path, demand, study.trajectory, questions=questions)
 
 
 def _effects(study: Study) -> list[Effect]:
@@ -199,28 +190,46 @@ def _open_effects(
     return [], unseen
 
 
-def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
-    """Judge the path that was found, as planned and as flown, beside other flights."""
+def _questions(
+    study: Study, asked: Goal, flight: NextFlight, planned: Trajectory
+) -> tuple[list[PathQuestion], list[str]]:
+    """Judge the path that was found, as planned and as flown, against other flights."""
     room, logging = asked.room, asked.logging
     answers = asked.answers(planned_signals(planned, room, logging))
     usual = asked.answers(planned_signals(room.planned(flight.random[len(flight.random) // 2]), room, logging))
     again = asked.answers(None)
     flown, notes = _flown(study, asked, planned)
-    names = [(each.true.candidate.effect.name, each.rival.name if each.rival else "") for each in asked.questions]
-    return QuestionGroup(
-        true=tuple(true for true, _ in names),
-        rival=tuple(rival for _, rival in names),
-        size=tuple(size_words(each.true.candidate.effect, physical_values(each.true)) for each in asked.questions),
-        likely=np.array([each.likely for each in answers]),
-        sure=np.array([each.sure for each in answers]),
-        likely_flown=np.array([each.likely if each else np.nan for each in flown]),
-        flown=np.array([each.sure if each else np.nan for each in flown]),
-        again=np.array([each.sure if len(each.evidence.gram) else np.nan for each in again]),
-        random=np.array([each.sure for each in usual]),
-        least=np.array([each.least_size for each in answers]),
-        smallest=tuple(_smallest(*pair) for pair in zip(asked.questions, answers, strict=True)),
-        advice=tuple(advice_words(CATALOGUE[true], CATALOGUE.get(rival)) for true, rival in names),
-    ), notes
+    rows = zip(asked.questions, answers, flown, again, usual, strict=True)
+    return [
+        PathQuestion(
+            true=(true := each.true.candidate.effect.name),
+            rival=(rival := each.rival.name if each.rival else ""),
+            size=size_words(each.true.candidate.effect, physical_values(each.true)),
+            likely=own.likely,
+            sure=own.sure,
+            likely_flown=by_autopilot.likely if by_autopilot else np.nan,
+            flown=by_autopilot.sure if by_autopilot else np.nan,
+            again=once_more.sure if len(once_more.evidence.gram) else np.nan,
+            random=random.sure,
+            least=own.least_size,
+            smallest=_smallest(each, own),
+            advice=advice_words(CATALOGUE[true], CATALOGUE.get(rival)),
+        )
+        for each, own, by_autopilot, once_more, random in rows
+    ], notes
+
+
+def size_words(effect: Effect, values: Mapping[str, float]) -> str:
+    """Write the numbers of an effect that are not zero."""
+    units = {each.name: unit_words(each.unit) for each in effect.numbers}
+    return ", ".join(f"{name} = {number(value, 3)} {units[name]}".rstrip() for name, value in values.items() if value)
+
+
+def advice_words(effect: Effect, rival: Effect | None) -> str:
+    """Give the flight that the catalogue advises."""
+    if rival is None:
+        return effect.excitation
+    return effect.rivals.get(rival.name) or rival.rivals.get(effect.name) or effect.excitation
 
 
 def _smallest(question: Question, answer: Answer) -> str:

@@ -1,47 +1,63 @@
-"""Command `trajectory`: plan a path in space or the rotations of a held vehicle, and check it against the vehicle."""
+"""Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish, go_on, require_numbers
-from cpfls_cli.artifacts.output import write_files
-from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
-from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts
+from cpfls_cli.artifacts.job import check_outputs, require_numbers
+from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
+from cpfls_cli.flights.path import DERIVATIVES, Excited, PlannedPath
 from cpfls_cli.logs.csv_log import read_csv, row_lines
-from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.trajectory import (
-    absolute_jerk,
-    answer,
-    demand_sentences,
-    figure_names,
-    guessed_words,
-    mission_blocks,
-    path_figures,
-    plan_blocks,
-)
-from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Command, Outcome, nothing_written
+from cpfls_cli.pages.effects import effect_title
+from cpfls_cli.pages.flight import draw_attitude, draw_rotation
+from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, style_of
+from cpfls_cli.report.numbers import plain
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
 from cpfls_cli.simulation.room_left import RoomLeft, room_left
+from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages import _next_flight as next_flight
+from cpfls_cli.stages._demand import demand_sentences
+from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
+from cpfls_cli.stages._path_options import (
+    Added,
+    BandOption,
+    BoxOption,
+    DurationOption,
+    ExciteOption,
+    ForOption,
+    HeightOption,
+    HomeOption,
+    HoverOption,
+    MissionOption,
+    PlotOption,
+    RepeatOption,
+    SignalOption,
+    SizeOption,
+    ToTellOption,
+    WaypointsOption,
+    option_overrides,
+    require_no_room,
+)
 from cpfls_cli.trajectory.consistency import check_waypoints
 from cpfls_cli.trajectory.excited import added_motion
-from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
-from cpfls_cli.words import did_you_mean
+from cpfls_cli.words import did_you_mean, joined
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PlanAt = Callable[[float], PlannedRotation]
 """Samples a plan with a sample time in s."""
@@ -65,53 +81,130 @@ class Flight:
         Samples it anew, two runs at most, for a look between its samples.
     excitation : Excitation or None
         Of a held vehicle, where the path is optimised.
-    excited : ExcitedGroup or None
+    excited : Excited or None
         What is added to the setpoints.
     """
 
     planned: PlannedRotation
     at: PlanAt
     excitation: Excitation | None = None
-    excited: ExcitedGroup | None = None
+    excited: Excited | None = None
 
 
-def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mission | None = None) -> Outcome:
-    """Plan the path of a study and write it."""
-    mission = mission or Mission()
-    inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
-    settings = _settings(job.study, waypoints)
-    require_numbers(job, "trajectory", whole=not settings.held)
-    figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
-    check_outputs(job, *figures, *mission_paths(job, mission))
+def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
+    """Draw pop to displacement over the first move: Figure 2 of the paper."""
+    move = r.first_leg()
+    panels = stacked(figure, len(DERIVATIVES))
+    for axes, peak in zip(panels, r.peaks, strict=True):
+        curve = move.curves[peak.name]
+        line(axes, move.time, curve, **style_of(0))
+        jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
+        axes.set_title(f"{peak.name}{jumps}")
+        axes.set_ylabel(peak.unit)
+        axes.axhline(0.0, color="#999999", linewidth=0.6)
+        for limit in (-peak.limit, peak.limit) if np.isfinite(peak.limit) else ():
+            axes.axhline(limit, **BASELINE)
+    panels[-1].set_xlabel("time, s")
+
+
+FIGURES = {
+    "derivatives": Drawn(
+        f"Seven curves over time: {', '.join(DERIVATIVES)}", 8.6, _draw_derivatives, lambda r: not r.held
+    ),
+    "attitude": Drawn("Roll and pitch angle over time", 2.7, draw_attitude, lambda r: not r.held),
+    "rotation": Drawn(
+        "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw_rotation, lambda r: r.held
+    ),
+}
+
+
+def _overrides(**given: Any) -> list[str]:
+    """Write the options as overrides of the config, which the file holds with them."""
+    settles = given["to_tell"] is not None or given["diagnosis"] is not None
+    asked = option_overrides(
+        *(given[key] for key in ("waypoints", "to_tell", "diagnosis", "box", "height", "duration"))
+    )
+    return [*asked, *_added(given).overrides(given["waypoints"], settles, given["duration"])]
+
+
+def _added(given: dict[str, Any]) -> Added:
+    signal = given["signal"]
+    asked = (None if signal is None else signal.value, given["band"], given["size"], given["hover"])
+    return Added(given["repeat"], given["excite"], *asked)
+
+
+@stage(
+    PlannedPath,
+    title="Training path",
+    figures=FIGURES,
+    words={"plain": plain, "axes": AXES, "effect_title": effect_title},
+    study=True,
+    overrides=_overrides,
+)
+def trajectory(
+    run: Run,
+    waypoints: WaypointsOption = None,
+    to_tell: ToTellOption = None,  # noqa: ARG001  # the config has it
+    diagnosis: ForOption = None,
+    box: BoxOption = None,
+    height: HeightOption = None,
+    duration: DurationOption = None,  # noqa: ARG001  # the config has it
+    hover: HoverOption = None,
+    repeat: RepeatOption = None,
+    excite: ExciteOption = None,
+    signal: SignalOption = None,
+    band: BandOption = None,
+    size: SizeOption = None,
+    form: MissionOption = None,
+    home: HomeOption = None,
+    plot: PlotOption = False,
+) -> PlannedPath | None:
+    """Plan a path in space or the rotations of a held vehicle, and check it against the vehicle."""
+    mission = mission_of(run.study, [each.value for each in form or []], home)
+    settles = run.study.trajectory.path == "next-flight"
+    if not settles:
+        require_no_room(box, height)
+        Added(repeat, excite, None if signal is None else signal.value, band, size, hover).require_axes(run.study)
+    settings = run.study.trajectory if settles else _settings(run.study, waypoints)
+    names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
+    figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
+    texts = next_flight.waypoints_path(run) if settles else mission_paths(run, mission)
+    check_outputs(run, *figures, *texts)
+    planned = next_flight.planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
+    written = None if planned is None else mission_texts(run, mission, planned, texts)
+    if planned is None or written is None or run.dry_run:
+        return None
+    pictures = (picture_of(FIGURES[name], name, planned) for name in names)
+    run.texts = {path: each.svg for path, each in zip(figures, pictures, strict=True) if each} | written
+    if figures:
+        run.say(f"drawn: {', '.join(map(str, figures))}")
+    if texts:
+        run.say(f"other files: {', '.join(map(str, texts))}")
+    for sentence in mission_words(mission.forms, planned):
+        run.say(sentence)
+    run.also = {"figures": [str(path) for path in figures], "files": [str(path) for path in texts]}
+    run.go_on("simulate", run.output, output=run.beside("flight.h5"))
+    return planned
+
+
+def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> PlannedPath | None:
+    run.take({"waypoints": waypoints} if waypoints else {})
+    require_numbers(run, "trajectory", whole=not settings.held)
     # To optimise takes long; what else can go wrong shows only when it is planned.
-    if job.dry_run and settings.path == "optimised":
-        return nothing_written(job)
-    with settings_of("trajectory", job.study):
-        flight = _flight(job, settings)
-        planned = flight.planned
-        demand, problems = _demand(job.study, settings, planned, flight.at)
+    if run.dry_run and settings.path == "optimised":
+        return None
+    with settings_of("trajectory", run.study):
+        flight = _flight(run, settings)
+        demand, problems = _demand(run.study, settings, flight.planned, flight.at)
     if problems and settings.infeasible == "stop":
-        change = f"{_remedy(job.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
-        raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; {change}"]))
-    record = TrajectoryRecord.of(planned, excited=flight.excited)
-    texts = mission_texts(job, mission, record)
-    if job.dry_run:
-        return nothing_written(job)
-    source = source_of(job, finish(job, record, inputs))
-    drawn = path_figures(source) if figures else ()
-    write_files({path: figure.picture.svg for path, figure in zip(figures, drawn, strict=True)} | texts)
-    blocks = [*plan_blocks(planned, demand, flight.excitation), *answer(source)]
-    blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
-    blocks += mission_blocks(texts, mission.forms, source.record)
-    guessed = guessed_words(job.study.vehicle) if job.open_numbers == "refused" else ()
-    blocks += [Text(problem, "warning") for problem in (*problems, *guessed)]
-    summary = _summary(source.record, planned, demand, flight.excitation, figures)
-    return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks), next=(to_simulate(job),))
-
-
-def to_simulate(job: Job) -> Command:
-    """Give the command that flies the path of a job."""
-    return go_on(job, "simulate", job.output, output=job.beside("flight.h5"))
+        change = f"{_remedy(run.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
+        raise ComputationError("\n".join([*problems, f"{run.output}: no path was written; {change}"]))
+    for problem in problems:
+        run.note(problem)
+    if run.study.vehicle.unknown and run.open_numbers == "refused":
+        unknown = joined(name.replace("_", " ") for name in run.study.vehicle.unknown)
+        run.note(f"{unknown}: null in the config; what the path asks of the rotors was checked with guesses")
+    return PlannedPath.of(flight.planned, demand, settings, excitation=flight.excitation, excited=flight.excited)
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -127,7 +220,7 @@ def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     return settings
 
 
-def _flight(job: Job, settings: TrajectorySettings) -> Flight:
+def _flight(job: Run, settings: TrajectorySettings) -> Flight:
     if settings.held:
         with settings_of("trajectory.rotation", job.study):
             path, excitation = _rotation(job, settings)
@@ -153,10 +246,10 @@ def _flight(job: Job, settings: TrajectorySettings) -> Flight:
     if room is None:
         return Flight(without, at)
     excited = repeated(room.added.onto(plain, gravity), settings, gravity)
-    return Flight(excited, at, None, ExcitedGroup.of(settings.excite, excited, without, room))
+    return Flight(excited, at, None, Excited.of(settings.excite, excited, without, room))
 
 
-def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:
+def _rotation(job: Run, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:
     """Draw a path of full rotations, or optimise it for the model of the study."""
     assert settings.duration_s is not None
     rng, vehicle = generator(job.study, "trajectory"), job.study.vehicle
@@ -274,46 +367,3 @@ def _too_much_without_turn(study: Study, settings: TrajectorySettings) -> bool:
 
     _, problems = _demand(study, still, at(still.sample_time_s), at)
     return bool(problems)
-
-
-def figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
-    """Name the figures of a path, beside its artifact."""
-    return tuple(job.output.with_name(f"{job.output.stem}-{name}.svg") for name in names)
-
-
-def _summary(
-    record: TrajectoryRecord,
-    planned: PlannedRotation,
-    demand: Flyability,
-    excitation: Excitation | None,
-    figures: Sequence[Path],
-) -> dict[str, Any]:
-    """Describe a plan for machines: its artifact holds samples, the plan is known exactly."""
-    summary: dict[str, Any] = {
-        "figures": [str(path) for path in figures],
-        "samples": len(planned.time),
-        "duration_s": planned.duration,
-        **record.summary,
-        "max_thrust_n": float(demand.thrust.max()),
-    }
-    if isinstance(planned, Trajectory):
-        summary |= {
-            "max_tilt_rad": float(demand.tilt.max()),
-            "max": {**planned.maxima, "position": planned.maxima["displacement"]},
-            "legs": [_leg_summary(leg) for leg in planned.legs],
-        }
-    if excitation is not None:
-        random = {"best": float(excitation.random.min()), "median": float(np.median(excitation.random))}
-        summary |= {"condition_number": excitation.condition_number, "random": random}
-        summary["evaluations"] = excitation.evaluations
-    return summary
-
-
-def _leg_summary(leg: Leg) -> dict[str, Any]:
-    return {
-        "begin_s": leg.begin,
-        "duration_s": leg.duration,
-        "displacement_m": leg.vector.tolist(),
-        "limited_by": list(leg.limited_by),
-        "jerk_integral_m_s2": absolute_jerk(leg),
-    }

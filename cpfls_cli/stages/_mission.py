@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mission import Home, qgc_plan, system_id_lines, waypoint_lines
+from cpfls_cli.flights.path import PlannedPath
 
 CSV, PX4, ARDUPILOT = "csv", "px4", "ardupilot"
 
@@ -74,20 +74,35 @@ def mission_paths(job: Job, mission: Mission) -> dict[Path, str]:
     return {path: form for form in mission.forms for path in paths[form]}
 
 
-def mission_texts(job: Job, mission: Mission, record: TrajectoryRecord) -> dict[Path, str]:
+def mission_texts(job: Job, mission: Mission, planned: PlannedPath, paths: Mapping[Path, str]) -> dict[Path, str]:
     """Write a path as the files that are asked for."""
     vehicle = job.study.vehicle
     most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
     hover = vehicle.mass_kg * vehicle.gravity_m_s2 / most
-    run = float(record.time[-1] if record.run is None else record.run.end[0])
-    texts, axes = {}, iter(() if record.excited is None else record.excited.axis)
-    for path, form in mission_paths(job, mission).items():
+    run = float(planned.runs[0].end if planned.runs else planned.time[-1])
+    texts, axes = {}, iter(planned.excited.axes if planned.excited else ())
+    for path, form in paths.items():
         if form == CSV:
-            texts[path] = waypoint_lines(record)
+            texts[path] = waypoint_lines(planned)
         elif form == PX4:
             assert mission.home is not None, "asked for before"
-            texts[path] = qgc_plan(record, mission.home)
+            texts[path] = qgc_plan(planned, mission.home)
         else:
-            assert record.excited is not None, "asked for before"
-            texts[path] = system_id_lines(record.excited, next(axes), run, hover)
+            assert planned.excited is not None, "asked for before"
+            texts[path] = system_id_lines(planned.excited, next(axes), run, hover)
     return texts
+
+
+def mission_words(forms: Sequence[str], planned: PlannedPath) -> Iterator[str]:
+    """Say what each autopilot does with the files."""
+    if PX4 in forms:
+        yield (
+            "PX4 flies the mission in its own time, by its own limits, at rest at each point: runs are alike, but do "
+            "not take as long as those planned. Load it in QGroundControl, and check heights and the way back."
+        )
+    if ARDUPILOT in forms:
+        times = f"{len(planned.runs)} times" if len(planned.runs) > 1 else "once"
+        yield (
+            f"ArduPilot makes the sweeps itself, in hover: switch to System ID mode {times} for each axis; the path of "
+            "the file is not flown."
+        )
