@@ -170,7 +170,7 @@ class Run(Job):
         if self.writes:
             refuse_own(path, self.output)
         check_output(path, self.force, self.inputs)
-        self.text = path, text
+        self.texts[path] = text
         self.also["file"], self.last_words = str(path), f"{path}: {what}"
 
     def _of(self, name: str) -> Run | _Taken:
@@ -277,24 +277,20 @@ class Stage:
             self._check(run, run.output)
         with run.until_written:
             found = self.function(run, **given)
-            results = dict(found) if self.folder and found is not None else {"": found}
-            if run.writes and found is not None:
+            if found is None:
+                return self._would(run)
+            results = dict(found) if self.folder else {"": found}
+            if self.fills and run.writes:
+                run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
+            several = len(results) > 1
+            texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
+            texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+            if run.writes:
                 self._write(run, run.output, results)
-        if found is None:
-            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
-            where = where if run.writes else ""
-            named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if self.study else ""
-            return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+            else:
+                write_files(run.texts)
         for act in run.afterwards:
             act()
-        if self.fills and run.writes:
-            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
-        several = len(results) > 1
-        texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
-        texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        if run.writes:
-            self._write(run, run.output, results)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -307,8 +303,16 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else run.text and run.text[0],
+            written=run.output if run.writes else next(iter(run.texts), None),
         )
+
+    def _would(self, run: Run) -> Outcome:
+        """Say of a dry run that it could go on."""
+        where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
+        where = where if run.writes else ""
+        named = {"output": str(run.output)} if run.writes else {}
+        config = "the config and " if self.study else ""
+        return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
 
     def info(self, path: Path) -> Outcome:
         """Say again what a file answers, where it comes from and what it holds."""

@@ -105,9 +105,9 @@ def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) 
 
 
 def vehicle_words(vehicle: object, part: str) -> list[str]:
-    """Say one part of what is said of a vehicle that was found, sentence by sentence (`vehicle_part.md.j2`)."""
+    """Say one part of what is said of a vehicle that was found, sentence by sentence (`said_of_vehicle.md.j2`)."""
     own = import_module("cpfls_cli.stages.vehicle").WORDS
-    blocks = page.blocks(page.words("vehicle_part", vehicle, added=own, part=part))
+    blocks = page.blocks(page.words("said_of_vehicle", vehicle, added=own, part=part))
     return [block.text for block in blocks if isinstance(block, Text)]
 
 

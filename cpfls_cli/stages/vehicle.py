@@ -280,7 +280,7 @@ def vehicle(
     held_out: HeldOutOption = None,
     resume: ResumeOption = False,
     write_config: WriteConfigOption = None,
-    anyway: AnywayOption = False,
+    anyway: AnywayOption = False,  # noqa: ARG001  # the config has it
 ) -> Vehicle | None:
     """Find a vehicle in flights, and judge it on those held out."""
     others = held_out or []
