@@ -10,19 +10,17 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.page import blocks as blocks_of
 from cpfls_cli.pages import diagnosis, disagreement, model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
-from cpfls_cli.stages.vehicle import vehicle
-from tests.builders import gap_artifacts, vehicle_models
+from tests.builders import gap_artifacts
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("flight", "model", "sweep")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS)
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -60,9 +58,6 @@ def answered(told):
     def of(name):
         if name in told:
             return told[name].source, told[name].outcome.blocks
-        if name == "vehicle":
-            source = vehicle_models.source_of_vehicle(vehicle_models.vehicle_of(vehicle_models.whole()), f"{name}.h5")
-            return source, tuple(blocks_of(vehicle.text(source.record, about=source)))
         made = getattr(gap_artifacts, name)()
         source = source_of(
             record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
