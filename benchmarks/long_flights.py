@@ -34,16 +34,16 @@ from benchmarks.blind.generator import generate, write
 from benchmarks.blind_study.fly import config as config_of
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
-from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
-from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.study import resolved_yaml
-from cpfls_cli.files import seal_of, text_sha256
+from cpfls_cli.files import seal_of
+from cpfls_cli.flights.flight import MOTION, Flight
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import Problem, decode, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.report.canvas import GREY, legend_above, plot, stacked, style_of
+from cpfls_cli.store import read
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "long-flights.svg"
@@ -117,10 +117,10 @@ def of_effects(sizes: list[int]) -> None:
         logs = sorted(folder.glob("train_*.csv"))
         by_command("gap", model, *logs, config=study)
         by_command("import", flight, logs[0], config=study)
-        flown = read_record(flight, FlightRecord)
+        flown, origin = read(flight, Flight)
         signals = {name: values for name, values in flown.signals.items() if name != "time"}
         for samples in sizes:
-            write_over_and_over(flight, samples, signals, float(flown.time[1]), flown.origin.config, 0.0)
+            write_over_and_over(flight, samples, signals, float(flown.time[1]), origin.config, 0.0)
             predicted = by_command("predict", output, model / "extended.h5", flight, config=study)
             rows.append((samples, *predicted, output.stat().st_size / 2**20))
     columns = ("samples", "`cpfls predict` of a model with effects, s", "its peak memory, MB", "its file, MB")
@@ -141,8 +141,15 @@ def write_over_and_over(
     """Write a flight artifact block by block: a flight over and over, with noise as a share of its scatter."""
     rng = np.random.default_rng(6)
     with h5py.File(path, "w") as file:
-        header = {"format": "cpfls/flight", "schema_version": SCHEMA_VERSION, "cpfls_version": __version__, "seed": 6}
-        file.attrs.update(header | {"config_sha256": text_sha256(config)})
+        header = {
+            "format": "cpfls/flight",
+            "schema_version": SCHEMA_VERSION,
+            "cpfls_version": __version__,
+            "seed": 6,
+            "stage": "simulate",
+            "cautions": "",
+        }
+        file.attrs.update(header)
         file["config"] = np.bytes_(config.encode())
         file["time"] = period * np.arange(samples)
         for name, values in signals.items():

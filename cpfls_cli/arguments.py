@@ -216,3 +216,8 @@ SchedulerOption = Annotated[
         "--scheduler", metavar="ADDRESS", help="Evaluate on the workers of this Dask scheduler (tcp://host:port)."
     ),
 ]
+
+OtherVehicleOption = Annotated[
+    bool,
+    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
+]

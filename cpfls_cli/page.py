@@ -176,8 +176,8 @@ def _environment(folder: Path, added: _Added) -> Environment:
     return made
 
 
-def environment(folder: Path, added: Mapping[str, Any] = _NOTHING) -> Environment:
-    """Make what renders the templates of a folder, with what a stage adds."""
+def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
+    """Give what renders the templates of a folder, with what a stage adds."""
     return _environment(folder, _Added(added))
 
 
@@ -193,7 +193,8 @@ def words(
     **more : object
         What it knows of this result.
     """
-    return environment(folder, added or _NOTHING).get_template(f"{template}.md.j2").render(r=given, **more)
+    own = environment(folder, _NOTHING if added is None else added)
+    return own.get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass

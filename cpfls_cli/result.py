@@ -76,15 +76,17 @@ def about(text: str, *axes: str, default: Any = MISSING, **more: Any) -> Any:
     return field(default=default, metadata={"about": About(text, axes, **more)})
 
 
-def part(default: Any = MISSING, kind: Any = None) -> Any:
+def part(default: Any = MISSING, kind: Any = None, *, brief: bool = True) -> Any:
     """Make a field a result itself, a mapping from names to results, or a tuple of results: a table.
 
     Parameters
     ----------
     kind : type or None
         What is written, where the field may hold more than that.
+    brief : bool
+        Whether `--json` shows it too.
     """
-    return field(default=default, metadata={"about": None, "kind": kind})
+    return field(default=default, metadata={"about": None, "kind": kind, "brief": brief})
 
 
 @dataclass_transform(eq_default=False, kw_only_default=True, frozen_default=True, field_specifiers=(about, part))
@@ -106,6 +108,8 @@ class Described(NamedTuple):
         `MISSING` where every file must hold it.
     optional : bool
         Whether it may be None.
+    brief : bool
+        Whether `--json` shows it too.
     """
 
     name: str
@@ -113,6 +117,7 @@ class Described(NamedTuple):
     about: About | None
     default: Any
     optional: bool
+    brief: bool = True
 
     @property
     def required(self) -> bool:
@@ -130,7 +135,7 @@ class Described(NamedTuple):
         if self.about is None:
             return None
         if maps(self.kind):
-            return _TextByName if self.scalar is str else _NumberByName
+            return {str: _TextByName, int: _CountByName}.get(self.scalar, _NumberByName)
         return _Line if self.many and get_origin(get_args(self.kind)[0]) is np.ndarray else None
 
     @property
@@ -192,21 +197,23 @@ def described_fields(cls: Any) -> tuple[Described, ...]:
 def _described(cls: Any) -> tuple[Described, ...]:
     hints, annotated = get_type_hints(cls), get_type_hints(cls, include_extras=True)
     return tuple(
-        Described(name, kind or _alone(hints[name]), known, default, NoneType in get_args(hints[name]))
-        for name, known, default, kind in _written(cls, annotated)
+        Described(name, kind or _alone(hints[name]), known, default, NoneType in get_args(hints[name]), brief)
+        for name, known, default, kind, brief in _written(cls, annotated)
     )
 
 
-def _written(cls: Any, annotated: Mapping[str, Any]) -> Iterator[tuple[str, About | None, Any, Any]]:
-    """List fields that are described, or parts, with defaults and kinds: of named tuples and of settings all."""
+def _written(cls: Any, annotated: Mapping[str, Any]) -> Iterator[tuple[str, About | None, Any, Any, bool]]:
+    """List what is described with default, kind and whether it is brief: of named tuples and of settings all."""
     for name in getattr(cls, "_fields", ()):
         own = (each for each in get_args(annotated[name]) if isinstance(each, About))
-        yield name, next(own, None), cls._field_defaults.get(name, MISSING), None
+        known = next(own, None)
+        yield name, known, cls._field_defaults.get(name, MISSING), None, known is None or known.brief
     for each in fields(cls) if is_dataclass(cls) else ():
         if "about" in each.metadata:
-            yield each.name, each.metadata["about"], each.default, each.metadata.get("kind")
+            known, brief = each.metadata["about"], each.metadata.get("brief", True)
+            yield each.name, known, each.default, each.metadata.get("kind"), known.brief if known else brief
         elif issubclass(cls, Settings):
-            yield each.name, _about_setting(each.name, annotated[each.name]), MISSING, None
+            yield each.name, _about_setting(each.name, annotated[each.name]), MISSING, None, True
 
 
 def _about_setting(name: str, hint: Any) -> About | None:
@@ -228,7 +235,7 @@ def _alone(hint: Any) -> Any:
 def plain(given: Any) -> Any:
     """Write a result as JSON knows it: brief fields, and properties in its ``SHOWN``; what is not finite is null."""
     if (is_dataclass(given) or hasattr(given, "_fields")) and not isinstance(given, type):
-        own = [each.name for each in described_fields(type(given)) if each.about is None or each.about.brief]
+        own = [each.name for each in described_fields(type(given)) if each.brief]
         return {name: plain(getattr(given, name)) for name in (*getattr(given, "SHOWN", ()), *own)}
     if isinstance(given, Mapping):
         return {name: plain(each) for name, each in given.items()}
@@ -258,6 +265,11 @@ def datasets(cls: Any, prefix: str = "", row: str = "", required: bool = True) -
 class _NumberByName(NamedTuple):
     name: Annotated[str, About("whose value it is")]
     value: Annotated[float, About("value", gaps=True)]
+
+
+class _CountByName(NamedTuple):
+    name: Annotated[str, About("of which it is the count")]
+    value: Annotated[int, About("count")]
 
 
 class _TextByName(NamedTuple):

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
+from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import (
     check_folder,
@@ -27,7 +28,8 @@ from cpfls_cli.artifacts.output import (
     write_files,
     write_text,
 )
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.spec import Header, InputFile, Record
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
@@ -157,6 +159,10 @@ class Run(Job):
             refuse_inputs(path, self.inputs)
         return own.files
 
+    def take_also(self, files: Mapping[str, InputFile], of: str = "") -> None:
+        """Take note of files that an input was made from: inputs of all results, or of the one of this name."""
+        self._of(of).files.update(files)
+
     def caution(self, text: str, of: str = "") -> None:
         """Take note of what speaks against all results, or the one of this name."""
         self._of(of).cautions[visible(text)] = None
@@ -207,7 +213,7 @@ class Stage:
     ----------
     function : callable
         Takes a `Run` and what its command line says. It gives a result, or its `Parts`; or, of a stage that fills a
-        folder, results by name, with a page each; or None in a dry run.
+        folder, results by name, with a page each; or None in a dry run; or the outcome of a command that goes on.
     kind : type
         Class of the result.
     title : str
@@ -304,6 +310,8 @@ class Stage:
             found = self.function(run, **given)
             if found is None:
                 return self._would(run)
+            if isinstance(found, Outcome):
+                return found
             streamed = isinstance(found, Parts)
             if isinstance(found, Parts):
                 # What there is to say is known behind the last part.
@@ -345,8 +353,13 @@ class Stage:
         return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
 
     def info(self, path: Path) -> Outcome:
-        """Say again what a file answers, where it comes from and what it holds."""
-        given, origin = store.read(path, self.kind)
+        """Say again what a file answers, where it comes from and what it holds; of a long one no values."""
+        long = store.is_long(path, self.kind)
+        if long:
+            store.check_rows(path, self.kind, store.held_rows(path, self.kind))
+        given, origin = store.read_first(path, self.kind) if long else store.read(path, self.kind)
+        about = source_of_result(given, origin, path, path.name, "")
+        answer = "too long to be shown: its values are in the file" if long else self.text(given, about=about)
         seed = "" if origin.seed is None else f", seed {origin.seed}"
         made = [("made by", f"cpfls {origin.version}{seed}")]
         made += [(role, f"{own.name} (sha256 {own.sha256[:12]})") for role, own in origin.inputs.items()]
@@ -355,9 +368,9 @@ class Stage:
         inputs = {role: vars(own) for role, own in origin.inputs.items()}
         summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "inputs": inputs}
         return Outcome(
-            {**summary, "cautions": list(origin.cautions), "result": plain(given)},
+            {**summary, "cautions": list(origin.cautions), **({} if long else {"result": plain(given)})},
             (
-                *page.blocks(self.text(given, about=source_of_result(given, origin, path, path.name, ""))),
+                *page.blocks(answer),
                 *caution_texts(origin.cautions),
                 Folded("where it comes from", [Facts(made)]),
                 Folded(f"what its {len(rows)} datasets hold", [table]),
@@ -410,13 +423,14 @@ class Stage:
         results = {name: getattr(given, name) if fills.parts else given for name in parts}
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
-            store.require_sound(output / f"{name}.h5", each)
+            if not isinstance(each, Record):
+                store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, self._names(fills)) as folder:
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)
                 made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
-                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+                _write_any(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
             cautions = run.cautions_of(*parts)
             summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -449,9 +463,23 @@ class Stage:
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
 
 
+def _write_any(path: Path, given: Any, origin: store.Origin) -> None:
+    """Write a result, or a record that is none yet."""
+    if not isinstance(given, Record):
+        store.write(path, given, origin)
+        return
+    header = Header(origin.version, origin.seed or 0, origin.config, origin.inputs, origin.cautions)
+    write_record(path, given.with_header(header))
+
+
 def loaded(module: str) -> Stage:
     """Load the stage of a module of `stages`."""
     return next(each for each in vars(import_module(f"cpfls_cli.stages.{module}")).values() if isinstance(each, Stage))
+
+
+def stage_named(name: str) -> Stage:
+    """Load the stage of this name."""
+    return loaded(stage_module({"stage": name}))
 
 
 def stage(

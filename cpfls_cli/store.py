@@ -36,6 +36,8 @@ _LARGEST = 1e150
 """Nothing that is measured or computed comes near; the square of a larger number is none."""
 _BLOCK = 1 << 18
 """Rows that are checked at a time."""
+IN_MEMORY = 500_000
+"""Rows of a result that are held in memory, of a flight 52 MB of motion and torque."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
 _NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
 _HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
@@ -202,16 +204,45 @@ def read(path: Path, kind: type[T]) -> tuple[T, Origin]:
     return given, origin
 
 
-def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
-    """Read a result, where it comes from, and everything in it that its description does not allow."""
+def read_first(path: Path, kind: type[T]) -> tuple[T, Origin]:
+    """Read a result as if it had two rows along ``STREAMED``: all else that it holds, in little memory."""
+    given, origin, _ = examine(path, kind, 2)
+    return given, origin
+
+
+def is_long(path: Path, kind: Any) -> bool:
+    """Tell whether a result has more rows than are held in memory."""
+    axis = getattr(kind, "STREAMED", "")
+    return bool(axis) and (count_rows(path, kind, axis) or 0) > IN_MEMORY
+
+
+def findings_in(path: Path, kind: Any) -> list[str]:
+    """Find everything in a file that its description does not allow; in a long one some rows at a time."""
+    if not is_long(path, kind):
+        return examine(path, kind)[2]
+    names = held_rows(path, kind)
+    with opened_file(path) as file, patient(path):
+        wrong = list(_wrong_rows(file, kind, names))
+    return [*wrong, *(each for each in examine(path, kind, 2)[2] if each.partition(":")[0] not in names)]
+
+
+def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Origin, list[str]]:
+    """Read a result, where it comes from, and everything in it that its description does not allow.
+
+    Parameters
+    ----------
+    rows : int or None
+        Along ``STREAMED``, so many at most.
+    """
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, file.attrs.get("format")  # type: ignore[attr-defined]
         if held != wanted:
-            raise InputError(f"{path}: is a {held}; this command needs a {wanted}")
+            made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
+            raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
         if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
             raise old_file(path, file)
         origin, missing = origin_of(file), list[str]()
-        given = _read(kind, file, missing)
+        given = _read(kind, file, missing, rows)
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
     return given, origin, findings(given)
@@ -316,15 +347,17 @@ def stage_of(path: Path) -> str:
         return ""
 
 
-def _read(kind: Any, group: h5py.Group, missing: list[str]) -> Any:
+def _read(kind: Any, group: h5py.Group, missing: list[str], rows: int | None = None) -> Any:
     given: dict[str, Any] = {}
+    streamed = getattr(kind, "STREAMED", "")
     for own in described_fields(kind):
         if own.name not in group:
             given |= _absent(own, group, missing)
         elif own.rows:
             given[own.name] = _of_rows(own, _read_table(own.rows, group[own.name], missing))
         elif own.about:
-            given[own.name] = _value(own, _values(group, own.name, own))
+            few = slice(rows) if rows is not None and own.about.axes[:1] == (streamed,) else ()
+            given[own.name] = _value(own, _values(group, own.name, own, few))
         elif own.table:
             given[own.name] = _read_table(own.inner, group[own.name], missing)
         elif own.named:
@@ -381,11 +414,12 @@ def _read_lines(own: Described, group: h5py.Group, rows: int, missing: list[str]
     return [each[0] if each else None for each in by_row]
 
 
-def _values(group: h5py.Group, name: str, own: Described) -> np.ndarray[Any, Any]:
-    dataset = dataset_of(group.file, f"{group.name}/{name}")
+def _values(group: h5py.Group, name: str, own: Described, rows: Any = ()) -> np.ndarray[Any, Any]:
+    path = f"{group.name}/{name}".lstrip("/")
+    dataset = dataset_of(group.file, path)
     if dataset is None or dataset.dtype.kind not in _HELD[own.scalar]:
-        raise ValueError(f"{group.name}/{name} holds no {own.scalar.__name__}")
-    array = np.asarray(dataset[()])
+        raise ValueError(f"{path} holds no {own.scalar.__name__}")
+    array = np.asarray(dataset[rows])
     return np.char.decode(array, "utf-8") if array.dtype.kind == "S" else _as(own, array)
 
 

@@ -56,9 +56,9 @@ def _judged(folder, compared):
         "differences": list(found.differences),
         "contradictions": list(found.contradictions),
         "share": found.share,
-        "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},
-        "gap_after": {"value": found.after.value.tolist(), "floors": found.after.floors.tolist()},
-        "floor": found.floor.tolist(),
+        "gap_before": {"value": found.gap.before.tolist(), "floors": found.gap.before_floors.tolist()},
+        "gap_after": {"value": found.gap.after.tolist(), "floors": found.gap.after_floors.tolist()},
+        "floor": found.gap.floor.tolist(),
         "air": None if run.air is None else _air(run.air),
         **simpler,
     }

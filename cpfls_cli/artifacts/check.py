@@ -290,10 +290,30 @@ def _identify(path: Path, file: h5py.File) -> Format:
     return known.spec()
 
 
+_MAKERS = {
+    "flight": "simulate` or `cpfls import",
+    "twin": "simulate",
+    "selection": "reduce",
+    "prediction": "predict",
+    "gains": "tune",
+    "disagreement": "compare",
+    "diagnosis": "diagnose",
+    "extended": "extend",
+    "identified": "identify",
+    "model": "identify",
+    "flight-numbers": "changed",
+}
+"""Commands that made files of earlier versions, by kind or format, where they are not called alike."""
+
+
 def old_file(path: Path, file: h5py.File) -> InputError:
-    """Say of a file of an earlier version that it has to be made again."""
+    """Say of a file of an earlier version which command makes it again."""
     version = file.attrs.get("cpfls_version", "1")
-    return InputError(f"{path}: was written by cpfls {version}, whose files this version does not read; make it again")
+    name = str(file.attrs.get("kind", "") or file.attrs.get("format", "")).removeprefix("cpfls/")
+    return InputError(
+        f"{path}: was written by cpfls {version}, whose files this version does not read; make it again with "
+        f"`cpfls {_MAKERS.get(name, name)}`"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

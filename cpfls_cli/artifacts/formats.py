@@ -5,18 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
-    ("cpfls/flight", ""): "flight.FlightRecord",
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/sweep", ""): "sweep.SweepRecord",
-    ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
-    ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
 }
@@ -38,10 +36,16 @@ def stage_module(attributes: Mapping[str, Any]) -> str:
 
     One with a line before its name is no command: other stages keep what it makes.
     """
-    module = str(attributes.get("stage", "")).replace("-", "_")
+    module = module_of(str(attributes.get("stage", "")))
     names = (module, f"_{module}") if re.fullmatch(r"[a-z]\w*", module) else ()
     folder = Path(__file__).parents[1] / "stages"
     return next((name for name in names if (folder / f"{name}.py").is_file()), "")
+
+
+def module_of(stage: str) -> str:
+    """Name the module of a stage: as the command, with a trailing underscore where Python has that word."""
+    module = stage.replace("-", "_")
+    return f"{module}_" if iskeyword(module) else module
 
 
 def records() -> list[type[Record]]:

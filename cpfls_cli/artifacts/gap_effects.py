@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.playback import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, paired, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.gap.settings import CLEAR, OFF
 from cpfls_cli.playback.errors import AFTER, BEFORE, FADING, MODEL, NOTHING_MOVES, STATED
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 _GROWN = 1.05
 """Ratio of the gaps after and before from which on a channel is marked; two digits show no less."""
-
-_EVALUATED = ("wrench", "actuator")
-"""Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
 
 
 def above_noise(floors: Array) -> BoolArray:
@@ -51,7 +48,7 @@ def effect_summary(effect: NamedEffect) -> dict[str, Any]:
     """Describe an effect for machines."""
     return {
         "name": effect.name,
-        "coefficients": {number.name: estimate_summary(number) for number in effect.coefficients},
+        "coefficients": {number.name: estimate_summary(number) for number in effect.numbers},
         "p_value": effect.p_value,
         "share": effect.share,
         "selection_frequency": effect.selection_frequency,
@@ -107,11 +104,11 @@ class CoefficientGroup:
     @classmethod
     def of(cls, effects: Sequence[NamedEffect]) -> Self:
         """Arrange the numbers of effects."""
-        numbers = [number for effect in effects for number in effect.coefficients]
+        numbers = [number for effect in effects for number in effect.numbers]
         return columns_of(
             cls,
             numbers,
-            effect=tuple(effect.name for effect in effects for _ in effect.coefficients),
+            effect=tuple(effect.name for effect in effects for _ in effect.numbers),
             plausible_low=np.fromiter((number.plausible[0] for number in numbers), float),
             plausible_high=np.fromiter((number.plausible[1] for number in numbers), float),
         )
@@ -157,12 +154,7 @@ class ShapeGroup:
     @classmethod
     def of(cls, effects: Sequence[NamedEffect]) -> Self:
         """Arrange the shapes of effects that are part of the model."""
-        shapes = [
-            (effect.name, name, value)
-            for effect in effects
-            if effect.candidate is not None
-            for name, value in effect.candidate.shape.items()
-        ]
+        shapes = [(effect.name, name, value) for effect in effects for name, value in effect.shape.items()]
         return cls(
             effect=tuple(effect for effect, _, _ in shapes),
             name=tuple(name for _, name, _ in shapes),
@@ -261,19 +253,15 @@ class NamedEffectsGroup:
 
     def _effect(self, index: int) -> NamedEffect:
         rows, name = self.effect, self.effect.name[index]
-        entry, shape = CATALOGUE.get(name), self.shape.of_effect(name)
-        linear = self.linear.of_effect(name)
-        entry = None if entry is None else entry.form(len(linear), shape)
-        known = entry is not None and entry.kind in _EVALUATED and len(shape) == len(entry.shapes)
         return NamedEffect(
-            name,
-            Candidate(entry, shape) if entry and known else None,
-            linear,
-            self.coefficient.of_effect(name),
-            float(rows.p_value[index]),
-            float(rows.share[index]),
-            float(rows.selection_frequency[index]),
-            rows.sentence[index],
+            name=name,
+            shape=self.shape.of_effect(name),
+            linear=self.linear.of_effect(name),
+            numbers=self.coefficient.of_effect(name),
+            p_value=float(rows.p_value[index]),
+            share=float(rows.share[index]),
+            selection_frequency=float(rows.selection_frequency[index]),
+            sentence=rows.sentence[index],
         )
 
 
@@ -315,15 +303,6 @@ class GapChangeGroup:
         return any(self.channel[index].startswith("force") for index in self.known)
 
     @property
-    def loud(self) -> tuple[list[int], list[int]]:
-        """Indices of the channels that are above noise before or after, or the largest; and of all other known ones."""
-        above = above_noise(self.before_floors) | above_noise(self.after_floors)
-        loud = [index for index in self.known if above[index]]
-        if not loud and self.known:
-            loud = [int(np.nanargmax(self.before_floors))]
-        return loud, [index for index in self.known if index not in loud]
-
-    @property
     def grown(self) -> BoolArray:
         """Channels whose gap is above noise and larger with the effects than without, shape (channel,)."""
         return above_noise(self.after_floors) & (self.after_floors > _GROWN * self.before_floors)
@@ -342,22 +321,6 @@ class GapChangeGroup:
     def summary_after(self) -> dict[str, Any]:
         """The gap with the effects, for machines."""
         return gap_summary(self.after, self.after_floors)
-
-
-@record
-class StretchGroup:
-    """Stretches of time with the largest gap, largest first."""
-
-    flight: Array = dataset("index of the flight; stretches of time with the largest gap, first", "stretch")
-    start_s: Array = dataset("on the clock of the flight", "stretch", path="start", units="s")
-    end_s: Array = dataset("on the clock of the flight", "stretch", path="end", units="s")
-    channel: tuple[str, ...] = dataset("channel of the gap", "stretch")
-    rms_floors: Array = dataset("root mean square of the gap there, in floors", "stretch", path="floors")
-
-    def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
-        """List the largest: flight, start and end in s, channel, floors."""
-        rows = (row.values() for row in rows_of(self)[:most])
-        return [(int(flight), start, end, channel, floors) for flight, start, end, channel, floors in rows]
 
 
 class EndError(NamedTuple):

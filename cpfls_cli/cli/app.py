@@ -14,16 +14,10 @@ from cpfls_cli.arguments import (
     ArtifactsArgument,
     ChooseOnOption,
     DiagnosisArgument,
-    DisagreementArgument,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightsArgument,
-    FlownArgument,
-    FolderOption,
-    HeldOutOption,
-    LogArgument,
     LogsArgument,
     ModelOption,
     ResumeOption,
@@ -95,66 +89,6 @@ def _main(
 
 
 @_command()
-def simulate(
-    config: ConfigArgument,
-    trajectory: FlownArgument,
-    output: OutputOption,
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model",
-            metavar="MODEL",
-            help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
-            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
-        ),
-    ] = None,
-    mode: Annotated[
-        str | None,
-        typer.Option(
-            "--mode",
-            metavar="MODE",
-            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
-            "Overrides simulation.mode.",
-        ),
-    ] = None,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            metavar="NAME=VALUE[,VALUE...]",
-            help="Fly with an effect of `cpfls effects`, in closed loop: its coefficients, then shapes; or "
-            "NAME.coefficient=VALUE; may be repeated.",
-        ),
-    ] = None,
-    gusts: Annotated[
-        bool,
-        typer.Option(
-            "--gusts",
-            help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop. Along a FLIGHT: beside it "
-            "fly vehicles that the model allows, each in gusts of its own, to see what gusts explain.",
-        ),
-    ] = False,
-    autopilot: Annotated[
-        str | None,
-        typer.Option(
-            "--autopilot",
-            metavar="NAME",
-            help="px4, ardupilot, betaflight or crazyflie: its own control law flies, in closed loop; along a FLIGHT "
-            "with the gains of its log.",
-        ),
-    ] = None,
-    *,
-    common: Common,
-) -> None:
-    """Fly a trajectory, exactly or in closed loop; or a flight's own setpoints, to see where simulator and it part."""
-    with messages_for_errors():
-        asked = _of("simulate").option_overrides(mode, effect or [], gusts=gusts, autopilot=autopilot)
-        common = replace(common, overrides=[*(common.overrides or []), *asked])
-
-    _run("simulate", config, output, common, lambda command, job: command.run(job, trajectory, model, mode))
-
-
-@_command()
 def init(
     logs: LogsArgument,
     output: OutputOption,
@@ -200,12 +134,6 @@ def init(
         return command.run(job, logs, stated)
 
     _run_without_config("init", output, common, call)
-
-
-@_command("import")
-def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, common: Common) -> None:
-    """Turn a flight log into a flight."""
-    _run("import", config, output, common, lambda command, job: command.run(job, log))
 
 
 @_command()
@@ -277,27 +205,6 @@ def report(
 
 
 @_command()
-def compare(
-    config: ConfigArgument, flights: FlightsArgument, output: OutputOption, model: ModelOption = None, *, common: Common
-) -> None:
-    """Find where a model and flights disagree."""
-    _run("compare", config, output, common, lambda command, job: command.run(job, flights, model))
-
-
-@_command()
-def diagnose(
-    config: ConfigArgument,
-    disagreement: DisagreementArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Name the physical effect that a model misses."""
-    _run("diagnose", config, output, common, lambda command, job: command.run(job, disagreement, held_out or []))
-
-
-@_command()
 def extend(
     config: ConfigArgument,
     diagnosis: DiagnosisArgument,
@@ -308,20 +215,6 @@ def extend(
 ) -> None:
     """Put the named effects into the model, and show that the gap shrinks."""
     _run("extend", config, output, common, lambda command, job: command.run(job, diagnosis, model))
-
-
-@_command()
-def gap(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: FolderOption,
-    held_out: HeldOutOption = None,
-    model: ModelOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Compare, diagnose and extend in one go, with a report."""
-    _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
 
 
 @_command()
@@ -437,7 +330,7 @@ def effects(
 
 def _of(title: str) -> Any:
     """Load the module of a command."""
-    return import_module(f"cpfls_cli.commands.{'import_log' if title == 'import' else title.replace('-', '_')}")
+    return import_module(f"cpfls_cli.commands.{title.replace('-', '_')}")
 
 
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:

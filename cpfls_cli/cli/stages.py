@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperCommand
 
 from cpfls_cli.arguments import FolderOption
+from cpfls_cli.cli.command_lines import CommandLine, command_line
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import (
     Commands,
@@ -54,21 +55,25 @@ class StageCommand(TyperCommand):
         self._file = file
         described = _DOCSTRING.match(file.read_text(encoding="utf-8"))
         assert described is not None, "a stage says in its docstring what it does"
-        super().__init__(file.stem.replace("_", "-"), help=inspect.cleandoc(described[1]), rich_markup_mode=None)
+        super().__init__(_named(file), help=inspect.cleandoc(described[1]), rich_markup_mode=None)
 
     @cached_property
+    def _line(self) -> CommandLine:
+        return command_line(self._file)
+
     def _stage(self) -> Stage:
         own: Stage = import_module("cpfls_cli.stage").loaded(self._file.stem)
         return own
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat options that take all values that follow."""
-        return super().parse_args(ctx, repeated(self.params, args) if self._stage.several else args)
+        return super().parse_args(ctx, repeated(self.params, args) if self._line.several else args)
 
     @cached_property
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        app.command(self.name)(with_common(command_of(self._stage)))
+        assert self.name is not None, "a command has a name"
+        app.command(self.name)(with_common(command_of(self.name, self._line, self._stage)))
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -102,10 +107,14 @@ class AllCommands(Commands):
         self.commands = {name: every[name] for name in (*(own for own in ORDER if own in every), *every)}
 
 
+def _named(file: Path) -> str:
+    return file.stem.strip("_").replace("_", "-")
+
+
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
     """List the commands of the stages in a folder; some are a part of another command, which calls them."""
     every = (file for file in sorted(folder.glob("[a-z]*.py")) if file.stem not in PARTS)
-    files = {file.stem.replace("_", "-"): file for file in every}
+    files = {_named(file): file for file in every}
     return {name: StageCommand(file) for name, file in files.items()}
 
 
@@ -147,17 +156,21 @@ def noted(job: Job) -> Iterator[None]:
         raise
 
 
-def command_of(own: Stage) -> Callable[..., None]:
-    """Write the command line of a stage: its own parameters, its output, and a config where it takes one."""
-    parameters = [
-        each for each in inspect.signature(own.function, eval_str=True).parameters.values() if each.name != "run"
-    ]
-    declared = any(each.name == "config" for each in parameters)
+def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Callable[..., None]:
+    """Write the command line of a stage: its own parameters, its output, and a config where it takes one.
+
+    Parameters
+    ----------
+    load : callable
+        Gives the stage, when the command runs.
+    """
+    declared = any(each.name == "config" for each in line.parameters)
 
     def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
         with messages_for_errors():
             from cpfls_cli.artifacts.output import locked
 
+            own = load()
             narration = Narration(own.name, common.verbose and not common.quiet)
             given |= {"config": config} if declared else {}
             if callable(own.study) and not own.study(given):
@@ -174,16 +187,16 @@ def command_of(own: Stage) -> Callable[..., None]:
             tell(outcome, common)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    added = {"config": ConfigArgument} if own.study and not declared else {}
-    option = own.output or (FilledOption if own.folder else FolderOption if own.fills else OutputOption)
+    added = {"config": ConfigArgument} if line.study and not declared else {}
+    option = line.output or (FilledOption if line.folder else FolderOption if line.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
-        *(each.replace(kind=keyword) for each in parameters),
-        output.replace(default=None) if own.folder or own.output else output,
+        *(each.replace(kind=keyword) for each in line.parameters),
+        output.replace(default=None) if line.folder or line.output else output,
         inspect.Parameter("common", keyword, annotation=Common),
     ]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in whole}
-    command.__name__ = own.name.replace("-", "_")
+    command.__name__ = name.replace("-", "_")
     return command

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
-from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.artifacts.learned import LearnedFlight, as_inputs, joined_flights
-from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs, joined_flights, learned_in
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs, rates_fade
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
+from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
 from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
 from cpfls_cli.pages.extended import warnings
 from cpfls_cli.pages.model import answer
@@ -37,42 +37,40 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     """Put the named effects into a model and write it."""
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
     job = with_numbers(job, "extend", model)
-    diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
-    base = vehicle_model(diagnosed.base) if model is None else read_base(model, job.study)
+    study = job.study
+    diagnosed, origin = read_result_of_vehicle(diagnosis, Diagnosis, study)
+    base = diagnosed.base if model is None else read_base(model, study)
     named_effects(diagnosed)
     if job.dry_run:
         return nothing_written(job)
+    flights = (in_roles(diagnosed.recorded, role) for role in (TRAINING, HELD_OUT))
     training, held = (
-        beside_rotors(diagnosed.flights.recordings(job.study, role), base) for role in (TRAINING, HELD_OUT)
+        beside_rotors([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
+        for own in flights
     )
-    record = extended(job.study, training, held, diagnosed, base)
-    own = None if model is None else learned_by(model)
-    record = finish_extended(job, record, diagnosed, inputs, own)
+    known = learned_in(origin.inputs, diagnosed.learned, MODEL_FLIGHT) if model is None else learned_by(model)
+    record = extended(study, training, held, diagnosed, base)
+    record, learned = with_learned(record, diagnosed.learned_from(origin.inputs), known)
+    record = finish(job, record, {**inputs, **learned})
     summary = {**record.summary, "warnings": warnings(record)}
     to_export = ("cpfls", "export", job.output, "-o", job.output.with_suffix(".c"))
     return Outcome(summary, tuple(answer(source_of(job, record))), next=(to_export,))
 
 
-def finish_extended(
-    job: Job,
-    record: ExtendedRecord,
-    diagnosis: DiagnosisRecord,
-    inputs: Mapping[str, InputFile],
-    of_base: Sequence[LearnedFlight] | None = None,
-) -> ExtendedRecord:
-    """Write an extended model, with the flights that its effects and its base learned from as inputs.
-
-    `of_base` is None where the base is the model of the diagnosis.
-    """
-    known = diagnosis.model_learned_from if of_base is None else of_base
-    flights, parts = as_inputs("flight", joined_flights(diagnosis.learned_from, known))
-    return finish(job, replace(record, learned=parts), {**inputs, **flights})
+def with_learned(
+    record: ExtendedRecord, of_effects: Sequence[LearnedFlight], of_base: Sequence[LearnedFlight]
+) -> tuple[ExtendedRecord, dict[str, InputFile]]:
+    """Take the flights that the effects of a model and its base learned from; they are inputs of its file."""
+    flights, parts = as_inputs("flight", joined_flights(of_effects, of_base))
+    return replace(record, learned=parts), flights
 
 
-def named_effects(diagnosis: DiagnosisRecord) -> Sequence[NamedEffect]:
-    """Take the effects that a diagnosis names; one that names none is refused."""
-    effects = diagnosis.effects.effects()
-    require_named(diagnosis.verdict, diagnosis.effects.named)
+def named_effects(diagnosis: Diagnosis) -> Sequence[NamedEffect]:
+    """Take the effects that a diagnosis names; one that names none, or what is not known here, is refused."""
+    effects = diagnosis.effects or diagnosis.closest
+    for each in effects:
+        effect(each.name)
+    require_named(diagnosis.verdict, diagnosis.effects)
     return effects
 
 
@@ -89,17 +87,17 @@ def extended(
     study: Study,
     training: Sequence[Recording],
     held: Sequence[Recording],
-    diagnosis: DiagnosisRecord,
+    diagnosis: Diagnosis,
     base: VehicleModel,
 ) -> ExtendedRecord:
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
     gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
-    named = named_effects(diagnosis), audit(diagnosis.audit)
+    named = named_effects(diagnosis), diagnosis.audit
     extension = extend(training, held, *named, study.gap, base.fuzzy, gusty_floor)
     stated = base.vehicle if has_effects(base) else study.vehicle
     whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
-    if diagnosis.disturbance is not None and diagnosis.gusts:
-        whole = replace(whole, gusts=diagnosis.disturbance.gusts)
+    if diagnosis.air is not None and diagnosis.gusts:
+        whole = replace(whole, gusts=diagnosis.air.gusts)
     require_body(extension.model, stated)
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.report.content import Block, Facts, Table, Text
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.result import datasets
+from cpfls_cli.stage import Stage, loaded
 from cpfls_cli.words import did_you_mean
 
 _COLUMNS = ("Dataset", "Dimensions", "Unit", "Frame", "Required", "What it holds")
@@ -35,8 +35,10 @@ def run(name: str | None) -> Outcome:
 
 def formats() -> list[Format]:
     """List every format of a file: those of records, in the order of the pipeline, then those of stages."""
-    stages = sorted((Path(__file__).parents[1] / "stages").glob("[a-z]*.py"))
-    return [own.spec() for own in records()] + [_of_stage(file.stem) for file in stages]
+    files = sorted((Path(__file__).parents[1] / "stages").glob("[a-z]*.py"))
+    stages = [loaded(file.stem) for file in files]
+    # What fills a folder with results of other stages has none of its own.
+    return [own.spec() for own in records()] + [_of_stage(own) for own in stages if hasattr(own.kind, "FORMAT")]
 
 
 def rows(described: Format) -> list[list[str]]:
@@ -60,9 +62,8 @@ def origin(described: Format) -> str:
     return f"Made by {described.makers}: {described.description}.{f' Inputs: {inputs}.' if inputs else ''}"
 
 
-def _of_stage(module: str) -> Format:
+def _of_stage(own: Stage) -> Format:
     """Describe the result of a stage as a format."""
-    own = import_module("cpfls_cli.stage").loaded(module)
     specs = (
         DatasetSpec(
             path,

@@ -18,15 +18,13 @@ from cpfls_cli.flights.models import any_model, is_model
 from cpfls_cli.pages.trust import stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
-from cpfls_cli.store import examine, stage_of
+from cpfls_cli.store import findings_in, stage_of
 
 _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
     "cpfls/sweep": "sweep",
-    "cpfls/disagreement": "disagreement",
-    "cpfls/diagnosis": "diagnosis",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 
@@ -117,7 +115,7 @@ def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     if stage := stage_of(path):
         made = import_module("cpfls_cli.stage").loaded(stage).kind
-        name, findings = made.FORMAT, examine(path, made)[2]
+        name, findings = made.FORMAT, findings_in(path, made)
     else:
         spec, findings = findings_of(path)
         name = spec.name

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.gap_flights import FlightsGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -31,7 +29,9 @@ from cpfls_cli.export.tracks import (
     Track,
     View,
 )
+from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.response.flown import Responses
 from cpfls_cli.result import described_fields
@@ -124,17 +124,19 @@ def _pose(child: str, time: Array, attitude: Array | None, position: Array | Non
     return [Pose(child, time, np.full_like(attitude, np.nan) if position is None else position, attitude)]
 
 
-def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
-    time = _log_time(record.time, record.begins)
-    specs = {spec.path: spec for spec in record.spec().datasets}
-    signals = {name: values for name, values in record.signals.items() if name != "time"}
-    units = _units_of(study, imported="log" in record.origin.inputs)
+def _of_flight(title: str, given: Flight, study: Study) -> View:
+    time = _log_time(given.time, given.begins)
+    specs = {
+        name: DatasetSpec(name, own.axes, own.unit, own.frame, own.text) for name, own in Flight.about_signals().items()
+    }
+    signals = {name: values for name, values in given.signals.items() if name != "time"}
+    units = _units_of(study, imported=isinstance(given, Imported))
     return View(
         title,
         tuple(_signals("", time, signals, specs, units)),
-        poses=_pose(BODY_FRAME, time, record.attitude, record.position),
+        poses=_pose(BODY_FRAME, time, given.attitude, given.position),
         stamps=_stamps(study),
-        on_log_clock=record.clock is not None,
+        on_log_clock=bool(np.isfinite(given.begins)),
     )
 
 
@@ -233,19 +235,17 @@ def _short(name: str) -> str:
     return Path(stem).stem + (f"_{part.rstrip(')').replace(' ', '_')}" if part else "")
 
 
-def _of_flights(
-    flights: FlightsGroup, record: Record
-) -> Iterator[tuple[str, float, dict[str, Array], Array, dict[str, DatasetSpec]]]:
-    """List the flights of a comparison: name for a track, begin on the clock of its log, signals, time, specs."""
-    each, signals = flights.each, flights.signals
-    begins = np.full(len(each.name), np.nan) if each.begins is None else each.begins
-    specs = {spec.path.removeprefix("signals/"): spec for spec in record.spec().datasets}
-    held = {name: own for name, own in vars(signals).items() if own is not None and name != "time"}
-    ends = [*each.first[1:], len(signals.time)]
-    for name, first, end, begin in zip(each.name, each.first, ends, begins.tolist(), strict=True):
-        part = slice(int(first), int(end))
-        known = {signal: own[part] for signal, own in held.items() if np.isfinite(own[part]).any()}
-        yield _short(name) if len(each.name) > 1 else "", begin, known, signals.time[part], specs
+_SPECS = {
+    each.name: DatasetSpec(each.name, each.about.axes, each.about.unit, each.about.frame, each.about.text)
+    for each in described_fields(RecordedFlight)
+    if each.about
+}
+
+
+def _flown(flights: Mapping[str, RecordedFlight]) -> Iterator[tuple[str, RecordedFlight]]:
+    """List flights, each with its name for a track."""
+    for own in flights.values():
+        yield _short(own.name) if len(flights) > 1 else "", own
 
 
 def _windows(flight: str, time: Array, values: Mapping[str, Array], about: str) -> Iterator[Track]:
@@ -258,42 +258,44 @@ def _windows(flight: str, time: Array, values: Mapping[str, Array], about: str) 
             )
 
 
-def _of_disagreement(title: str, record: DisagreementRecord, study: Study) -> View:
+def _of_disagreement(title: str, given: Disagreement, study: Study) -> View:
     tracks: list[Track] = []
-    floor = record.gap.floor
-    for index, (name, begin, signals, time, specs) in enumerate(_of_flights(record.flights, record)):
-        tracks += _signals(name, _log_time(time, begin), signals, specs, {})
-        at = np.flatnonzero(record.residual.flight == index)
-        values = {DIFFERENCE: record.residual.value[at], "floor": np.broadcast_to(floor, (len(at), len(CHANNELS)))}
+    floor, residual = given.sizes.floor, given.residual
+    for index, (name, flight) in enumerate(_flown(given.recorded)):
+        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _SPECS, {})
+        at = np.flatnonzero(residual.flight == index)
+        values = {DIFFERENCE: residual.value[at], "floor": np.broadcast_to(floor, (len(at), len(CHANNELS)))}
         about = "what inertia and rotors leave of the motion, mean over a window; measured less model"
-        tracks += _windows(name, _log_time(record.residual.time[at], begin), values, about)
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
+        tracks += _windows(name, _log_time(residual.time[at], flight.begins), values, about)
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=_on_log_clock(given.recorded))
 
 
-def _of_diagnosis(title: str, record: DiagnosisRecord, study: Study) -> View:
+def _on_log_clock(flights: Mapping[str, RecordedFlight]) -> bool:
+    return any(np.isfinite(own.begins) for own in flights.values())
+
+
+def _of_diagnosis(title: str, given: Diagnosis, study: Study) -> View:
     tracks: list[Track] = []
     places: dict[str, tuple[str, float]] = {}
-    held = 0
-    for (name, begin, signals, time, specs), full, role in zip(
-        _of_flights(record.flights, record), record.flights.each.name, record.flights.each.role, strict=True
-    ):
-        places[full] = name, begin
-        tracks += _signals(name, _log_time(time, begin), signals, specs, {})
-        if role != "held-out":
+    held, residual = 0, given.residual
+    for name, flight in _flown(given.recorded):
+        places[flight.name] = name, flight.begins
+        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _SPECS, {})
+        if flight.role != HELD_OUT:
             continue
-        at = np.flatnonzero(record.residual.flight == held)
+        at = np.flatnonzero(residual.flight == held)
         held += 1
-        values = {"before": record.residual.before[at], "after": record.residual.after[at]}
+        values = {"before": residual.before[at], "after": residual.after[at]}
         about = "gap of held-out windows, model as given and with the effects; measured less model"
-        tracks += _windows(name, _log_time(record.residual.time[at], begin), values, about)
-    if record.run is not None:
-        name, begin = places.get(record.run.flight, ("", np.nan))
-        own = {MEASURED: record.run.measured, "before": record.run.before, "after": record.run.after}
+        tracks += _windows(name, _log_time(residual.time[at], flight.begins), values, about)
+    if given.run is not None:
+        name, begin = places.get(given.run.flight, ("", np.nan))
+        own = {MEASURED: given.run.measured, "before": given.run.before, "after": given.run.after}
         about = "free runs from measured rates, model as given and with the effects"
         tracks.append(
             Track(
                 name="run/body_rate",
-                time=_log_time(record.run.time, begin),
+                time=_log_time(given.run.time, begin),
                 values=own,
                 unit="rad/s",
                 frame=BODY,
@@ -302,7 +304,7 @@ def _of_diagnosis(title: str, record: DiagnosisRecord, study: Study) -> View:
                 axes=AXES,
             )
         )
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=_on_log_clock(given.recorded))
 
 
 def _of_response(title: str, given: Responses, study: Study) -> View:
@@ -360,11 +362,11 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
 
 
 _KINDS: dict[type, Callable[[str, Any, Study], View]] = {
-    FlightRecord: _of_flight,
+    Flight: _of_flight,
     AlongFlight: _of_prediction,
     Playback: _of_replay,
-    DisagreementRecord: _of_disagreement,
-    DiagnosisRecord: _of_diagnosis,
+    Disagreement: _of_disagreement,
+    Diagnosis: _of_diagnosis,
     Responses: _of_response,
     Twin: _of_twin,
 }

@@ -2,9 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
+from types import MappingProxyType
+from typing import Final
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.result import about, part, result
+
+_DROPPED: Final = MappingProxyType(
+    {
+        "time_not_finite": "time stamp is not a number: rows dropped",
+        "repeated_time": "repeated time: rows dropped",
+        "backward_time": "backward time: rows dropped",
+        "crop": "outside import.crop_s: rows dropped",
+        "incomplete_ends": "before the first or after the last value of a column: rows dropped",
+        "gap": "beyond a gap longer than import.gap_s: rows dropped",
+    }
+)
 
 
 @result
@@ -14,9 +27,11 @@ class DelayEstimate:
     delay_s: float = about("the delay whose rigid-body regression explains most of the torque", unit="s")
     r2: Array = about("share of the torque explained about each body axis, at that delay", "axis")
     pooled_r2: float = about("of all axes: 1 minus the geometric mean of what stays unexplained about each")
-    inertia: Array = about("Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay", "moment", unit="kg m^2")
-    delays: Array = about("the delays tried", "delay", unit="s")
-    curve: Array = about("pooled R2 at each of them", "delay")
+    inertia: Array = about(
+        "Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay", "moment", unit="kg m^2", brief=False
+    )
+    delays: Array = about("the delays tried", "delay", unit="s", brief=False)
+    curve: Array = about("pooled R2 at each of them", "delay", brief=False)
     at_bound: bool = about("whether the best delay is the longest one tried, so the true one may be longer")
 
 
@@ -36,9 +51,11 @@ class ImportReport:
     saturated: Mapping[str, int] = about("values in long runs at the column's extremes; not changed")
     gaps: int = about("gaps in the time stamps, of more than 1.5 times the median step, that were interpolated")
     longest_gap_s: float = about("longest step between time stamps in the part that is kept", unit="s")
-    span_s: tuple[float, float] = about("begin and end of what is kept, from the log's first time stamp", unit="s")
+    span_s: tuple[float, float] = about("begin and end of what is kept, from the log's first time stamp", "2", unit="s")
     first_stamp_s: float = about("that stamp on the log's own clock", unit="s")
-    crop_s: tuple[float, float] | None = about("begin and end of the crop, as asked for or found", unit="s")
+    crop_s: tuple[float, float] | None = about(
+        "begin and end of the crop, as asked for or found; not finite where it has no end", "2", unit="s", gaps=True
+    )
     log_rate_hz: float = about("median rate of the log", unit="Hz")
     rate_hz: float = about("rate of the result", unit="Hz")
     cut_off_hz: Mapping[str, float] = about("cut-off of the low-pass filter before the log, by signal", unit="Hz")
@@ -46,11 +63,25 @@ class ImportReport:
     lowpass_hz: float | None = about("cut-off of the zero-phase filter of all signals", unit="Hz", default=None)
     delay_s: float = about("delay by which the commands were shifted", unit="s", default=0.0)
     delay: DelayEstimate | None = part(default=None)
-    warnings: tuple[str, ...] = about("plain sentences for the user", default=())
+    warnings: tuple[str, ...] = about("plain sentences for the user", "warning", default=())
     flown_at: float = about("when the log begins, since 1970 began (UTC)", unit="s", gaps=True, default=float("nan"))
     system: str = about("what wrote the log, and its version; empty where it does not say", default="")
     parameters: Mapping[str, float] = about("of the control law that flew, by the autopilot's own names")
     stated: Mapping[str, str] = about("what the log says of its vehicle, as `stated_vehicle`")
+
+    @property
+    def findings(self) -> dict[str, int]:
+        """What was found and done, with how often: rows by reason, then gaps, then values of all columns together."""
+        rows = {_DROPPED[reason]: count for reason, count in self.dropped.items()}
+        gaps = {f"gaps in the time stamps, up to {self.longest_gap_s:.3g} s: interpolated": self.gaps}
+        values = {
+            "missing: values interpolated": self.missing,
+            "spikes: values interpolated": self.spikes,
+            "suspected spikes: values reported only": self.suspected_spikes,
+            "saturated: values reported only": self.saturated,
+        }
+        counts = rows | gaps | {what: sum(by_column.values()) for what, by_column in values.items()}
+        return {what: count for what, count in counts.items() if count}
 
 
 @result

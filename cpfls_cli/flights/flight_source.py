@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.flight import CLOCK, MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import check_rows, count_rows, read_header, read_number, read_record, read_rows
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import ENOUGH
@@ -21,6 +20,7 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import SETPOINTS
+from cpfls_cli.flights.flight import MOTION, Flight, require_signals
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     all_known,
@@ -36,13 +36,11 @@ from cpfls_cli.flights.recordings import (
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.store import IN_MEMORY, check_rows, count_rows, held_rows, read, read_first, read_rows
 
 _NEEDED = ("time", *MOTION)
 _TORQUE = "torque"
 _ROTORS = ("rotor-speed", "rotor-command")
-
-IN_MEMORY = 500_000
-"""Samples of a flight that are held in memory, 52 MB of motion and torque."""
 
 STRETCH = 12 * PART
 """Samples that effects are evaluated on at once, some 2 kB each; whole parts of an artifact."""
@@ -89,7 +87,7 @@ class FlightFile:
             fault = "no such file"
         elif (size := self.path.stat().st_size) != self.size_bytes:
             fault = f"another file, with {size} bytes instead of {self.size_bytes}"
-        elif (rows := count_rows(self.path, FlightRecord.spec(), self.names[0])) != self.rows:
+        elif (rows := count_rows(self.path, Flight, self.names[0])) != self.rows:
             fault = f"another file, with {rows or 'no'} samples instead of {self.rows}"
         else:
             return
@@ -102,15 +100,16 @@ class FlightFile:
 def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     """Open a flight."""
     names = (*_NEEDED, _TORQUE) if torque else _NEEDED
-    paths = tuple(FlightRecord.path(name) for name in names)
-    samples = count_rows(path, FlightRecord.spec(), paths[0])
+    samples = count_rows(path, Flight, "time")
     if samples is None or samples <= IN_MEMORY:
-        flight = read_record(path, FlightRecord, *names)
+        flight, _ = read(path, Flight)
+        require_signals(path, flight.signals, *names)
         asked = {short: flight.signals[name] for name, short in SETPOINTS.items() if name in flight.signals}
         columns: dict[str, Array] = {name: own.reshape(len(own), -1) for name, own in asked.items()}
         return replace(_torque_data([getattr(flight, name) for name in names]), setpoints=columns)
-    check_rows(path, FlightRecord.spec(), paths)
-    return FlightFile(path.resolve(), paths, 0, samples, path.stat().st_size, samples)
+    require_signals(path, held_rows(path, Flight), *names)
+    check_rows(path, Flight, names)
+    return FlightFile(path.resolve(), names, 0, samples, path.stat().st_size, samples)
 
 
 def _torque_data(rows: Sequence[Array]) -> TorqueData:
@@ -196,16 +195,15 @@ class FlightStretches:
 
 def flight_stretches(path: Path, study: Study) -> FlightStretches:
     """Open a flight or import a log in stretches; one of more than `IN_MEMORY` samples stays in its file."""
-    samples = None if is_log(path) else count_rows(path, FlightRecord.spec(), FlightRecord.path("time"))
+    samples = None if is_log(path) else count_rows(path, Flight, "time")
     if samples is None or samples <= IN_MEMORY:
         flight = read_flight(path, study)
         rows, samples = partial(_rows_of, flight.signals), len(flight.signals["time"])
     else:
         units = units_of(path, read_header(path), study)
-        flight = ReadFlight(path.name, {}, units, (), begins=read_number(path, CLOCK))
-        spec = FlightRecord.spec()
-        names = [name for name in FlightRecord.signal_names() if count_rows(path, spec, name) is not None]
-        check_rows(path, spec, names)
+        flight = ReadFlight(path.name, {}, units, (), begins=read_first(path, Flight)[0].begins)
+        names = held_rows(path, Flight)
+        check_rows(path, Flight, names)
         rows = partial(_rows_in, path, names)
     volts = in_volts(flight.units)
     known, time, voltage = [], [], []
@@ -246,11 +244,10 @@ def torque_source_of(path: Path, study: Study) -> str:
 
 
 def _enough_of(path: Path, study: Study) -> ReadFlight:
-    samples = None if is_log(path) else count_rows(path, FlightRecord.spec(), FlightRecord.path("time"))
+    samples = None if is_log(path) else count_rows(path, Flight, "time")
     if samples is None or samples <= IN_MEMORY:
         return read_flight(path, study)
-    spec, first = FlightRecord.spec(), (samples - ENOUGH) // 2
-    names = [name for name in FlightRecord.signal_names() if count_rows(path, spec, name) is not None]
+    names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
     units = units_of(path, read_header(path), study)
     return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
 

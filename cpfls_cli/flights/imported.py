@@ -6,30 +6,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Final
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
 from cpfls_cli.flightlog.stated_vehicle import stated_vehicle
 from cpfls_cli.logs.formats import LogColumns, read_log
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
-
-_DROPPED: Final = MappingProxyType(
-    {
-        "time_not_finite": "time stamp is not a number: rows dropped",
-        "repeated_time": "repeated time: rows dropped",
-        "backward_time": "backward time: rows dropped",
-        "crop": "outside import.crop_s: rows dropped",
-        "incomplete_ends": "before the first or after the last value of a column: rows dropped",
-        "gap": "beyond a gap longer than import.gap_s: rows dropped",
-    }
-)
 
 
 def imported(log: Path, study: Study) -> ImportedFlight:
@@ -69,20 +56,6 @@ def _naming(log: Path) -> Iterator[None]:
         yield
     except CpflsError as error:
         raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
-
-
-def log_findings(report: ImportReport) -> dict[str, int]:
-    """Count what was found in a log: rows by reason, then gaps, then values of all columns together."""
-    rows = {_DROPPED[reason]: count for reason, count in report.dropped.items()}
-    gaps = {f"gaps in the time stamps, up to {report.longest_gap_s:.3g} s: interpolated": report.gaps}
-    values = {
-        "missing: values interpolated": report.missing,
-        "spikes: values interpolated": report.spikes,
-        "suspected spikes: values reported only": report.suspected_spikes,
-        "saturated: values reported only": report.saturated,
-    }
-    counts = rows | gaps | {what: sum(by_column.values()) for what, by_column in values.items()}
-    return {what: count for what, count in counts.items() if count}
 
 
 def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
 
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.scores import TRAINING
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import format_name, read_header
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.training import flight_roles
 from cpfls_cli.identification.data import TorqueSource, joined
@@ -60,7 +60,7 @@ def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[di
 def log_formats(paths: Sequence[Path]) -> set[str]:
     """Gather the endings, in small letters, of the logs among some files, and of those that flights were made from."""
     known = {path.suffix.lstrip(".").lower() for path in paths if is_log(path)}
-    flights = (path for path in paths if format_name(path) == FlightRecord.FORMAT.name)
+    flights = (path for path in paths if format_name(path) == Flight.FORMAT)
     made = (read_header(path).inputs.get("log") for path in flights)
     return known | {"" if log is None else log.format.lower() for log in made}
 

@@ -13,9 +13,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, stretches
 from cpfls_cli.artifacts.check import Origin
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
@@ -26,8 +24,8 @@ from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
-from cpfls_cli.flightlog.stated_vehicle import WRITTEN_BY
-from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
+from cpfls_cli.flights.flight import Imported, read_whole
+from cpfls_cli.flights.imported import commanded_speed, imported
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
@@ -129,13 +127,11 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     """Read a flight, or import it if it is a log."""
     if is_log(path):
         return read_import(path.name, [imported(path, study)], study)
-    record = read_record(path, FlightRecord)
-    updated = {} if record.quality is None else record.quality.updated_hz
-    units = units_of(path, record.origin, study)
-    stated = {} if record.stated is None else record.stated.facts
-    system = stated.get(WRITTEN_BY, "") if record.autopilot is None else record.autopilot.system
-    own = ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins)
-    return replace(own, stated=stated, system=system)
+    flight, origin = read_whole(path)
+    own = ReadFlight(path.name, flight.signals, units_of(path, origin, study), (), begins=flight.begins)
+    if isinstance(flight, Imported):
+        return replace(own, updated_hz=flight.updated_hz, stated=flight.stated, system=flight.system)
+    return own
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -144,8 +140,8 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         _require_speeds(name, part, study)
     first = parts[0]
     updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
-    done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
-    signals = [FlightRecord.of_import(part, {}).signals for part in parts]
+    done = tuple(f"{what} ({count})" for what, count in first.report.findings.items())
+    signals = [Imported.of(part).signals for part in parts]
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
         begins = first.report.first_stamp_s + first.report.span_s[0]

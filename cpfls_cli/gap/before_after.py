@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -13,15 +13,17 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
+from cpfls_cli.gap.naming.results import BODY
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
-from cpfls_cli.playback.errors import MODEL, STATED
+from cpfls_cli.playback.errors import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED, AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
 from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
+from cpfls_cli.result import about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
@@ -134,31 +136,22 @@ def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
     return replay(pairs, longest, _EVERY)
 
 
-@dataclass(frozen=True)
-class WorstStretch:
-    """Measured and simulated body rates over the stretch of flights in which the model as given is farthest off.
+@result
+class FreeRuns:
+    """Free runs over the stretch of held-out flights in which the model as given is farthest off."""
 
-    Attributes
-    ----------
-    flight : int
-        Number of the flight.
-    first : int
-        Sample of the flight at which it begins.
-    measured, before, after : array, shape (run, sample, 3), rad/s, body frame
-        Each run starts from the measured rates.
-    axis : int
-        Body axis on which the model as given is worst.
-    """
-
-    flight: int
-    first: int
-    measured: Array
-    before: Array
-    after: Array
-    axis: int
+    flight: str = about("held-out flight of the stretch whose free runs went astray most")
+    axis: int = about("body axis on which they did: 0, 1, 2 for x, y, z")
+    time: Array = about("on the clock of the flight", "run_sample", unit="s")
+    restart: Array = about("times at which each free run starts from the measured rate", "run", unit="s")
+    measured: Array = about("body rates", "run_sample", "axis", unit="rad/s", frame=BODY)
+    before: Array = about("simulated, model as given", "run_sample", "axis", unit="rad/s", frame=BODY)
+    after: Array = about("simulated, with the effects", "run_sample", "axis", unit="rad/s", frame=BODY)
 
 
-def worst_stretch(pairs: Sequence[PlayedPair], horizon_s: float, shown_s: float) -> WorstStretch:
+def worst_stretch(
+    pairs: Sequence[PlayedPair], recordings: Sequence[Recording], horizon_s: float, shown_s: float
+) -> FreeRuns:
     """Find where free runs of the model as given, one after another, are farthest off.
 
     Parameters
@@ -173,11 +166,13 @@ def worst_stretch(pairs: Sequence[PlayedPair], horizon_s: float, shown_s: float)
     """
     samples = max(2, round(horizon_s / pairs[0].flight.motion.period))
     most = max(1, round(shown_s / horizon_s))
-    found = [_worst(index, pair, samples, most) for index, pair in enumerate(pairs)]
+    found = [
+        _worst(pair, recording.signals.time, samples, most) for pair, recording in zip(pairs, recordings, strict=True)
+    ]
     return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
 
 
-def _worst(index: int, pair: PlayedPair, samples: int, most: int) -> WorstStretch:
+def _worst(pair: PlayedPair, time: Array, samples: int, most: int) -> FreeRuns:
     starts = pair.flight.starts(samples - 1, samples)
     before = drawn_runs(Played(pair.logged, pair.stated, pair.stated), starts, samples - 1).model
     after = drawn_runs(pair, starts, samples - 1)
@@ -185,28 +180,102 @@ def _worst(index: int, pair: PlayedPair, samples: int, most: int) -> WorstStretc
     joined = min(len(starts), most)
     begin = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
     runs = slice(begin, begin + joined)
-    axis = int(square[runs].sum(axis=0).argmax())
-    return WorstStretch(index, int(starts[begin]), after.measured[runs], before[runs], after.model[runs], axis)
+    first, flown = int(starts[begin]), joined * samples
+    time = time[first : first + flown]
+    return FreeRuns(
+        flight=pair.flight.name,
+        axis=int(square[runs].sum(axis=0).argmax()),
+        time=time,
+        restart=time[::samples],
+        measured=after.measured[runs].reshape(-1, 3),
+        before=before[runs].reshape(-1, 3),
+        after=after.model[runs].reshape(-1, 3),
+    )
 
 
-@dataclass(frozen=True)
-class StretchCurves:
-    """Measured and simulated torque or force over the stretch of the largest gap.
+@result
+class WorstWindows:
+    """Measured and simulated torque or force over the stretch of the largest gap."""
 
-    Other fields are described at `PictureGroup`.
+    flight: str = about("held-out flight of the stretch in which model and flight disagreed most")
+    channel: str = about("channel of the stretch")
+    time: Array = about("on the clock of the flight", "moment", unit="s")
+    measured: Array = about("torque or force that the measured motion takes", "moment", unit="SI", frame=BODY)
+    before: Array = about("simulated, model as given", "moment", unit="SI", frame=BODY)
+    after: Array = about("simulated, with the effects", "moment", unit="SI", frame=BODY)
 
-    Attributes
-    ----------
-    flight : int
-        Number of the held-out flight.
-    """
 
-    flight: int
-    channel: str
-    time: Array
-    measured: Array
-    before: Array
-    after: Array
+@result
+class ResidualChange:
+    """Gap of each held-out window, before and after."""
+
+    time: Array = about("middle of each held-out window, on the clock of its flight", "window", unit="s")
+    flight: IntArray = about("index of its flight", "window")
+    before: Array = about("gap of the model as given, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True)
+    parameters: Array = about("gap with only its numbers refitted", "window", "6", unit="SI", frame=BODY, gaps=True)
+    after: Array = about("gap with the effects", "window", "6", unit="SI", frame=BODY, gaps=True)
+
+
+@result
+class WhitenessChange:
+    """Autocorrelation of the gap on held-out windows."""
+
+    lag: Array = about("distance of windows that do not overlap", "lag", unit="s", brief=False)
+    before: Array = about("autocorrelation of the gap of the model as given", "lag", "6", gaps=True, brief=False)
+    after: Array = about("autocorrelation of the gap with the effects", "lag", "6", gaps=True, brief=False)
+    p_value_before: Array = about("probability that noise is as correlated, by Ljung and Box", "6", gaps=True)
+    p_value_after: Array = about("the same with the effects", "6", gaps=True)
+
+    @classmethod
+    def of(cls, before: Whiteness, after: Whiteness, lag_s: float) -> Self:
+        """Arrange autocorrelations; `lag_s` is the time between windows without common samples, s."""
+        return cls(
+            lag=np.asarray(lag_s * np.arange(1, len(before.autocorrelation) + 1), dtype=float),
+            before=before.autocorrelation,
+            after=after.autocorrelation,
+            p_value_before=before.p_value,
+            p_value_after=after.p_value,
+        )
+
+
+@result
+class EndError:
+    """How far off a signal is at the longest horizon."""
+
+    SHOWN: ClassVar = ("worse",)
+
+    before: float = about("mean error of the model as given")
+    after: float = about("mean error of the model with the effects")
+    rival: str = about("what knows no model and is best over all horizons: nothing-moves, rate-stays or rate-fades")
+    without_model: float = about("its mean error")
+
+    @property
+    def worse(self) -> bool:
+        """Whether the model with the effects is no better than none."""
+        return self.after >= self.without_model
+
+
+@result
+class PlaybackChange(AlongFlights):
+    """Held-out flights played back with the model as given and with the effects."""
+
+    SHOWN: ClassVar = ("at_end",)
+
+    @classmethod
+    def of_pairs(cls, flights: Sequence[PlayedPair], replayed: Replay) -> Self:
+        """Sum up a replay without its windows."""
+        names = {MODEL: AFTER, STATED: BEFORE}
+        return cls(**vars(replayed.along(flights, {name: names.get(name, name) for name in replayed.models})))
+
+    @property
+    def at_end(self) -> dict[str, EndError]:
+        """Errors at the longest horizon by signal, of those that move."""
+        ends = {}
+        for signal in (name for name in self.signals if self.of(NOTHING_MOVES, name).sum > 0):
+            rival = self.rival(signal)
+            before, after, other = (float(self.of(each, signal).mae[-1]) for each in (BEFORE, AFTER, rival))
+            ends[signal] = EndError(before=before, after=after, rival=rival, without_model=other)
+        return ends
 
 
 @dataclass(frozen=True)
@@ -215,28 +284,18 @@ class BeforeAfter:
 
     Attributes
     ----------
-    centres : array, shape (window,), s
-    flight_index : array of int, shape (window,)
     stretches : tuple of GapStretch
         Of the model as given, largest gap first.
-    lag_s : float
-        Between windows without common samples.
-    run : WorstStretch
-        Free runs over the stretch in which the model as given was worst.
     again_before, again_after : ComesAgain or None
         What of the gap comes again, of training flights too; None where no flight repeats another.
     """
 
-    centres: Array
-    flight_index: IntArray
-    played: list[PlayedPair]
-    playback: Replay
+    playback: PlaybackChange
+    residual: ResidualChange
     stretches: tuple[GapStretch, ...]
-    white_before: Whiteness
-    white_after: Whiteness
-    lag_s: float
-    picture: StretchCurves
-    run: WorstStretch
+    whiteness: WhitenessChange
+    picture: WorstWindows
+    run: FreeRuns
     again_before: ComesAgain | None
     again_after: ComesAgain | None
 
@@ -271,17 +330,16 @@ def before_after(
     played = played_pairs(held, with_effects, given, rates_fade(training, settings.horizon_s))
     in_floors = unseen.before * unseen.known / unseen.floor
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
+    left = {"before": unseen.before, "parameters": unseen.parameters, "after": unseen.after}
+    known = {name: np.where(unseen.known, rows, np.nan) for name, rows in left.items()}
+    white = [whiteness(rows * unseen.known, index, stride) for rows in (unseen.before, unseen.after)]
     return BeforeAfter(
-        np.concatenate(centres),
-        index,
-        played,
-        errors_by_horizon(played, settings.horizon_s),
+        PlaybackChange.of_pairs(played, errors_by_horizon(played, settings.horizon_s)),
+        ResidualChange(time=np.concatenate(centres), flight=index, **known),
         found,
-        whiteness(unseen.before * unseen.known, index, stride),
-        whiteness(unseen.after * unseen.known, index, stride),
-        stride * windows.hop * windows.period,
+        WhitenessChange.of(white[0], white[1], stride * windows.hop * windows.period),
         _picture(held, found[0], windows, model, settings),
-        worst_stretch(played, settings.horizon_s, settings.block_s),
+        worst_stretch(played, held, settings.horizon_s, settings.block_s),
         *_again(training, held, model, settings),
     )
 
@@ -302,7 +360,7 @@ def _again(
 
 def _picture(
     held: Sequence[Recording], stretch: GapStretch, windows: Windows, model: ExtendedModel, settings: GapSettings
-) -> StretchCurves:
+) -> WorstWindows:
     channel = CHANNELS.index(stretch.channel)
     close = dense(windows)
     recording = held[stretch.flight]
@@ -316,4 +374,11 @@ def _picture(
     measured = repaired.averaged(repaired.inertial)[shown, channel]
     logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
-    return StretchCurves(stretch.flight, stretch.channel, time[shown], measured, logged, after)
+    return WorstWindows(
+        flight=recording.name,
+        channel=stretch.channel,
+        time=time[shown],
+        measured=measured,
+        before=logged,
+        after=after,
+    )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,76 +13,97 @@ from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
-from cpfls_cli.gap.before_after import PlayedPair, errors_by_horizon, played_pairs
+from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.results import NotExcited
+from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
+from cpfls_cli.playback.errors import STATED, AlongFlights
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import Replay
+from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
-@dataclass(frozen=True)
-class WorstChannel:
-    """The channel with the largest gap, over the two signals that explain most of it.
+@result
+class ResidualWindows:
+    """Gap of each window."""
 
-    Attributes
-    ----------
-    heat_map : HeatMap
-        Of the gap in N m or N.
-    """
-
-    channel: str
-    signals: tuple[str, str]
-    heat_map: HeatMap
+    time: Array = about("middle of each window, on the clock of its flight", "window", unit="s")
+    flight: IntArray = about("index of its flight", "window")
+    value: Array = about("what inertia and rotors leave, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True)
 
 
-@dataclass(frozen=True)
-class Disagreement:
-    """The gap between a model and flights.
+@result
+class States:
+    """Signals averaged over the windows."""
 
-    Attributes
-    ----------
-    rms, floor, activity : array, shape (6,), N m and N
-        Of the gap, of noise, and of what moves the vehicle; NaN where unknown.
-    residual : array, shape (window, 6), N m and N
-        NaN where unknown.
-    centres : array, shape (window,), s
-    flight_index : array of int, shape (window,)
-    states : mapping of str to array, shape (window,)
-    worst : WorstChannel or None
-        None where no two signals tell anything.
-    played : list of PlayedPair
-        The model alone.
-    again : ComesAgain or None
-        None where no flight repeats another.
-    """
+    name: tuple[str, ...] = about("signals", "state")
+    value: Array = about("their averages", "window", "state", unit="SI", gaps=True)
 
-    audit: Audit
-    rms: Array
-    floor: Array
-    activity: Array
-    residual: Array
-    centres: Array
-    flight_index: IntArray
-    states: dict[str, Array]
-    stretches: tuple[GapStretch, ...]
-    dependence: tuple[Dependence, ...]
-    worst: WorstChannel | None
-    not_excited: tuple[NotExcited, ...]
-    played: list[PlayedPair]
-    playback: Replay
-    again: ComesAgain | None
+
+@result
+class ChannelGaps:
+    """Gap of each channel: torque about the body axes x, y, z, then force along them; NaN where unknown."""
+
+    rms: Array = about("root mean square over windows, N m and N", "6", unit="SI", frame=BODY, gaps=True)
+    floor: Array = about("noise floor of the same windows, N m and N", "6", unit="SI", frame=BODY, gaps=True)
+    floors: Array = about("gap over floor", "6", frame=BODY, gaps=True)
+    share: Array = about("gap over the torque or force that moves the vehicle", "6", frame=BODY, gaps=True)
+
+    @property
+    def known(self) -> list[int]:
+        """Indices of the channels whose gap is known."""
+        return np.flatnonzero(np.isfinite(self.floors)).tolist()
+
+    @property
+    def above_noise(self) -> list[int]:
+        """Indices of the channels with a gap above noise."""
+        return np.flatnonzero(self.floors > CLEAR).tolist()
+
+    @property
+    def largest(self) -> int | None:
+        """Index of the channel with the largest gap in floors; None where no gap is known."""
+        return int(np.nanargmax(self.floors)) if self.known else None
+
+
+@result
+class Comparison:
+    """The gap between a model and flights."""
+
+    sizes: ChannelGaps = part(brief=False)
+    comes_again: ComesAgain | None = part(None)
+    worst: tuple[GapStretch, ...] = part(brief=False)
+    dependence: tuple[Dependence, ...] = part()
+    heat_map: HeatMap | None = part(None)
+    not_excited: tuple[NotExcited, ...] = part()
+    audit: Audit = part()
+    residual: ResidualWindows = part(brief=False)
+    states: States = part(brief=False)
+    playback: AlongFlights | None = part(None)
 
     @property
     def floors(self) -> Array:
         """Gap of each channel in floors, shape (6,); NaN where unknown."""
-        return np.asarray(self.rms / self.floor)
+        return self.sizes.floors
+
+    @property
+    def gap(self) -> dict[str, Any]:
+        """Gap of each channel for machines: lists over x, y, z."""
+        return GapSize(self.sizes.rms, self.floors).as_summary | {"share": self.sizes.share}
+
+    def followed(self, channel: str) -> list[tuple[str, float]]:
+        """List the signals that the gap of a channel surely follows, with their shares, best first."""
+        return [(each.signal, each.r2) for each in self.dependence if each.channel == channel and each.sure]
+
+    @property
+    def followed_channels(self) -> list[str]:
+        """Channels above noise of which it is known what they follow: those below follow chance."""
+        judged = {each.channel for each in self.dependence}
+        return [CHANNELS[index] for index in self.sizes.above_noise if CHANNELS[index] in judged]
 
 
 def compare(
@@ -92,7 +114,7 @@ def compare(
     progress: Callable[[float, str], None] = lambda _done, _note: None,
     *,
     whole: Sequence[Recording] = (),
-) -> Disagreement:
+) -> Comparison:
     """Compare a model with flights.
 
     Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
@@ -138,22 +160,23 @@ def compare(
     repairing = replace(model, repairs=audited)
     played = played_pairs(recordings, repairing, repairing)
     repeated = RepeatedRuns.of(recordings)
-    return Disagreement(
-        audited,
-        rms,
-        np.where(known.any(axis=0), floor, np.nan),
-        _activity(hypothesis, known),
-        np.where(known, residual, np.nan),
-        centres,
-        index,
-        states,
-        stretches(residual / floor, centres, index),
-        dependence,
-        _worst(residual, rms / floor, dependence, states),
-        not_excited(hypothesis, effects, floor),
-        played,
-        errors_by_horizon(played, settings.horizon_s),
-        None if repeated is None else repeated.split(hypothesis, extended.linear),
+    replayed = errors_by_horizon(played, settings.horizon_s)
+    return Comparison(
+        sizes=ChannelGaps(
+            rms=rms,
+            floor=np.where(known.any(axis=0), floor, np.nan),
+            floors=np.where(known.any(axis=0), rms / floor, np.nan),
+            share=rms / _activity(hypothesis, known),
+        ),
+        comes_again=None if repeated is None else repeated.split(hypothesis, extended.linear),
+        worst=stretches(residual / floor, centres, index),
+        dependence=dependence,
+        heat_map=_worst(residual, rms / floor, dependence, states),
+        not_excited=not_excited(hypothesis, effects, floor),
+        audit=audited,
+        residual=ResidualWindows(time=centres, flight=index, value=np.where(known, residual, np.nan)),
+        states=States(name=tuple(states), value=np.column_stack(list(states.values()))),
+        playback=replayed.along(played, {name: name for name in replayed.models if name != STATED}),
     )
 
 
@@ -168,11 +191,9 @@ def _activity(hypothesis: System, known: BoolArray) -> Array:
 
 def _worst(
     residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]
-) -> WorstChannel | None:
+) -> HeatMap | None:
     channel = int(np.nanargmax(floors))
     names = [entry.signal for entry in dependence if entry.channel == CHANNELS[channel]][:2]
     if len(names) < 2:
         return None
-    first, second = names
-    mean = heat_map(residual[:, channel], states[first], states[second])
-    return WorstChannel(CHANNELS[channel], (first, second), mean)
+    return heat_map(CHANNELS[channel], residual[:, channel], (names[0], names[1]), states)

@@ -25,6 +25,7 @@ from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.by_instruments import by_instruments, that_stand, untold, untold_axes
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
+    all_numbers,
     impossible_ratios,
     judge_effects,
     likely_sets,
@@ -36,7 +37,18 @@ from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.lateness import told_apart
 from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
-from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
+from cpfls_cli.gap.naming.results import (
+    Alternative,
+    ByKind,
+    Conclusion,
+    GapChange,
+    GapVerdict,
+    NamedEffect,
+    TorqueAlone,
+    gap_stays,
+    matters,
+    verdict_of,
+)
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
 from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
@@ -57,7 +69,7 @@ class DiagnosisRun:
         Of the training flights, with the chosen effects.
     """
 
-    diagnosis: Diagnosis
+    diagnosis: Conclusion
     air: Air | None
     audit: Audit
     hypothesis: System
@@ -317,13 +329,13 @@ def considered(settings: GapSettings) -> list[Effect]:
 
 def _torque_alone(
     weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
-) -> tuple[tuple[str, float], ...]:
+) -> tuple[TorqueAlone, ...]:
     """List the effects that the torques alone would name first, where the force balance was used too."""
     if not has_force(weak):
         return ()
     step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
     best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
-    return tuple((s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
+    return tuple(TorqueAlone(s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
 
 
 def _concluded(
@@ -331,12 +343,12 @@ def _concluded(
     judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
     excited: bool,
-    torque_alone: tuple[tuple[str, float], ...],
+    torque_alone: tuple[TorqueAlone, ...],
     audited: Audit,
     notes: Sequence[str],
     flown: tuple[Sequence[Recording], Sequence[Recording]],
     settings: GapSettings,
-) -> Diagnosis:
+) -> Conclusion:
     (hypothesis, estimates, *_), held_out = found.judgement
     remainder = found.judge.remainder(found.judgement.found)
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
@@ -374,24 +386,22 @@ def _concluded(
     elif differ:
         verdict = GapVerdict.FLIGHTS_DIFFER
     refused = verdict in (GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER, GapVerdict.CONTRADICTED)
-    return Diagnosis(
-        verdict,
-        tuple(faults if refused else effects),
-        tuple(named) if refused else (),
-        rivals,
-        tuple(known) if verdict is GapVerdict.NAMED else remainder,
-        not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
-        {number.name: number for number in estimates.parameters},
-        share,
-        held_out.size(held_out.before),
-        held_out.size(held_out.after),
-        held_out.floor,
-        torque_alone,
-        (*audited.filtered, *audited.settled, *differ, *wrong, *notes, *audited.warnings, *audited.notes),
-        wrong,
-        differ,
-        removed,
-        likely_sets(judged) if still or not _late(judged) else (),
+    return Conclusion(
+        verdict=verdict,
+        contradictions=wrong,
+        share=share,
+        share_by_kind=ByKind(torque=removed.get("torque", np.nan), force=removed.get("force", np.nan)),
+        differences=differ,
+        effects=tuple(faults if refused else effects),
+        closest=tuple(named) if refused else (),
+        alternatives=rivals,
+        sets=likely_sets(judged) if still or not _late(judged) else (),
+        unexplained=tuple(known) if verdict is GapVerdict.NAMED else remainder,
+        not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
+        vehicle_numbers=all_numbers(estimates),
+        gap=GapChange.of(held_out.size(held_out.before), held_out.size(held_out.after), held_out.floor),
+        torque_alone=torque_alone,
+        notes=(*audited.filtered, *audited.settled, *differ, *wrong, *notes, *audited.warnings, *audited.notes),
     )
 
 

@@ -202,5 +202,5 @@ def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Esti
             continue
         candidate, linear, numbers = fitted[effect.name]
         sentence = effect_sentence(candidate.effect, numbers, hypothesis.vehicle)
-        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=sentence))
+        renewed.append(replace(effect, shape=candidate.shape, linear=linear, numbers=numbers, sentence=sentence))
     return renewed

@@ -18,24 +18,9 @@ def still_air_text() -> Text:
     return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
 
 
-def left_to_gusts(axes: Sequence[GustAxis], told_by: str) -> str:
-    """Say that what is left is gusts: sizes and how long they last, rotations first."""
-    said = []
-    for own in ([axis for axis in axes if axis.turns], [axis for axis in axes if not axis.turns]):
-        if own:
-            sizes, lasting = (
-                ", ".join(number(value, 2) for value in each)
-                for each in ([axis.size for axis in own], [axis.memory for axis in own])
-            )
-            where = f"{'about' if own[0].turns else 'along'} {', '.join(axis.name for axis in own)}"
-            said.append(f"{sizes} {_unit(own[0])} {where}, lasting {lasting} s")
-    nothing = "nothing that the vehicle did before" if told_by == "past" else "nothing that was asked of the vehicle"
-    return f"What is left is gusts, {'; '.join(said)}: {nothing} foretells them."
-
-
 def gust_words(axes: list[GustAxis], told_by: str) -> str:
     """Tell sizes and memories by axis, and what no gust exceeds."""
-    known = [_size(axis) for axis in axes if np.isfinite(axis.size)]
+    known = [axis_words(axis) for axis in axes if np.isfinite(axis.size)]
     least = [
         f"{number(axis.high, 2)} {_unit(axis)} {_where(axis)}"
         for axis in axes
@@ -56,12 +41,8 @@ def gust_words(axes: list[GustAxis], told_by: str) -> str:
 _UNTOLD = ": all that the model leaves, because nothing separates gusts from what it lacks"
 
 
-def beside_gaps(axes: Sequence[GustAxis]) -> str:
-    """Tell the gusts that do not come again beside a gap that does."""
-    return f"{'; '.join(_size(axis) for axis in axes)}: what does not come again."
-
-
-def _size(axis: GustAxis) -> str:
+def axis_words(axis: GustAxis) -> str:
+    """Write size and memory of gusts about or along an axis, with their intervals."""
     size = f"{number(axis.size, 2)} {_unit(axis)} {_where(axis)} ({_ends(axis.low, axis.high)})"
     return f"{size}, lasting {number(axis.memory, 2)} s ({_ends(axis.memory_low, axis.memory_high)})"
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
-from cpfls_cli.report.canvas import plot
-from cpfls_cli.report.content import Plot, Table
+from cpfls_cli.report.canvas import Drawn
+from cpfls_cli.report.content import Table
 from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
-from cpfls_cli.words import capitalised, joined
+from cpfls_cli.words import capitalised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     # What effects are called is told of models that are read without a gap.
     from cpfls_cli.arrays import Array
     from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
-    from cpfls_cli.gap.naming.results import Estimate, LikelySet, NamedEffect
+    from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
 _RELATIVE = "_error"
 _SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
@@ -70,19 +70,17 @@ def effect_sentence(effect: NamedEffect, whole: str = "the gap") -> str:
     return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, whole)}."
 
 
-def closest_sentence(effect: NamedEffect) -> str:
-    """Say which effect came closest to a gap that it does not explain."""
-    size = _size(effect, "what the closest effects explain")
-    return f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {size}."
+def number_words(effect: NamedEffect) -> str:
+    """Write the numbers of an effect with their intervals."""
+    relative = effect.name.endswith(_RELATIVE)
+    return "; ".join(_relative(effect.name, each) if relative else _coefficient(each) for each in effect.numbers)
 
 
 def _size(effect: NamedEffect, whole: str) -> str:
     """Write the numbers of an effect, how sure it is, and its share of a whole."""
     chance = probability(effect.p_value)
     p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
-    relative = effect.name.endswith(_RELATIVE)
-    numbers = "; ".join(_relative(effect.name, c) if relative else _coefficient(c) for c in effect.coefficients)
-    return f"{numbers} ({p_value}, {share_words(effect.share)} of {whole})".lstrip()
+    return f"{number_words(effect)} ({p_value}, {share_words(effect.share)} of {whole})".lstrip()
 
 
 def _coefficient(coefficient: Estimate) -> str:
@@ -101,10 +99,10 @@ def _relative(effect: str, number: Estimate) -> str:
     return f"{name} {value} % [{low}, {high}]"
 
 
-def wrong_numbers(effects: NamedEffectsGroup) -> dict[str, str]:
+def wrong_numbers(effects: Iterable[NamedEffect]) -> dict[str, str]:
     """Give the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`, by identifier."""
-    named = [effect for effect in effects.named if effect.name == VEHICLE_NUMBERS.name]
-    numbers = [(effect, number) for effect in named for number in effect.coefficients]
+    named = [effect for effect in effects if effect.name == VEHICLE_NUMBERS.name]
+    numbers = [(effect, number) for effect in named for number in effect.numbers]
     words = ((number.name, _error_words(effect.name, number)) for effect, number in numbers)
     return {name: f"{short} {value} %" for name, (short, value, *_) in words}
 
@@ -113,40 +111,8 @@ def _error_words(effect: str, number: Estimate) -> list[str]:
     """Name a number of the vehicle as people do, and write its error and the interval in per cent, with signs."""
     name = _SHORT.get(number.name, effect.removesuffix(_RELATIVE).replace("_", " "))
     numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
-    return [name, *(printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers)]
-
-
-def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
-    """Show how sure each effect is."""
-    rows = [
-        [
-            effect_title(effect.name) if named else f"{effect_title(effect.name)} (closest only)",
-            effect.name,
-            whole_percent(effect.share),
-            probability(effect.p_value),
-            whole_percent(effect.selection_frequency),
-            effect.sentence,
-        ]
-        for effect, named in zip(effects.listed, effects.effect.named, strict=True)
-    ]
-    caption = (
-        "Effects. Share: part of the gap above the floor that returns when the effect is left out. p: how often chance "
-        "explains as much with any effect of the catalogue. Chosen again: share of the stretches of flight without "
-        "which it would still be the first choice."
-    )
-    header = ("Effect", "Identifier", "Share", "p", "Chosen again", "What it is")
-    return Table(name, caption, header, rows, frozenset({0, 1, 5}), frozenset({0, 5}))
-
-
-def sets_table(name: str, sets: Sequence[LikelySet]) -> Table:
-    """Show how likely each set of effects is among those compared."""
-    rows = [[joined(titles(each.effects)), whole_percent(each.likely)] for each in sets]
-    caption = (
-        "How likely each set of effects is, of the one that the search chose and all with other effects in the place "
-        "of one of it: by what each leaves of stretches of flight that no fit saw. A set that is not in the catalogue "
-        "is not among them."
-    )
-    return Table(name, caption, ("Set of effects", "Likely"), rows, frozenset({0}), frozenset({0}))
+    signed = (text if text.startswith("-") or text == UNKNOWN or not float(text) else f"+{text}" for text in numbers)
+    return [name, *map(printed, signed)]
 
 
 def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
@@ -156,7 +122,7 @@ def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
     rows = [
         [
             effect if effect not in numbers.effect[:index] else "",
-            _meaning(effect, numbers.name[index]),
+            meaning(effect, numbers.name[index]),
             *measured(*(float(values[index]) for values in (numbers.value, numbers.low, numbers.high))),
             unit_words(numbers.unit[index]),
             _range(float(low[index]), float(high[index])),
@@ -174,12 +140,9 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
     columns = (numbers.value.tolist(), numbers.low.tolist(), numbers.high.tolist())
     rows = []
     for parameter, unit, *values in zip(numbers.name, numbers.unit, *columns, strict=True):
-        kind, _, axis = parameter.rpartition("_")
-        words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else parameter.replace("_", " ")
-        words = f"{_SHORT[parameter]}, {words}" if kind == "inertia" else words
         is_relative = unit == "1"
         value, low, high = (100.0 * each if is_relative else each for each in values)
-        rows.append([words, *measured(value, low, high), "%" if is_relative else unit_words(unit)])
+        rows.append([vehicle_number(parameter), *measured(value, low, high), "%" if is_relative else unit_words(unit)])
     caption = (
         "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
         "Only ratios to the torque of the rotors can be determined."
@@ -197,46 +160,60 @@ def _range(low: float, high: float) -> str:
     return f"{number(low, 3)} … {number(high, 3)}" if np.isfinite([low, high]).any() else UNKNOWN
 
 
-def _meaning(effect: str, coefficient: str) -> str:
+def possible(number: Estimate) -> str:
+    """Write the range that is physically possible."""
+    return _range(*number.plausible)
+
+
+def meaning(effect: str, coefficient: str) -> str:
+    """Name a coefficient of an effect with what it means."""
     if effect not in CATALOGUE:
         return coefficient
     known = CATALOGUE[effect]
-    meaning = {entry.name: entry.meaning for entry in (known.exact or known).numbers}.get(coefficient)
-    return f"{coefficient}: {meaning}" if meaning else coefficient
+    words = {entry.name: entry.meaning for entry in (known.exact or known).numbers}.get(coefficient)
+    return f"{coefficient}: {words}" if words else coefficient
 
 
-def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
-    """Draw where each coefficient lies between the least and the largest possible value, where a range is known."""
-    coefficients = effects.coefficient
-    low, high = coefficients.plausible_low, coefficients.plausible_high
-    with np.errstate(divide="ignore", invalid="ignore"):
-        values = (coefficients.value, coefficients.low, coefficients.high)
-        placed = np.column_stack([(each - low) / (high - low) for each in values])
-    known = np.isfinite(placed[:, 0]) & np.isfinite(low) & np.isfinite(high)
-    # From below, as the axis counts.
-    shown = np.flatnonzero(known)[::-1]
-    if not len(shown):
-        return None
-    names = [f"{coefficients.effect[index]}  {coefficients.name[index]}" for index in shown]
-    ranges = [f"{_range(low[index], high[index])} {unit_words(coefficients.unit[index])}" for index in shown]
+def vehicle_number(name: str) -> str:
+    """Say what a number of the vehicle is."""
+    kind, _, axis = name.rpartition("_")
+    words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
+    return f"{_SHORT[name]}, {words}" if kind == "inertia" else words
 
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        for row, index in enumerate(shown):
-            _draw_row(axes, row, placed[index])
-        axes.set_yticks(range(len(shown)), names)
-        right = axes.twinx()
-        axes.set_ylim(-0.6, len(shown) - 0.4)
-        right.set_ylim(axes.get_ylim())
-        right.set_yticks(range(len(shown)), ranges)
-        right.tick_params(length=0)
-        right.grid(visible=False)
-        axes.set_xlim(-0.03, 1.03)
-        axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
-        axes.grid(visible=False)
 
-    caption = "Value (dot) and 95 % interval (bar) of each coefficient within the range that is physically possible."
-    return plot(name, caption, "Coefficients within their possible ranges", 0.75 + 0.3 * len(shown), draw)
+def intervals_drawn(effects: Callable[[Any], Sequence[NamedEffect]]) -> Drawn:
+    """Make the figure of where each coefficient lies between the least and the largest possible value."""
+
+    def rows(r: Any) -> list[tuple[NamedEffect, Estimate]]:
+        """List numbers whose range is known, from below, as the axis counts."""
+        every = [(effect, number) for effect in effects(r) for number in effect.numbers]
+        return [each for each in every if np.isfinite([*each[1].plausible, each[1].value]).all()][::-1]
+
+    return Drawn(
+        "Coefficients within their possible ranges",
+        lambda r: 0.75 + 0.3 * len(rows(r)),
+        lambda r, figure: _draw_intervals(rows(r), figure),
+        rows,
+    )
+
+
+def _draw_intervals(shown: Sequence[tuple[NamedEffect, Estimate]], figure: Figure) -> None:
+    axes = figure.subplots()
+    for row, (_, own) in enumerate(shown):
+        low, high = own.plausible
+        with np.errstate(divide="ignore", invalid="ignore"):
+            placed = (np.array([own.value, own.low, own.high]) - low) / (high - low)
+        _draw_row(axes, row, placed)
+    axes.set_yticks(range(len(shown)), [f"{effect.name}  {own.name}" for effect, own in shown])
+    right = axes.twinx()
+    axes.set_ylim(-0.6, len(shown) - 0.4)
+    right.set_ylim(axes.get_ylim())
+    right.set_yticks(range(len(shown)), [f"{possible(own)} {unit_words(own.unit)}" for _, own in shown])
+    right.tick_params(length=0)
+    right.grid(visible=False)
+    axes.set_xlim(-0.03, 1.03)
+    axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
+    axes.grid(visible=False)
 
 
 def _draw_row(axes: Axes, row: int, placed: Array) -> None:

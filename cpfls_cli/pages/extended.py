@@ -9,12 +9,13 @@ import numpy as np
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.playback import by_horizon
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.effects import coefficients_table, intervals_figure, named_sentences, parameters_table, titles
-from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
+from cpfls_cli.pages.effects import coefficients_table, intervals_drawn, named_sentences, parameters_table, titles
+from cpfls_cli.pages.gap import gap_table, sizes_drawn
 from cpfls_cli.pages.playback import against_rivals, playback_figure, trust_sentences
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.report.content import Block, Facts, Folded, Heading, Table, Text
+from cpfls_cli.report.canvas import Drawn, picture_of
+from cpfls_cli.report.content import Block, Facts, Folded, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.words import joined
 
@@ -126,17 +127,24 @@ def _gap_table(extended: Source[ExtendedRecord], index: int) -> Table:
     return gap_table(f"extended-gap-{index}", extended.record.gap, caption)
 
 
+_SIZES = "Gap on held-out flights, in noise floors (logarithmic); within the grey band it does not count."
+_INTERVALS = "Value (dot) and 95 % interval (bar) of each coefficient within the range that is physically possible."
+
+
+def _plotted(name: str, caption: str, drawn: Drawn, record: ExtendedRecord) -> Iterator[Plot]:
+    picture = picture_of(drawn, name, record)
+    if picture is not None:
+        yield Plot(name, caption, picture, drawn.description)
+
+
 def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
-    if record.gap.known:
-        yield gap_sizes_figure(f"extended-gap-sizes-{index}", record.gap)
+    yield from _plotted(f"extended-gap-sizes-{index}", _SIZES, sizes_drawn(lambda r: r.gap), record)
     yield from _played(record)
-    drawn = (
-        record.playback
-        and playback_figure(
-            f"extended-prediction-error-{index}", record.playback.by_horizon, "the model with the effects"
-        ),
-        intervals_figure(f"extended-intervals-{index}", record.effects),
+    drawn = record.playback and playback_figure(
+        f"extended-prediction-error-{index}", record.playback.by_horizon, "the model with the effects"
     )
-    yield from (plot for plot in drawn if plot)
+    yield from [drawn] if drawn else []
+    intervals = intervals_drawn(lambda r: r.effects.listed)
+    yield from _plotted(f"extended-intervals-{index}", _INTERVALS, intervals, record)
     if record.effects.parameter.name:
         yield parameters_table(f"extended-parameters-{index}", record.effects)

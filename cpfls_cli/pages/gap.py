@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, logarithmic, plot, style_of
-from cpfls_cli.report.content import Cell, Plot, Table
-from cpfls_cli.report.numbers import number, plain
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, logarithmic, style_of
+from cpfls_cli.report.content import Cell, Table
+from cpfls_cli.report.numbers import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cpfls_cli.artifacts.gap_effects import GapChangeGroup
+    from cpfls_cli.gap.naming.results import GapChange
 
 AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 
@@ -98,34 +99,37 @@ def _view(shown: Sequence[Array]) -> tuple[float, float]:
     return low - room, high + room
 
 
-def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
-    """Draw the gap of each channel on a logarithmic scale, with the noise floor."""
-    channels = [channel_words(gap.channel[index]) for index in gap.known]
-    before, after = gap.before_floors[gap.known], gap.after_floors[gap.known]
-    hidden = bool((np.fmin(before, after) < _LEAST).any())
+def hidden_gaps(gap: GapChange | GapChangeGroup) -> bool:
+    """Tell whether gaps are smaller than the figure of them shows."""
+    return bool((np.fmin(gap.before_floors[gap.known], gap.after_floors[gap.known]) < _LEAST).any())
 
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        rows = np.arange(len(channels))[::-1]
-        start, end = (np.maximum(values, _LEAST) for values in (before, after))
-        axes.hlines(rows, np.fmin(start, end), np.fmax(start, end), color="#bbbbbb", linewidth=2, zorder=1)
-        axes.plot(start, rows, label="before", zorder=2, **_GIVEN)
-        axes.plot(end, rows, label="after", zorder=3, **_SHRUNK)
-        axes.axvspan(0.8 * _LEAST, CLEAR, color="#eeeeee", label="within noise", zorder=0)
-        axes.axvline(1.0, color="black", linewidth=1.1, linestyle=(0, (4, 2)), label="noise floor", zorder=1)
-        axes.set_yticks(rows, channels)
-        axes.set_ylim(-0.6, len(channels) - 0.4)
-        axes.grid(visible=False, axis="y")
-        largest = float(np.nanmax([*before, *after, 1.0]))
-        axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
-        logarithmic(axes, [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)])
-        axes.set_xlabel("gap, noise floors")
-        legend_over(figure, axes)
 
-    note = f" Marks at {plain(_LEAST)} stand for {plain(_LEAST)} or less." if hidden else ""
-    caption = (
-        f"Gap on held-out flights, in noise floors (logarithmic). A gap at the dashed line is as large as what noise "
-        f"alone leaves; within the grey band, up to {CLEAR:g} floors, it does not count.{note}"
+def sizes_drawn(gap: Callable[[Any], GapChange | GapChangeGroup]) -> Drawn:
+    """Make the figure of the gap of each channel on a logarithmic scale, with the noise floor."""
+    return Drawn(
+        "Gap of each channel before and after, in noise floors",
+        lambda r: 1.0 + 0.34 * len(gap(r).known),
+        lambda r, figure: _draw_sizes(gap(r), figure),
+        lambda r: gap(r).known,
     )
-    description = "Gap of each channel before and after, in noise floors"
-    return plot(name, caption, description, 1.0 + 0.34 * len(channels), draw)
+
+
+def _draw_sizes(gap: GapChange | GapChangeGroup, figure: Figure) -> None:
+    channels = [channel_words(tuple(CHANNELS)[index]) for index in gap.known]
+    before, after = gap.before_floors[gap.known], gap.after_floors[gap.known]
+    axes = figure.subplots()
+    rows = np.arange(len(channels))[::-1]
+    start, end = (np.maximum(values, _LEAST) for values in (before, after))
+    axes.hlines(rows, np.fmin(start, end), np.fmax(start, end), color="#bbbbbb", linewidth=2, zorder=1)
+    axes.plot(start, rows, label="before", zorder=2, **_GIVEN)
+    axes.plot(end, rows, label="after", zorder=3, **_SHRUNK)
+    axes.axvspan(0.8 * _LEAST, CLEAR, color="#eeeeee", label="within noise", zorder=0)
+    axes.axvline(1.0, color="black", linewidth=1.1, linestyle=(0, (4, 2)), label="noise floor", zorder=1)
+    axes.set_yticks(rows, channels)
+    axes.set_ylim(-0.6, len(channels) - 0.4)
+    axes.grid(visible=False, axis="y")
+    largest = float(np.nanmax([*before, *after, 1.0]))
+    axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
+    logarithmic(axes, [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)])
+    axes.set_xlabel("gap, noise floors")
+    legend_over(figure, axes)

@@ -8,17 +8,13 @@ from operator import attrgetter
 from typing import Any
 
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
-from cpfls_cli.pages.diagnosis import diagnosis_blocks
-from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
-from cpfls_cli.pages.flight import flight_blocks, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks, recorded_models
-from cpfls_cli.pages.provenance import missing, provenance_section
+from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
@@ -28,7 +24,7 @@ from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import stage_named
 
 
 def _of_each(
@@ -61,7 +57,7 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
-        return [loaded(name).section(source, number) for number, source in enumerate(own, start=1)]
+        return [stage_named(name).section(source, number) for number, source in enumerate(own, start=1)]
 
     return sections
 
@@ -72,16 +68,15 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     comparison_section,
     models_section,
     _of_each("model", "What the model is", recorded_models, model_blocks, among=True),
-    _of_each("diagnosis", "Before and after", attrgetter("diagnoses"), diagnosis_blocks),
+    _of_stage("diagnose"),
     _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
     _of_stage("vehicle"),
-    _of_each("disagreement", "Where they disagree", attrgetter("disagreements"), disagreement_blocks),
-    sensors_section,
-    unseen_section,
+    _of_stage("compare"),
     vehicle_section,
     _of_stage("trajectory"),
-    _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),
+    _of_stage("simulate"),
+    _of_stage("import"),
     _of_stage("reduce"),
     identification_section,
     _of_each("validation", "How far to trust it", _MODELS, validation_blocks),

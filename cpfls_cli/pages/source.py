@@ -23,14 +23,14 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-    from cpfls_cli.artifacts.disagreement import DisagreementRecord
+    from cpfls_cli.artifacts.diagnosis import Diagnosis
+    from cpfls_cli.artifacts.disagreement import Disagreement
     from cpfls_cli.artifacts.extended import ExtendedRecord
-    from cpfls_cli.artifacts.flight import FlightRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.changes.results import Changed, Trend
+    from cpfls_cli.flights.flight import Flight
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
@@ -61,7 +61,7 @@ class Sources:
     settings: ReportSettings
 
     trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
-    flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
+    flights: ClassVar[_OfFormat[Flight]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
     sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
@@ -70,8 +70,8 @@ class Sources:
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
     twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
     gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
-    disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
-    diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
+    disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
+    diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
     trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
-from cpfls_cli.pages.diagnosis import gap_blocks
+from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
-from cpfls_cli.pages.model import cautions_of
+from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import stage_named
 
 
 def summary_section(sources: Sources) -> Section:
@@ -23,15 +22,21 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = list(_cautions(sources))
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
-    blocks += gap_blocks(sources)
-    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
+    blocks += [
+        trust_box(extended)
+        for extended in sources.extensions
+        if sources.by_hash(extended.made_from("diagnosis")) is None
+    ]
+    # A comparison that was diagnosed has its answer there.
+    answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
+    told = [source for source in sources.all if source.stage and source.sha256 not in answered]
+    blocks += [box for source in told for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
-    for flight in sources.flights:
-        quality = flight.record.quality
-        said = () if quality is None else quality.warning or ()
+    for flight in sources.of_kind(Imported):
+        said = (*flight.record.contradictions, *flight.record.warnings)
         blocks += [Text(f"{flight.label}: {warning}.", "warning") for warning in said]
     if len(sources.models) < 2:
         blocks += _missing(sources)
@@ -147,7 +152,7 @@ def _beside_rigid_body(model: Source[IdentifiedRecord], sources: Sources) -> Ite
         )
 
 
-def _noise_free(flight: Source[FlightRecord]) -> bool:
+def _noise_free(flight: Source[Flight]) -> bool:
     """Tell whether a flight was simulated and nothing was added to it."""
     added = [*flight.config["simulation"]["noise"].values(), *flight.config["simulation"]["relative_noise"].values()]
     return flight.made_from("trajectory") is not None and not any(added)

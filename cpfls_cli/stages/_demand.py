@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.flights.flight import Infeasible
 from cpfls_cli.simulation.inverse import Flyability, TooMuch
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
-from cpfls_cli.vehicle.rotors import RotorViolation
 
 _TURN = 360.0
 
@@ -16,16 +16,15 @@ def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str,
     """Say what a plan asks for beyond what the vehicle has, with its time and place; nothing where it can do it all."""
     return (
         *(_too_much(too_much, planned) for too_much in demand.too_much),
-        *(violation_sentence(one, planned.time) + _place(one.first, planned) for one in demand.rotors),
+        *(infeasible_sentence(Infeasible.of(one, planned.time)) + _place(one.first, planned) for one in demand.rotors),
     )
 
 
-def violation_sentence(violation: RotorViolation, time: Array) -> str:
+def infeasible_sentence(one: Infeasible) -> str:
     """Say what a rotor was asked for that it cannot do."""
-    start, end = time[violation.first], time[violation.last]
     return (
-        f"M{violation.rotor + 1}: {violation.kind} asked for at {_samples(violation.count)} from {start:.2f} s to "
-        f"{end:.2f} s (worst squared speed {violation.worst:.6g} rad^2/s^2)"
+        f"M{one.rotor}: {one.kind} asked for at {_samples(one.samples)} from {one.first_s:.2f} s to "
+        f"{one.last_s:.2f} s (worst squared speed {one.worst:.6g} rad^2/s^2)"
     )
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.results import CANNOT_TELL
@@ -22,11 +19,6 @@ CANNOT_TELL_CODE = 3
 
 _APART = 3
 """Facts that are named where two logs are of different vehicles."""
-
-OtherVehicleOption = Annotated[
-    bool,
-    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
-]
 
 
 @stage(FlightNumbers, title="Numbers of each flight", words=WORDS, study=True)

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.gap_flights import TRAINING
-from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
+from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
@@ -18,7 +16,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
 from cpfls_cli.flights.path import PathQuestion, PlannedPath
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.naming.ranking import best_floor
@@ -35,6 +33,7 @@ from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between,
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
+from cpfls_cli.gap.recorded import TRAINING, in_roles
 from cpfls_cli.pages.effects import unit_words
 from cpfls_cli.report.numbers import number
 from cpfls_cli.simulation.inverse import flyability
@@ -142,15 +141,15 @@ _NO_NOISE = (
 
 def _left_open(study: Study, path: Path) -> Case:
     """Ask what a diagnosis leaves open, or for the effects that the config names with what the diagnosis knows."""
-    record = read_of_vehicle(path, DiagnosisRecord, study)
-    base = vehicle_model(record.base).fuzzy
-    recordings = record.flights.recordings(study, TRAINING)
-    prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, audit(record.audit))
+    found, _ = read_result_of_vehicle(path, Diagnosis, study)
+    base, ground = found.base.fuzzy, study.gap.ground_height_m
+    recordings = [each.recording(study.vehicle, ground) for each in in_roles(found.recorded, TRAINING)]
+    prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, found.audit)
     flights = tuple(prepared.repaired(recordings))
-    named = [each for each in record.effects.effects() if each.candidate is not None]
+    named = [each for each in found.effects or found.closest if each.candidate is not None]
     explained = system(flights, [each.candidate for each in named if each.candidate is not None])
     floor = best_floor(explained)
-    rivals, unseen = _open_effects(study, record, flights, path)
+    rivals, unseen = _open_effects(study, found, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
     weighed = questions_left(named, rivals, unseen, flights, floor, study.gap)
     questions = weighed or _between(study)
@@ -164,27 +163,27 @@ def _left_open(study: Study, path: Path) -> Case:
 
 
 def _open_effects(
-    study: Study, record: DiagnosisRecord, flights: Sequence[WeakFlight], path: Path
+    study: Study, found: Diagnosis, flights: Sequence[WeakFlight], path: Path
 ) -> tuple[list[Alternative], list[Effect]]:
     """List the rivals that a diagnosis leaves, or what its flights could not show; nothing for effects not weighed."""
     asked = _effects(study)
     # Between an effect and two that together do the same no path decides: the log has to.
-    rivals = [each for each in record.alternative.rows() if not each.beside]
+    rivals = [each for each in found.alternatives if not each.beside]
     told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
-    rivals = [each for each in rivals if each.name in told and each.instead_of in record.effects_of_motion]
+    rivals = [each for each in rivals if each.name in told and each.instead_of in found.effects_of_motion]
     if asked:
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
         require_tellable([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
-    hidden = [CATALOGUE[name] for name in record.not_excited.name if name in told]
+    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in told]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
         return [], []
-    if record.verdict not in _OPEN or not unseen:
+    if found.verdict not in _OPEN or not unseen:
         raise InputError(
-            f"{path}: its verdict is {record.verdict}, and it leaves nothing to tell apart; to plan a flight all the "
+            f"{path}: its verdict is {found.verdict}, and it leaves nothing to tell apart; to plan a flight all the "
             "same name effects with --to-tell A,B"
         )
     return [], unseen

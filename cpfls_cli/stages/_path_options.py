@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import radians
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from cpfls_cli.config.study import Study
 
 
 class Signal(StrEnum):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from cpfls_cli.arguments import OtherVehicleOption
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.changes.judge import changed as compared
@@ -29,7 +30,6 @@ from cpfls_cli.report.change_words import WORDS
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
-    OtherVehicleOption,
     contradictions_of,
     exit_code,
     first_of_each,

@@ -12,11 +12,9 @@ import numpy as np
 from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.evidence import UncertaintyGroup
-from cpfls_cli.artifacts.flight import CLOCK, FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, read_number
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
@@ -25,6 +23,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import FlightStretch, check_file, flight_source, flight_stretches, torque_source_of
 from cpfls_cli.flights.inputs import hashes_of
 from cpfls_cli.flights.models import any_model, is_found, modelled, read_model
@@ -39,6 +38,7 @@ from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, stacked, style_of
 from cpfls_cli.rotations import attitude_rate, generalised_torque
 from cpfls_cli.stage import Parts, Run, stage
+from cpfls_cli.store import count_rows, read_first
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.prediction import AlongFlight, Totals
 from cpfls_cli.weak_form.windows import Recording
@@ -164,14 +164,14 @@ def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | N
         return _summed(run, found, len(stretches), known)
     functions = modelled(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
-    torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
+    torque = count_rows(flight, Flight, "torque") is not None
     flown = flight_source(flight, torque=torque)
     if run.dry_run:
         return None
     draws = _draws(identified.uncertainty)
     others = (*model_of_another(model, run.study), *other_vehicles([flight], run.study))
     known |= {
-        "begins_s": read_number(flight, CLOCK),
+        "begins_s": read_first(flight, Flight)[0].begins,
         "condition_number": identified.solve.condition_number if identified.known_everywhere else None,
         "warnings": (*(each.text for each in unjudged(identified, model)), *others),
     }

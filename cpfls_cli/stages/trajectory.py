@@ -19,7 +19,6 @@ from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
 from cpfls_cli.flights.path import DERIVATIVES, Excited, PlannedPath
 from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.effects import effect_title
-from cpfls_cli.pages.flight import draw_attitude, draw_rotation
 from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, style_of
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
@@ -27,6 +26,7 @@ from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages import _next_flight as next_flight
 from cpfls_cli.stages._demand import demand_sentences
+from cpfls_cli.stages._flight import draw_attitude, draw_rotation
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
 from cpfls_cli.stages._path_options import (
     Added,

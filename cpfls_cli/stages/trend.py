@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from cpfls_cli.arguments import SchedulerOption, TimeOrder
+from cpfls_cli.arguments import OtherVehicleOption, SchedulerOption, TimeOrder
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import format_name
@@ -35,7 +35,6 @@ from cpfls_cli.report.change_words import WORDS, natural_unit
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
-    OtherVehicleOption,
     contradictions_of,
     exit_code,
     first_of_each,

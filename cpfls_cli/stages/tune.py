@@ -13,9 +13,8 @@ import typer
 
 from cpfls_cli.arguments import AutopilotChoice
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST
-from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
@@ -24,6 +23,7 @@ from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import parameter_file
+from cpfls_cli.flights.flight import Flight, Imported, read_whole
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
 from cpfls_cli.logs.formats import log_contents, read_log
@@ -330,9 +330,11 @@ class _Log:
 def _read(flight: Path, study: Study) -> _Log:
     """Read a log, or what an imported flight keeps of its log, which is low-passed and so shows no noise."""
     nothing = (np.zeros(0), np.zeros((0, 3)), "")
-    if holds(flight, FlightRecord):
-        kept = read_record(flight, FlightRecord).autopilot
-        return _Log(flight.name, kept.system if kept else "", kept.parameters if kept else {}, *nothing)
+    if format_name(flight) == Flight.FORMAT:
+        kept, _ = read_whole(flight)
+        if not isinstance(kept, Imported) or not kept.parameters:
+            return _Log(flight.name, "", {}, *nothing)
+        return _Log(flight.name, kept.system, kept.parameters, *nothing)
     contents = log_contents(flight, ())
     rates = _rates(flight, study) if _maps_rates(study) else nothing
     return _Log(flight.name, contents.system, contents.parameters, *rates)

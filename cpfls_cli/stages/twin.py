@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import go_on
-from cpfls_cli.artifacts.store import read_header, read_record
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
+from cpfls_cli.flights.flight import Imported, read_whole
 from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
@@ -57,6 +56,7 @@ from cpfls_cli.simulation.twin_flight import (
     measured_channels,
 )
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages.compare import to_gap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -324,8 +324,8 @@ def _parameters(path: Path) -> Mapping[str, float | str]:
     """Read what a log, or a flight that was imported from one, knows of its autopilot."""
     if is_log(path):
         return log_contents(path, ()).parameters
-    kept = read_record(path, FlightRecord).autopilot
-    return {} if kept is None else kept.parameters
+    kept, _ = read_whole(path)
+    return kept.parameters if isinstance(kept, Imported) else {}
 
 
 def _thrust_is_share(path: Path, study: Study) -> bool:

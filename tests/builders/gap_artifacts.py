@@ -2,14 +2,37 @@
 
 import numpy as np
 
-from cpfls_cli.artifacts.comes_again import ComesAgainGroup
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli import page
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
+from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows, States
+from cpfls_cli.gap.naming.results import (
+    Alternative,
+    ByKind,
+    Estimate,
+    GapChange,
+    LikelySet,
+    NamedEffect,
+    NotExcited,
+    TorqueAlone,
+    Unexplained,
+)
+from cpfls_cli.gap.recorded import RecordedFlight
+from cpfls_cli.gap.residual.dependence import Dependence
+from cpfls_cli.gap.residual.repeated import ComesAgain
+from cpfls_cli.gap.residual.views import GapStretch, HeatMap
+from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.source import source_of_result
+from cpfls_cli.stage import loaded
+from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
@@ -64,16 +87,142 @@ def vehicle(prefix):
     return {path.replace("vehicle", prefix, 1): values for path, values in data.items()}
 
 
-def flights(names=("one.csv", "two.csv"), roles=("training", "held-out")):
-    samples = 8
+def flights(roles=("training", "held-out")):
+    """Two flights of four samples each."""
+    pairs = zip(("one.csv", "two.csv"), roles, strict=True)
+    still = {"time": 0.01 * np.arange(4), "body_rate": np.zeros((4, 3))}
     return {
-        "flight/name": texts(*names),
-        "flight/role": texts(*roles),
-        "flight/first": np.array([0, 4]),
-        "flight/commanded": np.zeros(2, dtype=int),
-        "signals/time": np.arange(samples) * 0.01,
-        "signals/body_rate": np.zeros((samples, 3)),
+        f"flight-{number}": RecordedFlight(name=name, role=role, commanded=False, begins=np.nan, **still)
+        for number, (name, role) in enumerate(pairs, start=1)
     }
+
+
+def rows(data, group, *names):
+    """List the rows of a table that is given as datasets."""
+    return list(zip(*(data[f"{group}/{name}"].tolist() for name in names), strict=True))
+
+
+def part(kind, data, group):
+    """Make a result of the datasets of a group; None where there are none."""
+    held = {path.removeprefix(f"{group}/"): each for path, each in data.items() if path.startswith(f"{group}/")}
+    return kind(**held) if held else None
+
+
+def audited(data):
+    """Make an audit of its datasets."""
+    numbers = rows(data, "audit_coefficient", "finding", "name", "unit", "value", "low", "high", "named")
+    return Audit(
+        findings=tuple(
+            AuditFinding(
+                name=name,
+                coefficients=tuple(
+                    FaultNumber(name=of, value=value, unit=unit, low=low, high=high, named=bool(sure))
+                    for owner, of, unit, value, low, high, sure in numbers
+                    if owner == name
+                ),
+                p_value=p_value,
+                named=bool(named),
+                sentence=sentence,
+            )
+            for name, named, p_value, sentence in rows(data, "audit", "finding", "named", "p_value", "sentence")
+        ),
+        untested=dict(each.split(": ", 1) for each in data["audit/untested"].tolist()),
+        warnings=tuple(data["audit/warning"].tolist()),
+        notes=tuple(data["audit/note"].tolist()),
+        contradictions=tuple(data["audit/contradiction"].tolist()) if "audit/contradiction" in data else (),
+    )
+
+
+def along(kind, data):
+    """Make a playback of its datasets."""
+    names, signals = data["playback/prediction"].tolist(), ("body_rate", "attitude", "velocity", "position")
+    return kind(
+        horizon_s=data["playback/horizon_s"],
+        models={
+            name: Prediction(
+                diverged=0,
+                **{
+                    signal: Errors(
+                        mae=data[f"playback/{signal}/mae"][row], rms_by_axis=data[f"playback/{signal}/rms"][row]
+                    )
+                    for signal in signals
+                    if f"playback/{signal}/mae" in data
+                },
+            )
+            for row, name in enumerate(names)
+        },
+        flights=tuple(data["playback/flight"].tolist()),
+        windows=60,
+    )
+
+
+def stretches(data):
+    """Make stretches of their datasets."""
+    found = rows(data, "stretch", "flight", "start", "end", "channel", "floors")
+    return tuple(GapStretch(int(flight), *others) for flight, *others in found)
+
+
+def unseen(data):
+    """Make effects that were not excited of their datasets."""
+    return tuple(NotExcited(*row) for row in rows(data, "not_excited", "name", "reason"))
+
+
+def effects_of(data, named):
+    """Make effects of their datasets: those that are named, or those that are the closest."""
+    numbers = rows(
+        data, "coefficient", "effect", "name", "unit", "value", "low", "high", "plausible_low", "plausible_high"
+    )
+    columns = ("name", "named", "p_value", "share", "selection_frequency", "sentence")
+    return tuple(
+        named_effect(
+            name,
+            linear=[value for owner, value in rows(data, "linear", "effect", "value") if owner == name],
+            numbers=tuple(
+                Estimate(*own, tuple(ends))
+                for owner, *own, low, high in numbers
+                if owner == name
+                for ends in [(low, high)]
+            ),
+            p_value=p_value,
+            share=share,
+            selection_frequency=frequency,
+            sentence=sentence,
+        )
+        for name, is_named, p_value, share, frequency, sentence in rows(data, "effect", *columns)
+        if bool(is_named) is named
+    )
+
+
+def named_effect(
+    name, shape=None, linear=(), numbers=(), p_value=0.001, share=1.0, selection_frequency=1.0, sentence=""
+):
+    """Make an effect with its numbers."""
+    return NamedEffect(
+        name=name,
+        shape=shape or {},
+        linear=np.array(linear, dtype=float),
+        numbers=tuple(numbers),
+        p_value=p_value,
+        share=share,
+        selection_frequency=selection_frequency,
+        sentence=sentence,
+    )
+
+
+def source_of(given, stage, config="seed: 1\n", cautions=()):
+    """Say where a result comes from, for its template."""
+    origin = Origin(stage=stage, seed=1, config=config, cautions=tuple(cautions))
+    return source_of_result(given, origin, f"{stage}.h5", f"{stage}.h5", "f" * 64)
+
+
+def blocks_of(given, stage, **origin):
+    """Give what a result says as blocks."""
+    return page.blocks(text_of(given, stage, **origin))
+
+
+def text_of(given, stage, **origin):
+    """Word a result by the template of its stage."""
+    return loaded(stage).text(given, about=source_of(given, stage, **origin))
 
 
 def playback(*predictions, **sizes):
@@ -131,10 +280,26 @@ def disagreement(force=True, **changed):
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
         "warning": texts("one.csv: rotor 2 looks saturated"),
-        **vehicle("base"),
-        **flights(roles=("given", "given")),
-    }
-    return Artifact(DisagreementRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
+    } | changed
+    return Disagreement(
+        sizes=part(ChannelGaps, {path: each for path, each in data.items() if path != "gap/channel"}, "gap"),
+        comes_again=None,
+        worst=stretches(data),
+        dependence=tuple(Dependence(*row) for row in rows(data, "dependence", "channel", "signal", "r2", "p_value")),
+        heat_map=HeatMap(
+            channel=str(data["heat_map/channel"]),
+            signals=tuple(data["heat_map/signal"].tolist()),
+            **{name: data[f"heat_map/{name}"] for name in ("first_edge", "second_edge", "mean", "count")},
+        ),
+        not_excited=unseen(data),
+        audit=audited(data),
+        residual=part(ResidualWindows, data, "residual"),
+        states=States(name=tuple(data["state/name"].tolist()), value=data["state/value"]),
+        playback=along(AlongFlights, data),
+        warnings=tuple(data["warning"].tolist()),
+        base=VehicleModel(vehicle=VehicleSettings()),
+        recorded=flights(("given", "given")),
+    )
 
 
 def effects(*rows):
@@ -196,17 +361,12 @@ def pictures():
     }
 
 
-def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alone=(), force=True, **changed):
+def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alone=(), sets=(), force=True, **changed):
     data = {
         "verdict": np.array(verdict),
         "share": 0.973,
         "split": np.array("no flight was held out by name"),
         **effects(*named),
-        **table("alternative", ("'name", "'instead_of", "relative_gain", "'separated_by", "'beside"), alternatives),
-        **table(
-            "unexplained", ("'axis", "floors", "'signal", "share", "frequency", "'energy"), unexplained
-        ),
-        **table("torque_alone", ("'name", "share"), alone),
         **sizes(force),
         **played_pair(),
         **table(
@@ -215,7 +375,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
             [(0, 5.0, 6.2, "torque x", 90.0), (0, 1.0, 2.5, "force z", 80.0)],
         ),
         "residual/time": np.arange(WINDOWS) * 0.2,
-        "residual/flight": np.zeros(WINDOWS),
+        "residual/flight": np.zeros(WINDOWS, dtype=int),
         "residual/before": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
         "residual/parameters": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
         "residual/after": np.zeros((WINDOWS, 6)),
@@ -223,10 +383,49 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
         "note": texts("A note that readers need."),
-        **vehicle("base"),
-        **flights(),
-    }  # fmt: skip
-    return Artifact(DiagnosisRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
+    } | changed  # fmt: skip
+    kinds, listed = data.get("share_by_kind", [np.nan, np.nan]), {name: tuple(data.get(name, ())) for name in LISTED}
+    chosen = {path: each for path, each in data.items() if path != "gap/channel"}
+    return Diagnosis(
+        verdict=str(data["verdict"]),
+        contradictions=tuple(map(str, listed["impossible"])),
+        share=float(data["share"]),
+        share_by_kind=ByKind(torque=float(kinds[0]), force=float(kinds[1])),
+        differences=tuple(map(str, listed["difference"])),
+        effects=effects_of(data, named=True),
+        closest=effects_of(data, named=False),
+        alternatives=tuple(Alternative(*row) for row in alternatives),
+        sets=tuple(LikelySet(*row) for row in sets),
+        unexplained=tuple(
+            Unexplained(axis, floors, signal or None, part_, None if np.isnan(hz) else hz, energy)
+            for axis, floors, signal, part_, hz, energy in unexplained
+        ),
+        not_excited=unseen(data),
+        vehicle_numbers=tuple(
+            Estimate(*row, (np.nan, np.nan)) for row in rows(data, "parameter", "name", "unit", "value", "low", "high")
+        ),
+        gap=part(GapChange, chosen, "gap"),
+        torque_alone=tuple(TorqueAlone(*row) for row in alone),
+        notes=tuple(map(str, listed["note"])),
+        playback=along(PlaybackChange, data),
+        worst=stretches(data),
+        residual=part(ResidualChange, data, "residual"),
+        whiteness=part(WhitenessChange, data, "whiteness"),
+        picture=part(
+            WorstWindows,
+            data | {f"picture/{name}": str(data[f"picture/{name}"]) for name in ("flight", "channel")},
+            "picture",
+        ),
+        run=part(FreeRuns, data | {"run/flight": str(data["run/flight"])}, "run"),
+        audit=audited(data),
+        split=str(data["split"]),
+        warnings=tuple(map(str, listed["warning"])),
+        base=VehicleModel(vehicle=VehicleSettings()),
+        recorded=flights(),
+    )
+
+
+LISTED = ("impossible", "difference", "note", "warning")
 
 
 def extended(diagnosis_sha256="", **changed):
@@ -243,18 +442,12 @@ def extended(diagnosis_sha256="", **changed):
     return Artifact(ExtendedRecord.spec(), Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
 
 
-def without(artifact, *groups):
-    """Leave out optional datasets."""
-    kept = {path: values for path, values in artifact.data.items() if path.split("/")[0] not in groups}
-    return Artifact(artifact.spec, artifact.header, kept)
-
-
 def comes_again(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):
     """What of gaps comes again, shares by channel and band, of rad/s^2 and m/s^2 about a body of 1 kg m^2 and 1 kg."""
     share = np.array(share, dtype=float)
     total = np.full(share.shape, gap**2)
     low, high = [0.0, 2.0, 1.0, 0.5, 0.25, 0.0], [6.0, 6.0, 3.0, 1.5, 0.75, 0.25]
-    return ComesAgainGroup(
+    return ComesAgain(
         low=np.array(low),
         high=np.array(high),
         total=total,

@@ -58,13 +58,12 @@ def imported(cpfls, tmp_path):
         (("attitude", "rotor_command"), "rotor-command", []),
     ],
 )
-def test_what_later_stages_will_miss_is_said_and_kept(imported, signals, source, wanted):
+def test_what_later_stages_will_miss_is_said_and_kept(cpfls, imported, signals, source, wanted):
     _, notes, flight = imported(*signals, source=source)
     assert [note[: len(start)] for note, start in zip(notes, wanted, strict=True)] == wanted
     assert all(note.endswith("cpfls vehicle and replay need rotors instead") for note in notes if NO_TORQUE in note)
-    with h5py.File(flight) as file:
-        kept = list(file["quality/warning"].asstr()) if notes else []
-        assert ("quality/warning" in file, kept) == (bool(notes), notes)
+    again = cpfls("info", flight, "-v").stderr.splitlines()
+    assert [f"cpfls: note: {note}" for note in notes] == again
 
 
 def test_the_stages_refuse_as_it_was_said(imported, refuse, study, tmp_path):
@@ -152,5 +151,5 @@ def test_a_filter_before_the_log_is_said_and_its_cut_off_is_kept(notes_of):
     notes, flight = notes_of(**dict(zip("pqr", filtered.T, strict=True)))
     assert "the spectrum drops sharply: body_rate at about 12 Hz; low-passed before logging" in notes[0]
     with h5py.File(flight) as file:
-        assert list(file["quality/filtered"].asstr()) == ["body_rate"]
-        assert file["quality/cut_off"][0] == pytest.approx(12.0, rel=0.1)
+        assert list(file["cut_off_hz/name"].asstr()) == ["body_rate"]
+        assert file["cut_off_hz/value"][0] == pytest.approx(12.0, rel=0.1)

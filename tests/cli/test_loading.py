@@ -83,7 +83,7 @@ def imported():
     assert len(names) > 20
     codes = {
         "the package": "import cpfls_cli",
-        "flying": "from cpfls_cli.commands import simulate, trajectory",
+        "flying": "from cpfls_cli.stages import simulate, trajectory",
         "searches": "from cpfls_cli.commands import identify, sweep; from cpfls_cli.stages import reduce",
         "report": "import cpfls_cli.commands.report",
         "all commands and pages": f"import {', '.join(names)}",

@@ -138,7 +138,7 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
         assert len(file["time"]) == len(TIME)
         np.testing.assert_allclose(file["time"], TIME, atol=1e-8)
         # A date in s is known to a quarter of a microsecond.
-        assert float(file["clock/begins"][()]) == pytest.approx(BEGINS.get(name, 0.0), abs=5e-7, rel=0)
+        assert float(file["begins"][()]) == pytest.approx(BEGINS.get(name, 0.0), abs=5e-7, rel=0)
         for signal, values in SIGNALS.items():
             # Most logs keep seven digits.
             np.testing.assert_allclose(file[signal], values, atol=1e-6, err_msg=signal)

@@ -107,7 +107,7 @@ def test_it_is_listed_without_being_loaded(house):
     assert command.get_short_help_str() == "Weigh a craft."
     assert "cpfls_cli.stages.weigh_it" not in importlib.sys.modules
     assert {"craft", "factor", "output", "as_json", "dry_run"} <= {own.name for own in command.params}
-    assert "cpfls_cli.stages.weigh_it" in importlib.sys.modules
+    assert "cpfls_cli.stages.weigh_it" not in importlib.sys.modules
 
 
 def test_it_computes_writes_and_answers(house, capsys, tmp_path):

@@ -179,7 +179,7 @@ def test_what_has_nothing_over_time_is_refused(refuse, pipeline, tmp_path):
 def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path):
     shutil.copy(logged / "flight.h5", tmp_path / "flight.h5")
     with edited(tmp_path / "flight.h5") as file:
-        file["clock/begins"][()] = -5.0
+        file["begins"][()] = -5.0
     (said,) = refuse("export", tmp_path / "flight.h5", "-o", tmp_path / "flight.mcap")
     assert "no stamps before 0" in said
     exported(cpfls, tmp_path / "flight.h5", tmp_path / "flight.csv")

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.flights.flight import Flight, Simulated
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.store import read
 from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
@@ -150,10 +150,10 @@ def test_every_part_of_the_model_flies(sums, written, vehicle, flight, part):
 def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
     commanded = written("commanded.h5", replace(WHOLE, commanded=True))
     flown = fly("commanded-flight.h5", commanded)
-    record = read_record(flown, FlightRecord)
+    record = read(flown, Simulated)[0]
     assert record.rotor_speed is None
     late = {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
-    assert late.items() <= record.effects.by_name.items()
+    assert late.items() <= record.effects.items()
     errors = sums(commanded, flown, "--hold", "linear")
     assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
 
@@ -264,7 +264,7 @@ def written_log(flight, tmp_path):
     """Write what a flight measured as a log, and give the settings that import it."""
 
     def call(**more):
-        flown = read_record(flight, FlightRecord)
+        flown = read(flight, Flight)[0]
         columns = {
             "attitude": ("rad", flown.attitude),
             "body_rate": ("rad/s", flown.body_rate),
@@ -358,7 +358,7 @@ def test_gusts_of_a_model_are_played_where_they_are_asked_for(cpfls, config, pat
         slow = ("--set", "simulation.closed_loop.integration_rate_hz=100")
         result = cpfls("simulate", config, path, "--model", model, "-o", folder / name, *slow, *options)
         assert result.exit_code == 0, result.stderr
-        return (folder / name).read_bytes(), read_record(folder / name, FlightRecord).body_rate, result.stdout
+        return (folder / name).read_bytes(), read(folder / name, Flight)[0].body_rate, result.stdout
 
     once, shaken, said = flown("shaken.h5", "--gusts")
     again, _, _ = flown("again.h5", "--gusts")

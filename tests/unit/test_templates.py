@@ -12,9 +12,9 @@ from cpfls_cli.cli.stages import PARTS, STAGES, stage_commands
 from cpfls_cli.page import TEMPLATES, environment
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import described_fields
-from cpfls_cli.stage import loaded
+from cpfls_cli.stage import loaded, stage_named
 
-NAMES = sorted(file.stem for file in STAGES.glob("[a-z]*.py"))
+NAMES = sorted(file.stem.strip("_") for file in STAGES.glob("[a-z]*.py"))
 GIVEN = {"r", "source", "loop", "caller"}
 SAME_ROWS = {"first", "last", "list", "sort", "selectattr", "rejectattr"}
 CONTEXTS = ("load", "store", "param")
@@ -110,7 +110,7 @@ def test_each_stage_has_a_template_and_each_template_a_stage():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_templates_name_exists(name):
-    stage = loaded(name)
+    stage = stage_named(name)
     own = environment(TEMPLATES, stage.words)
     for template in templates(name):
         text, _, _ = own.loader.get_source(own, template)
@@ -128,7 +128,7 @@ def test_what_templates_name_exists(name):
 
 def test_a_name_that_does_not_exist_is_found():
     kind = loaded("reduce").kind
-    own = environment(TEMPLATES)
+    own = environment(TEMPLATES, {})
     with pytest.raises(AssertionError, match="has no selektion"):
         Walk(kind)(own.parse("{{ r.selektion }}"))
     look = loaded("look").kind

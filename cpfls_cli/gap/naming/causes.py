@@ -55,14 +55,14 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
         step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
         own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(
-            candidate.effect.name,
-            candidate,
-            estimates.of_effect[index],
-            numbers,
-            step.p_value(own.gain) if chance is None else chance,
-            share,
-            _frequency(own, ranking),
-            effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
+            name=candidate.effect.name,
+            shape=candidate.shape,
+            linear=estimates.of_effect[index],
+            numbers=numbers,
+            p_value=step.p_value(own.gain) if chance is None else chance,
+            share=share,
+            selection_frequency=_frequency(own, ranking),
+            sentence=effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
         )
         compared = {
             tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
@@ -129,7 +129,7 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
     named = [
-        (CATALOGUE[each.name].accounts, {number.name: number.value for number in each.coefficients}) for each in effects
+        (CATALOGUE[each.name].accounts, {number.name: number.value for number in each.numbers}) for each in effects
     ]
     wrong = []
     for number in (each for each in estimates.parameters if each.name in NUMBERS):
@@ -142,8 +142,15 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
         return None
     share = float(max(shown[number.name] for number in wrong))
     p_value = min(_chance(number) for number in wrong)
-    return NamedEffect(
-        VEHICLE_NUMBERS.name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, VEHICLE_NUMBERS.sentence
+    return _without_columns(VEHICLE_NUMBERS.name, tuple(wrong), p_value, share, VEHICLE_NUMBERS.sentence)
+
+
+def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
+    """List the numbers of the vehicle in the order of the catalogue; the interval of one that is not known is NaN."""
+    known, nothing = {each.name: each for each in estimates.parameters}, (np.nan, np.nan)
+    return tuple(
+        known.get(own.name) or Estimate(own.name, own.unit, float(value), *nothing, nothing)
+        for own, value in zip(VEHICLE_NUMBERS.coefficients, estimates.of_vehicle, strict=True)
     )
 
 
@@ -174,4 +181,20 @@ def sensor_fault(
         for number in finding.coefficients
         if number.named and (known := by_label[number.name])
     )
-    return NamedEffect(finding.name, None, np.zeros(0), numbers, finding.p_value, share, 1.0, finding.sentence)
+    return _without_columns(finding.name, numbers, finding.p_value, share, finding.sentence)
+
+
+def _without_columns(
+    name: str, numbers: tuple[Estimate, ...], p_value: float, share: float, sentence: str
+) -> NamedEffect:
+    """Name what is no part of a model: a fault of the sensors, or wrong numbers of the vehicle."""
+    return NamedEffect(
+        name=name,
+        shape={},
+        linear=np.zeros(0),
+        numbers=numbers,
+        p_value=p_value,
+        share=share,
+        selection_frequency=1.0,
+        sentence=sentence,
+    )

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
+from cpfls_cli.result import about, part, result
+
+BODY = "body (FLU)"
+_EVALUATED = ("wrench", "actuator")
+"""Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
 
 
 class GapVerdict(StrEnum):
@@ -28,14 +35,14 @@ class GapVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimated coefficient with its 95 % confidence interval, and the range that is possible on the vehicle."""
+    """An estimated number with its 95 % confidence interval, and the range that is possible on the vehicle."""
 
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    plausible: tuple[float, float]
+    name: str = about("of the number")
+    unit: str = about("1 for a share, or an error relative to the number of the model")
+    value: float = about("estimate", unit="SI")
+    low: float = about("lower end of the 95 % interval", unit="SI", gaps=True)
+    high: float = about("upper end of the 95 % interval", unit="SI", gaps=True)
+    plausible: tuple[float, float] = about("least and largest value that is physically possible", "2", gaps=True)
 
     @property
     def impossible(self) -> bool:
@@ -43,71 +50,96 @@ class Estimate:
         return self.high < self.plausible[0] or self.low > self.plausible[1]
 
 
-@dataclass(frozen=True)
+@result
 class NamedEffect:
-    """An effect that is part of the diagnosis; other fields are described at `EffectGroup`.
+    """An effect with all its numbers, enough to evaluate it."""
 
-    Attributes
-    ----------
-    candidate : Candidate or None
-        None for faults of sensors, and for numbers of the vehicle.
-    linear : array, shape (coefficient,)
-        Of the columns; empty where the effect has none.
-    coefficients : tuple of Estimate
-        Physical coefficients, then shapes.
-    """
+    SHOWN: ClassVar = ("coefficients",)
 
-    name: str
-    candidate: Candidate | None
-    linear: Array
-    coefficients: tuple[Estimate, ...]
-    p_value: float
-    share: float
-    selection_frequency: float
-    sentence: str
+    name: str = about("identifier, see `cpfls effects`")
+    shape: Mapping[str, float] = about("what it depends on nonlinearly", unit="SI", brief=False)
+    linear: Array = about("coefficients of its columns", "number", unit="SI", ragged=True, brief=False)
+    numbers: tuple[Estimate, ...] = part(brief=False)
+    p_value: float = about("probability that chance explains as much, over the whole catalogue")
+    share: float = about("part of the gap above the floor that returns without it")
+    selection_frequency: float = about("share of the blocks without which it is still the first choice")
+    sentence: str = about("what it means, in plain words")
+
+    @property
+    def coefficients(self) -> dict[str, Estimate]:
+        """Physical coefficients, then shapes, by name."""
+        return {each.name: each for each in self.numbers}
+
+    @property
+    def kind(self) -> str:
+        """Wrench, actuator, sensor or parameter."""
+        return CATALOGUE[self.name].kind
+
+    @property
+    def of_log(self) -> bool:
+        """Whether the audit of the sensors tests it: then it is a fault of the log, whatever it is in a model."""
+        return CATALOGUE[self.name].test is not None
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The effect with its shapes; None for faults of sensors, and for numbers of the vehicle."""
+        shape = dict(self.shape)
+        entry = effect(self.name).form(len(self.linear), shape)
+        return Candidate(entry, shape) if entry.kind in _EVALUATED and len(shape) == len(entry.shapes) else None
+
+
+@dataclass(frozen=True)
+class TorqueAlone:
+    """An effect that a look at the torques alone would choose first."""
+
+    name: str = about("identifier of the effect")
+    share: float = about("share of the gap that it would explain")
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that the flights cannot tell from a named one; its fields are described at `AlternativeGroup`."""
+    """An effect that the flights cannot tell from a named one."""
 
-    name: str
-    instead_of: str
-    relative_gain: float
-    separated_by: str
-    beside: str = ""
+    name: str = about("identifier of the effect")
+    instead_of: str = about("the named one")
+    relative_gain: float = about(
+        "what it explains over what the named one explains; NaN where it could not be tried", gaps=True
+    )
+    separated_by: str = about("the flight, or the signal, that separates them")
+    beside: str = about(
+        "another effect that is not named and without which it would not do; empty for none", default=""
+    )
 
 
 @dataclass(frozen=True)
 class LikelySet:
     """A set of effects with how likely it is among those compared."""
 
-    effects: tuple[str, ...]
-    likely: float
+    effects: tuple[str, ...] = about("its effects", "effect")
+    likely: float = about("probability among the sets compared, by the residual of blocks that no fit saw")
 
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A channel with a gap that nothing in the catalogue explains; its fields are described at `UnexplainedGroup`."""
+    """A channel with a gap that nothing in the catalogue explains."""
 
-    axis: str
-    floors: float
-    signal: str | None
-    share: float
-    frequency_hz: float | None
-    energy: str
+    axis: str = about("the channel")
+    floors: float = about("root mean square of its residual, in floors")
+    signal: str | None = about("signal that it depends on most")
+    share: float = about("share of the residual that signal or narrow band explains")
+    frequency_hz: float | None = about("of a narrow band that stands out", unit="Hz")
+    energy: str = about("feeds, drains or neither")
 
 
 @dataclass(frozen=True)
 class NotExcited:
     """An effect that these flights could not show."""
 
-    name: str
-    reason: str
+    name: str = about("identifier of the effect")
+    reason: str = about("signals that are lacking, or the flight that would show it")
 
 
-@dataclass(frozen=True)
-class GapSize:
+class GapSize(NamedTuple):
     """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown.
 
     Attributes
@@ -119,49 +151,117 @@ class GapSize:
     value: Array
     floors: Array
 
+    @property
+    def as_summary(self) -> dict[str, Any]:
+        """Torque and force over x, y, z for machines."""
+        pairs = {"torque_n_m": (self.value, 0), "floors": (self.floors, 0)}
+        pairs |= {"force_n": (self.value, 3), "force_floors": (self.floors, 3)}
+        return {name: values[first : first + 3] for name, (values, first) in pairs.items()}
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """Result of a diagnosis: the effects that a model misses.
 
-    Attributes
-    ----------
-    closest : tuple of NamedEffect
-        What explained most where the verdict names nothing.
-    parameters : mapping of str to Estimate
-        Relative errors of the vehicle's own numbers, refitted with the effects.
-    share : float
-        Of the gap above the floor that the effects take off the held-out flights; the least of `shares`, which are
-        those of ``torque`` and of ``force``, where they have a gap.
-    before, after : GapSize
-        Of the model as it was and with the effects, on the held-out flights.
-    floor : array, shape (6,), N m and N
-    torque_alone : tuple of (str, float)
-        First choices of a look at the torques alone, and the share that each would explain.
-    notes, contradictions, differences : tuple of str
-        Sentences: all that a reader should know; what of the log contradicts itself or its vehicle; and what differs
-        between the flights that were learned from and those held out.
-    sets : tuple of LikelySet
-        The set that the search chose, and those with another effect in the place of one of it; most likely first.
-    """
+@result
+class GapChange:
+    """Gap of each channel on held-out flights, before and after: torque about x, y, z, then force along x, y, z."""
 
-    verdict: GapVerdict
-    effects: tuple[NamedEffect, ...]
-    closest: tuple[NamedEffect, ...]
-    alternatives: tuple[Alternative, ...]
-    unexplained: tuple[Unexplained, ...]
-    not_excited: tuple[NotExcited, ...]
-    parameters: Mapping[str, Estimate]
-    share: float
-    before: GapSize
-    after: GapSize
-    floor: Array
-    torque_alone: tuple[tuple[str, float], ...]
-    notes: tuple[str, ...]
-    contradictions: tuple[str, ...] = ()
-    differences: tuple[str, ...] = ()
-    shares: Mapping[str, float] = field(default_factory=dict)
-    sets: tuple[LikelySet, ...] = ()
+    before: Array = about("root mean square of the model as given", "6", unit="SI", frame=BODY, gaps=True)
+    after: Array = about("the same with the effects", "6", unit="SI", frame=BODY, gaps=True)
+    floor: Array = about("noise floor of the held-out flights", "6", unit="SI", frame=BODY, gaps=True)
+    before_floors: Array = about("gap of the model as given, in floors", "6", frame=BODY, gaps=True)
+    after_floors: Array = about("gap with the effects, in floors", "6", frame=BODY, gaps=True)
+
+    @classmethod
+    def of(cls, before: GapSize, after: GapSize, floor: Array) -> Self:
+        """Arrange the gap before and after; the floor has shape (6,), N m and N."""
+        return cls(
+            before=before.value,
+            after=after.value,
+            floor=np.where(np.isfinite(before.value), floor, np.nan),
+            before_floors=before.floors,
+            after_floors=after.floors,
+        )
+
+    @property
+    def known(self) -> list[int]:
+        """Indices of the channels whose gap is known."""
+        return np.flatnonzero(np.isfinite(self.before_floors)).tolist()
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the gap of any force is known."""
+        return any(index >= 3 for index in self.known)
+
+    @property
+    def loud(self) -> list[int]:
+        """Indices of the channels that are above noise before or after; of none the largest."""
+        above = (self.before_floors > CLEAR) | (self.after_floors > CLEAR)
+        loud = [index for index in self.known if above[index]]
+        return loud or ([int(np.nanargmax(self.before_floors))] if self.known else [])
+
+    @property
+    def grown(self) -> BoolArray:
+        """Channels whose gap is above noise and larger with the effects than without, shape (6,)."""
+        return np.asarray((self.after_floors > CLEAR) & (self.after_floors > (1 + COUNTS) * self.before_floors))
+
+    @property
+    def worse_axes(self) -> list[int]:
+        """Indices of the axes about which a clear gap grows by more than formulas are off by."""
+        before, after = self.before_floors[:3], self.after_floors[:3]
+        return [int(c) for c in np.flatnonzero((before > CLEAR) & (after > (1 + OFF) * before))]
+
+
+@result
+class ByKind:
+    """A share of torque and one of force; NaN where there is no gap, or no name."""
+
+    torque: float = about("of the torque", gaps=True)
+    force: float = about("of the force", gaps=True)
+
+
+@result
+class Conclusion:
+    """What a diagnosis concludes: the effects that a model misses."""
+
+    verdict: str = about("NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, CONTRADICTED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
+    contradictions: tuple[str, ...] = about(
+        "contradictions within the log or with its vehicle, including numbers that no vehicle has", "contradicted"
+    )
+    share: float = about("part of the held-out gap above the floor that the effects take off: the least by kind")
+    share_by_kind: ByKind = part()
+    differences: tuple[str, ...] = about("what differs between the training and the held-out flights", "difference")
+    effects: tuple[NamedEffect, ...] = part()
+    closest: tuple[NamedEffect, ...] = part()
+    alternatives: tuple[Alternative, ...] = part()
+    sets: tuple[LikelySet, ...] = part()
+    unexplained: tuple[Unexplained, ...] = part()
+    not_excited: tuple[NotExcited, ...] = part()
+    vehicle_numbers: tuple[Estimate, ...] = part(brief=False)
+    gap: GapChange = part(brief=False)
+    torque_alone: tuple[TorqueAlone, ...] = part()
+    notes: tuple[str, ...] = about("what a reader should know", "remark")
+
+    @property
+    def parameters(self) -> dict[str, Estimate]:
+        """Numbers of the vehicle, refitted with the effects, by name: relative errors where their unit is 1."""
+        return {each.name: each for each in self.vehicle_numbers}
+
+    @property
+    def effects_of_motion(self) -> tuple[str, ...]:
+        """Effects that the verdict names and that torque and force show, by identifier."""
+        return tuple(each.name for each in self.effects if each.kind in _EVALUATED)
+
+    @property
+    def forces_decide(self) -> bool:
+        """Whether the torques alone would name another effect first than torque and force together."""
+        alone, named = self.torque_alone, self.effects_of_motion
+        return bool(alone and named and self.gap.has_force and alone[0].name not in named)
+
+    @property
+    def rivals(self) -> dict[str, list[Alternative]]:
+        """Effects that could be named instead, by the named one."""
+        found: dict[str, list[Alternative]] = {}
+        for rival in self.alternatives:
+            found.setdefault(rival.instead_of, []).append(rival)
+        return found
 
 
 def verdict_of(

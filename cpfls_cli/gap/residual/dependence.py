@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -12,6 +12,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.settings import CHANCE
+from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
@@ -26,21 +28,23 @@ ANGLES = ("roll", "yaw")
 
 
 class Dependence(NamedTuple):
-    """Share of a channel of the residual that one signal alone explains.
+    """Share of a channel of the residual that one signal alone explains."""
 
-    Other fields are described at `DependenceGroup`.
+    channel: Annotated[str, About("channel of the gap")]
+    signal: Annotated[str, About("signal that the gap is explained with, alone")]
+    r2: Annotated[
+        float,
+        About(
+            "share of the variance about the mean of each flight that a curve over the signal explains on blocks that "
+            "its fit did not see; negative where it is worse than none"
+        ),
+    ]
+    p_value: Annotated[float, About("probability that chance does as well with any signal")]
 
-    Attributes
-    ----------
-    r2 : float
-        Share of the variance about the mean of each flight that the curve explains on blocks its fit did not see;
-        negative where the curve is worse than none.
-    """
-
-    channel: str
-    signal: str
-    r2: float
-    p_value: float
+    @property
+    def sure(self) -> bool:
+        """Whether it is no chance."""
+        return self.p_value < CHANCE and self.r2 > 0
 
 
 def rank_dependence(

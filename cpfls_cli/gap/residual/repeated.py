@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import FEWEST_BLOCKS, jackknife_error
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, left_over
-from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.result import about, result
 from cpfls_cli.weak_form.windows import Recording, Windows
+
+_SURE = 1 - 0.05 / 36
+"""Confidence from which on something comes again: 36 numbers are looked at, and chance shall pass none in 95 %."""
+OPEN = 0.5
+"""Share of a gap up to which it has to be known that no more comes again, to say that it does not."""
+_TOLD = 0.2
+"""Standard error of an explained share above which it says nothing: hardly any motion comes again there."""
 
 
 class Band(NamedTuple):
@@ -34,38 +43,209 @@ class Band(NamedTuple):
     high: float
 
 
-@dataclass(frozen=True)
-class ComesAgain:
-    """What of a gap comes again in other runs of the same path, by channel and band; the first band is all of them.
-
-    With the gap r of a run and r' of another at the same place of the path, mean squares are over windows and pairs;
-    N^2 m^2 and N^2, NaN where unknown.
-
-    Other fields are described at `ComesAgainGroup`.
+class Part(NamedTuple):
+    """Neighbouring bands in which something comes again.
 
     Attributes
     ----------
-    share, share_error : array, shape (6, band)
-        Of the gap that comes again, and its standard error over blocks of the path.
-    explained, explained_error : array, shape (6, band)
-        Of what the motion takes and comes again, the share that the model explains.
+    bands : slice
+    low, high : float, Hz
     """
 
-    low: Array
-    high: Array
-    total: Array
-    again: Array
-    noise: Array
-    taken: Array
-    share: Array
-    share_error: Array
-    explained: Array
-    explained_error: Array
-    resists: Array
-    flights: tuple[str, ...]
-    paths: int
-    runs: int
-    blocks: IntArray
+    bands: slice
+    low: float
+    high: float
+
+
+@result
+class ComesAgain:
+    """What of a gap comes again in other runs of the same path, by channel and band, and what does not.
+
+    With the gap r of a run and r' of another at the same place of the path, mean squares are over windows and pairs;
+    N^2 m^2 and N^2, NaN where unknown.
+    """
+
+    SHOWN: ClassVar = ("nothing", "bands_hz", "channels")
+
+    low: Array = about("lower end of each band, about; the first band is all of them", "band", unit="Hz", brief=False)
+    high: Array = about("upper end of each band, about", "band", unit="Hz", brief=False)
+    total: Array = about(
+        "mean square of the gap in a band, (N m)^2 and N^2",
+        "channel",
+        "band",
+        unit="SI",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    again: Array = about(
+        "what of it comes again: mean product with the gap of another run at the same place of the path",
+        "channel",
+        "band",
+        unit="SI",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    noise: Array = about(
+        "what white noise of the sensors leaves of the gap; NaN where signals were filtered",
+        "channel",
+        "band",
+        unit="SI",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    taken: Array = about(
+        "what comes again of the torque or force that the motion takes, as a mean product",
+        "channel",
+        "band",
+        unit="SI",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    share_error: Array = about(
+        "standard error of again over total", "channel", "band", frame="body (FLU)", gaps=True, brief=False
+    )
+    explained_error: Array = about(
+        "standard error of 1 less again over taken, the share of the motion that comes again and the model explains",
+        "channel",
+        "band",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    resists: Array = about(
+        "moments of inertia, kg m^2, and mass, kg", "channel", unit="SI", frame="body (FLU)", brief=False
+    )
+    flights: tuple[str, ...] = about("flights that repeat each other", "repeating")
+    runs: int = about("runs that are compared with others")
+    paths: int = about("different paths among them")
+    blocks: IntArray = about("blocks of the paths that tell the errors", "band", brief=False)
+
+    @property
+    def share(self) -> Array:
+        """Share of the gap that comes again, shape (channel, band)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.again / self.total)
+
+    @property
+    def share_half(self) -> Array:
+        """Half of its 95 % interval, shape (channel, band)."""
+        return half_width(self.share_error, self.blocks)
+
+    @property
+    def explained(self) -> Array:
+        """Share of the motion that comes again and is explained, shape (channel, band); NaN where hardly any does."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = 1 - self.again / self.taken
+        return np.where((self.taken > 0) & (self.explained_error < _TOLD), share, np.nan)
+
+    @property
+    def sure(self) -> BoolArray:
+        """Where more comes again than chance lets and than hardly counts, shape (channel, band)."""
+        return np.asarray(self.share > np.maximum(half_width(self.share_error, self.blocks, _SURE), COUNTS))
+
+    @property
+    def known(self) -> list[int]:
+        """Indices of the channels that are known."""
+        return np.flatnonzero(np.isfinite(self.total[:, 0])).tolist()
+
+    @property
+    def repeating(self) -> list[int]:
+        """Indices of the channels of which something comes again."""
+        return np.flatnonzero(self.sure.any(axis=1)).tolist()
+
+    def parts(self, channel: int) -> list[Part]:
+        """List neighbouring bands in which a gap comes again; all of them where it shows in none alone."""
+        sure = self.sure[channel]
+        bands = [slice(first + 1, after + 1) for first, after in runs(sure[1:])]
+        found = [Part(own, float(self.low[own.stop - 1]), float(self.high[own.start])) for own in bands]
+        return found or ([Part(slice(0, 1), float(self.low[0]), float(self.high[0]))] if sure[0] else [])
+
+    def share_in(self, channel: int, part: Part) -> float:
+        """Compute the share of a gap that comes again in some bands together."""
+        return float(np.nansum(self.again[channel, part.bands]) / np.nansum(self.total[channel, part.bands]))
+
+    def at_most(self, channel: int) -> float:
+        """Bound the share of all of a gap that may come again, by 95 %; products that cancel are taken for none."""
+        bound = np.maximum(self.share[channel, 0], 0.0) + self.share_half[channel, 0]
+        return float(np.clip(np.nan_to_num(bound), 0.0, 1.0))
+
+    @property
+    def largest(self) -> tuple[float, int, Part] | None:
+        """Largest share of a gap that comes again in a part, with its channel; None where none surely does."""
+        pairs = [(channel, part) for channel in self.repeating for part in self.parts(channel)]
+        found = [(self.share_in(*pair), *pair) for pair in pairs]
+        return max(found, key=lambda each: each[0], default=None)
+
+    def explained_in(self, channel: int, part: Part) -> tuple[float, float] | None:
+        """Give the least and largest share of the motion in a part that the model explains, where it explains some."""
+        explained = self.explained[channel, part.bands]
+        return (float(explained.min()), float(explained.max())) if (explained > COUNTS).all() else None
+
+    def kept_of(self, before: ComesAgain, channel: int, part: Part) -> float:
+        """Compute the share that is left of what came again in a part before effects."""
+        left, came = (np.nansum(each.again[channel, part.bands]) for each in (self, before))
+        return float(np.clip(left / came, 0.0, 1.0))
+
+    def left_of(self, before: ComesAgain) -> dict[int, float]:
+        """Give by channel the largest share that is left of what came again before; infinite where none came."""
+        shares = {}
+        for channel in self.repeating:
+            bands = [part.bands for part in self.parts(channel)]
+            came, left = ([float(np.nansum(each.again[channel, own])) for own in bands] for each in (before, self))
+            shares[channel] = max(now / then if then > 0 else np.inf for then, now in zip(came, left, strict=True))
+        return shares
+
+    @property
+    def sizes(self) -> Array:
+        """Root mean square of the gap over inertia or mass, rad/s^2 and m/s^2, shape (channel, band)."""
+        return np.asarray(np.sqrt(self.total) / self.resists[:, None])
+
+    @property
+    def noise_size(self) -> Array:
+        """The same of the noise of the sensors, all bands together, shape (channel,)."""
+        return np.asarray(np.sqrt(self.noise[:, 0]) / self.resists)
+
+    @property
+    def nothing(self) -> bool:
+        """Whether it is known that nothing of a gap comes again but a part that does not matter."""
+        return not self.repeating and self.most <= OPEN
+
+    @property
+    def most(self) -> float:
+        """Largest share of the gap of a channel that may come again."""
+        return max((self.at_most(channel) for channel in self.known), default=0.0)
+
+    @property
+    def does_not(self) -> Array:
+        """Root mean square of what is neither again nor noise of the sensors, rad/s^2 and m/s^2, shape (channel,)."""
+        noise = np.nan_to_num(self.noise[:, 0])
+        rest = self.total[:, 0] - np.clip(self.again[:, 0], 0.0, None) - noise
+        return np.asarray(np.sqrt(np.clip(rest, 0.0, None)) / self.resists)
+
+    @property
+    def bands_hz(self) -> Array:
+        """Ends of each band, shape (band, 2)."""
+        return np.column_stack([self.low, self.high])
+
+    @property
+    def channels(self) -> dict[str, dict[str, Any]]:
+        """Known channels for machines: of each a list over the bands."""
+        values = {
+            "gap": np.sqrt(self.total),
+            "share": self.share,
+            "share_half_width": self.share_half,
+            "comes_again": self.sure,
+            "noise": np.sqrt(self.noise),
+            "explained": self.explained,
+        }
+        return {
+            CHANNELS[index]: {key: each[index] for key, each in values.items()} | {"does_not": self.does_not[index]}
+            for index in self.known
+        }
 
 
 @dataclass(frozen=True)
@@ -146,7 +326,7 @@ class RepeatedRuns:
             return None
         known = np.all([flight.known for flight in flights], axis=0)[:, None] & (blocks >= FEWEST_BLOCKS)
         values, errors = np.where(known, np.stack([_with_errors(of_band) for of_band in found], axis=-1), np.nan)
-        total, again, taken, share, explained = values
+        total, again, taken, *_ = values
         body = flights[0].signals.vehicle
         return ComesAgain(
             low=np.array([band.low for band in self.bands]),
@@ -160,8 +340,6 @@ class RepeatedRuns:
             total=total,
             again=again,
             taken=taken,
-            share=share,
-            explained=explained,
             share_error=errors[3],
             explained_error=errors[4],
         )

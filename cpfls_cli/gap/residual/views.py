@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, uniform_filter1d
@@ -14,6 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
+from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
@@ -25,13 +26,13 @@ _LONGEST_PAUSE_S = 1.0
 
 
 class GapStretch(NamedTuple):
-    """A stretch of a flight with a large gap; its fields are described at `StretchGroup`."""
+    """A stretch of a flight with a large gap."""
 
-    flight: int
-    start_s: float
-    end_s: float
-    channel: str
-    rms_floors: float
+    flight: Annotated[int, About("index of the flight")]
+    start_s: Annotated[float, About("on the clock of the flight", unit="s")]
+    end_s: Annotated[float, About("on the clock of the flight", unit="s")]
+    channel: Annotated[str, About("channel of the gap")]
+    rms_floors: Annotated[float, About("root mean square of the gap there, in floors")]
 
 
 def stretches(
@@ -91,26 +92,23 @@ def _runs(above: BoolArray, pause: int) -> list[slice]:
     return [slice(*run) for run in runs(joined)]
 
 
-@dataclass(frozen=True)
+@result
 class HeatMap:
-    """Mean residual in the cells of a grid over two signals.
+    """Mean gap of a channel in the cells of a grid over two signals."""
 
-    Attributes
-    ----------
-    edges : tuple of array, shape (bins + 1,)
-        Of the first and the second signal.
-    mean : array, shape (bins, bins)
-        In the unit of the residual; not a number in empty cells.
-    count : array, shape (bins, bins)
-        Windows in each cell.
-    """
-
-    edges: tuple[Array, Array]
-    mean: Array
-    count: Array
+    channel: str = about("channel with the largest gap in floors")
+    signals: tuple[str, ...] = about("the two signals that explain it best", "2")
+    first_edge: Array = about("edges of the cells along the first signal", "edge", unit="SI", brief=False)
+    second_edge: Array = about("edges of the cells along the second signal", "edge", unit="SI", brief=False)
+    mean: Array = about(
+        "mean gap in each cell, N m or N; NaN in empty ones", "first", "second", unit="SI", gaps=True, brief=False
+    )
+    count: Array = about("windows in each cell", "first", "second", brief=False)
 
 
-def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> HeatMap:
+def heat_map(
+    channel: str, residual: Array, signals: tuple[str, str], states: Mapping[str, Array], bins: int = 12
+) -> HeatMap:
     """Average a residual over the cells of two signals.
 
     The outer cells also take the half per cent of windows beyond each end of the grid, so that a few windows do not
@@ -119,20 +117,30 @@ def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> He
     Parameters
     ----------
     residual : array, shape (window,)
-    first, second : array, shape (window,)
-        Windows where one is not a number are left out.
+        Of the channel.
+    signals : tuple of str
+    states : mapping of str to array, shape (window,)
+        By signal; windows where one is not a number are left out.
     bins : int
         Cells along each signal.
     """
+    first, second = (states[name] for name in signals)
     known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
-    signals = [first[known], second[known]]
-    edges = [_edges(signal, bins) for signal in signals]
-    cells = [np.clip(np.searchsorted(e, s, side="right") - 1, 0, bins - 1) for e, s in zip(edges, signals, strict=True)]
+    values = [first[known], second[known]]
+    edges = [_edges(each, bins) for each in values]
+    cells = [np.clip(np.searchsorted(e, v, side="right") - 1, 0, bins - 1) for e, v in zip(edges, values, strict=True)]
     flat = cells[0] * bins + cells[1]
     count = np.bincount(flat, minlength=bins**2).astype(float)
     total = np.bincount(flat, weights=residual[known], minlength=bins**2)
     mean = np.divide(total, count, out=np.full(bins**2, np.nan), where=count > 0)
-    return HeatMap((edges[0], edges[1]), mean.reshape(bins, bins), count.reshape(bins, bins))
+    return HeatMap(
+        channel=channel,
+        signals=signals,
+        first_edge=edges[0],
+        second_edge=edges[1],
+        mean=mean.reshape(bins, bins),
+        count=count.reshape(bins, bins),
+    )
 
 
 def _edges(signal: Array, bins: int) -> Array:

@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +14,7 @@ from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
+from tests.builders.exported_vehicles import on_numpy
 
 
 def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
@@ -30,16 +29,14 @@ def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
 
 def test_it_is_exported(cpfls, extended, tmp_path):
     output = tmp_path / "quad.py"
-    result = cpfls("export", extended, "-o", output)
+    result = cpfls("export", extended, "--format", "jax", "-o", output)
     assert result.exit_code == 0, result.stderr
     assert "Effects: " in result.stdout
     assert "On held-out flights its largest gap is " in result.stdout
-    done = subprocess.run([sys.executable, "-I", output], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    names = {"__name__": "quad"}
-    exec(output.read_text(), names)
+    names = on_numpy(output.read_text())
     # Where the centre of mass is off, equal rotors tilt the vehicle.
-    torque, force = names["wrench"](np.zeros(3), np.zeros(3), names["steady"](np.full(4, 350.0)))
+    wrench = names["wrench"](np.zeros(3), np.zeros(3), names["steady"](np.full(4, 350.0)))
+    force, torque = wrench[:3], wrench[3:]
     offset = read_record(extended, ExtendedRecord).vehicle.effect.linear_of("com_offset")
     thrust = 4 * 121.5e-6 * 350.0**2
     np.testing.assert_allclose(torque[:2], [-offset[1] * thrust, offset[0] * thrust], rtol=1e-9)
@@ -85,11 +82,9 @@ def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
     with edited(old) as file:
         file.attrs["format"] = f"cpfls/{name}"
         file.attrs["schema_version"] = 1
+        file.attrs.pop("kind", None)
     (line,) = refuse("export", old, "-o", tmp_path / "m.c")
-    assert line == (
-        f"{old}: a model written by an earlier cpfls, before all models shared one format; make it again with "
-        f"`cpfls {command}`"
-    )
+    assert line.endswith(f"whose files this version does not read; make it again with `cpfls {command}`")
 
 
 def test_an_identified_model_holds_the_stated_vehicle(pipeline):

@@ -70,8 +70,8 @@ def test_identified_model_is_flown(cpfls, fly, gap_config, path, tmp_path):
 
 
 def test_a_model_with_effects_needs_closed_loop(refuse, gap_config, path, extended, tmp_path):
-    (line,) = refuse("simulate", gap_config, path, "--model", extended, "-o", tmp_path / "x.h5")
-    assert line.startswith(f"{extended}: a model with effects is flown in closed loop only; add --mode closed-loop")
+    (line,) = refuse("simulate", gap_config, path, "--model", extended, "--mode", "inverse", "-o", tmp_path / "x.h5")
+    assert line.startswith(f"{extended}: no model is flown in mode inverse; leave the mode out")
 
 
 def test_a_model_of_another_vehicle_is_refused(refuse, gap_config, path, extended, tmp_path):

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights import flight_source
+from cpfls_cli.flights.flight import Flight, Simulated
+from cpfls_cli.store import read, write
 from cpfls_cli.vehicle.rotors import body_wrench
 
 COLUMNS = "t,wx,wy,wz,om1,om2,om3,om4,phi,theta,psi"
@@ -42,7 +42,7 @@ def test_error_is_the_gap_that_remains(cpfls, gap_config, extended, flown, tmp_p
         assert file["held_against"][()] == b"motion"
     # The rotors balance the offset, 0.47 N m about y, so that their torque turns nothing, and the model knows.
     vehicle = load_study(gap_config).vehicle
-    rotors = body_wrench(vehicle, read_record(flown, FlightRecord).signals["rotor_speed"]).body_torque
+    rotors = body_wrench(vehicle, read(flown, Flight)[0].signals["rotor_speed"]).body_torque
     assert abs(rotors[50:-50, 1].mean()) > 0.4
     assert abs(measured[:, 1].mean()) < 0.01
     assert abs(error[:, 1].mean()) < 0.01
@@ -58,11 +58,11 @@ def test_a_flight_without_attitude_is_refused(cpfls, refuse, gap_config, extende
 
 
 def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, flown, tmp_path, monkeypatch):
-    record = read_record(flown, FlightRecord)
+    record, origin = read(flown, Simulated)
     times = 2 * PART // len(record.time) + 1
     tiled = {name: np.concatenate([values] * times) for name, values in record.signals.items()}
     tiled["time"] = record.time[1] * np.arange(len(tiled["body_rate"]))
-    write_record(tmp_path / "long.h5", replace(record, **tiled))
+    write(tmp_path / "long.h5", replace(record, **tiled), origin)
 
     def predicted(name):
         output = tmp_path / name

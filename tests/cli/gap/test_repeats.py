@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.rotations import euler_angles
+from cpfls_cli.store import read
 from tests.builders.command_line import undrawn
 from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
 
@@ -78,12 +78,12 @@ def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_on
         assert told["channels"]["force x"]["share"][0] > 0.7
         assert all(told["channels"]["force x"]["comes_again"][:5])
         assert not any(told["channels"]["torque x"]["comes_again"])
-    record = read_record(found.folder / "diagnosis.h5", DiagnosisRecord)
-    assert record.again_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
+    diagnosed, _ = read(found.folder / "diagnosis.h5", Diagnosis)
+    assert diagnosed.again_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
 
 
 def test_the_report_shows_it_in_a_picture(found):
     page = (found.folder / "report.html").read_text()
-    assert "comes-again-diagnosed-1" in page
-    assert "comes-again-compared-1" in page
-    assert page.index("REPEATS") < page.index("What comes again")
+    assert "diagnose-1-comes-again" in page
+    assert "compare-1-comes-again" in page
+    assert page.index("REPEATS") < page.index("band by band")

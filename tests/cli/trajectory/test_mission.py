@@ -6,9 +6,8 @@ import shlex
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.store import read
@@ -50,7 +49,7 @@ def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_p
     flight = tmp_path / "flight.h5"
     result = cpfls("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
     assert result.exit_code == 0, result.output
-    planned, flown = read(mission[0], PlannedPath)[0], read_record(flight, FlightRecord)
+    planned, flown = read(mission[0], PlannedPath)[0], read(flight, Flight)[0]
     firsts = [round(run.begin / planned.time[1]) for run in planned.runs]
     length = round(planned.runs[0].end / planned.time[1]) + 1
     for name in ("attitude", "body_rate", "rotor_speed", "velocity"):

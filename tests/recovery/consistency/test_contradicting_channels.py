@@ -260,7 +260,7 @@ def test_rotors_that_disagree_about_their_delay_are_left_alone(lively):
 def test_the_effect_is_named_in_spite_of_late_rotors(lively):
     found = answer(*with_rotors_late(lively, 0.05, 0.05))
     assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
-    assert found.effects[0].coefficients[0].value == pytest.approx(DRAG, rel=0.05)
+    assert found.effects[0].numbers[0].value == pytest.approx(DRAG, rel=0.05)
     assert "The rotor speeds are late" in found.notes[0]
 
 
@@ -292,9 +292,9 @@ def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
     change, words = WRONG[wrong]
     found = answer(*(change(signals) for signals in flights))
     assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
-    assert found.effects[0].coefficients[0].value == pytest.approx(DRAG, rel=0.05)
+    assert found.effects[0].numbers[0].value == pytest.approx(DRAG, rel=0.05)
     assert words in found.notes[0]
-    assert np.nanmax(found.before.floors) < 20
+    assert np.nanmax(found.gap.before_floors) < 20
 
 
 def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flights):

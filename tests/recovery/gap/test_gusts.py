@@ -76,7 +76,7 @@ def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoint
     tells_sizes(run.air.found)
     assert run.diagnosis.verdict is GapVerdict.NAMED
     (effect,) = run.diagnosis.effects
-    (number,) = effect.coefficients
+    (number,) = effect.numbers
     assert (effect.name, number.name) == ("parameter_error", "inertia_x")
     assert number.low < 1 / HEAVY - 1 < number.high < 0
 
@@ -105,7 +105,7 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert run.diagnosis.verdict is GapVerdict.NAMED
     assert not run.diagnosis.alternatives
     (effect,) = run.diagnosis.effects
-    (number,) = effect.coefficients
+    (number,) = effect.numbers
     assert effect.name == "motor_lag"
     # The gyroscope's noise is inside of the loop.
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.comes_again import ComesAgainGroup
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
@@ -42,7 +41,7 @@ def split(flown):
     recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
     flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
-    return ComesAgainGroup.of(RepeatedRuns.of(recordings).split(model.system(flights), model.linear))
+    return RepeatedRuns.of(recordings).split(model.system(flights), model.linear)
 
 
 def test_the_share_that_comes_again_is_that_of_the_effects(found):

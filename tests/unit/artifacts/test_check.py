@@ -1,15 +1,38 @@
 """The rules of `check_artifact`, each broken alone."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.spec import Format, Header, Record, dataset, group, record
 from cpfls_cli.artifacts.store import Artifact
 
-FLIGHT = FlightRecord.spec()
+
+@record
+class Quality:
+    """What was found."""
+
+    warning: tuple[str, ...] = dataset("what to know", "warning")
+    delay: float = dataset("of motion", units="s")
+
+
+@record
+class Flown(Record):
+    """A flight."""
+
+    FORMAT: ClassVar = Format("cpfls/flown", "a flight", "import")
+
+    time: np.ndarray = dataset("time", "time", units="s")
+    attitude: np.ndarray = dataset("angles", "time", "axis", units="rad")
+    rotor_speed: np.ndarray = dataset("speeds", "time", "rotor", gaps=True)
+    rotor_command: np.ndarray = dataset("commands", "time", "rotor")
+    quality: Quality = group()
+
+
+FLIGHT = Flown.spec()
 
 
 def findings(spec=FLIGHT, **data):
@@ -35,7 +58,7 @@ def test_good():
         ({"attitude": np.full((4, 3), "x")}, "attitude: holds text, expected numbers"),
         ({"attitude": np.zeros((4, 3), complex)}, "attitude: holds complex128, expected numbers"),
         ({"quality__warning": np.zeros(1)}, "quality/warning: holds numbers, expected text"),
-        ({"delay__value": np.nan}, "delay/value: 1 samples are not finite, the first at index 0"),
+        ({"quality__delay": np.nan}, "quality/delay: 1 samples are not finite, the first at index 0"),
         ({"time": np.array([0.0, 1, 1, 2])}, "time: does not ascend at index 2"),
         ({"time": np.array([0.0, 3, 2, 1])}, "time: does not ascend at index 2"),
     ],

@@ -9,7 +9,6 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, Format, Header, InputFile, Record, dataset, group, record
@@ -176,7 +175,7 @@ def test_files_get_the_permissions_of_any_new_file(tmp_path):
 def test_wrong_format_names_both(tmp_path):
     write_artifact(tmp_path / "s.h5", selection())
     with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/flight"):
-        read_artifact(tmp_path / "s.h5", FlightRecord.spec())
+        read_artifact(tmp_path / "s.h5", Format("cpfls/flight", "a flight", "import"))
 
 
 def test_pipe_is_not_waited_for(tmp_path):

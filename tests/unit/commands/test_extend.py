@@ -4,9 +4,10 @@ import pytest
 from cpfls_cli.artifacts.gap_effects import worse_axes
 from cpfls_cli.commands.extend import require_named
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
+from cpfls_cli.gap.naming.results import GapVerdict
+from tests.builders.gap_artifacts import named_effect
 
-OFFSET = NamedEffect("com_offset", None, np.array([0.01]), (), 1e-9, 0.998, 1.0, "Off centre.")
+OFFSET = named_effect("com_offset", linear=[0.01], p_value=1e-9, share=0.998, sentence="Off centre.")
 
 
 @pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])

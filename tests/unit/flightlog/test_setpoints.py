@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.importing import import_log, read_signals
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import hold_asked, on_one_clock
+from cpfls_cli.flights.flight import Imported
 
 PERIOD, SAMPLES = 0.01, 401
 TIME = PERIOD * np.arange(SAMPLES)
@@ -156,11 +156,11 @@ def test_a_flight_holds_its_setpoints_and_counts_where_they_are_known():
     thrust = np.linspace(0.2, 0.6, SAMPLES)[:, None].copy()
     thrust[:21] = np.nan
     signals = {"setpoint_position": mapped("m", *columns_of("x")), "setpoint_thrust": mapped("1", "f0")}
-    record = FlightRecord.of_import(import_log(log(x=wished, f=thrust), settings(signals)), {})
+    record = Imported.of(import_log(log(x=wished, f=thrust), settings(signals)))
     assert record.setpoint_thrust is not None
     assert record.setpoint_thrust.shape == (SAMPLES,)
     # The first value goes back by import.gap_s, and no further.
-    assert record.setpoints_known == {"position": SAMPLES, "thrust": SAMPLES - 11}
+    assert record.setpoints == {"position": SAMPLES, "thrust": SAMPLES - 11}
 
 
 def test_on_a_clock_that_was_computed_a_setpoint_is_not_a_row_late():

@@ -7,31 +7,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
 from cpfls_cli.flights import playback, recordings
+from cpfls_cli.flights.flight import MOTION
+from cpfls_cli.store import Origin, write
+from tests.builders.flown import imported, simulated
 
 SAMPLES = 30
 
 
-def write(path, samples):
+def write_flight(path, samples):
     rng = np.random.default_rng(2)
     signals = {name: rng.normal(size=(samples, 3)) for name in (*MOTION, "torque")}
-    header = Header("1", 1, resolved_yaml(Study()))
-    write_record(path, FlightRecord(header=header, time=np.arange(samples) / 10, **signals))
+    flight = simulated(time=np.arange(samples) / 10, **signals)
+    write(path, flight, Origin(stage="simulate", seed=1, config=resolved_yaml(Study())))
 
 
 @pytest.fixture
 def source(tmp_path, monkeypatch):
     """As a worker gets it: pickled here, and read there."""
     monkeypatch.setattr(sources, "IN_MEMORY", 10)
-    write(tmp_path / "flight.h5", SAMPLES)
+    write_flight(tmp_path / "flight.h5", SAMPLES)
     opened = sources.part_of(sources.flight_source(tmp_path / "flight.h5"), slice(5, 20))
     return pickle.loads(pickle.dumps(opened))
 
@@ -48,7 +49,7 @@ def another_size(path):
 
 def another_length(path):
     size, sealed = path.stat().st_size, len(seal_of(b""))
-    write(path, SAMPLES - 3)
+    write_flight(path, SAMPLES - 3)
     content = path.read_bytes()[:-sealed].ljust(size - sealed, b"\0")
     path.write_bytes(content + seal_of(content))
 
@@ -80,12 +81,13 @@ def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
         del mapped["body_torque"]
     config = parse_config(resolved_yaml(Study()), "own") | {"import": {"signals": mapped, "torque_source": source}}
     study = validate(config, "own")
-    header = Header("1", 1, resolved_yaml(study), {"log": InputFile("log.csv", "0" * 64, "CSV")})
+    inputs = {"log": InputFile("log.csv", "0" * 64, "CSV")}
     signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate")}
     name, columns = ("body_torque", 3) if commands is None else ("rotor_command", 4)
     signals[name] = rng.uniform(0.2, 0.8, size=(90, columns))
     signals["voltage"] = np.linspace(*voltage, 90)
-    write_record(path, FlightRecord(header=header, time=PERIOD_S * np.arange(90), **signals))
+    flight = imported(time=PERIOD_S * np.arange(90), **signals)
+    write(path, flight, Origin(stage="import", seed=1, config=resolved_yaml(study), inputs=inputs))
     return path
 
 

@@ -6,7 +6,8 @@ from scipy.stats import norm
 
 from cpfls_cli.gap.naming.causes import JudgedEffect, impossible_ratios, likely_sets, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates
-from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+from cpfls_cli.gap.naming.results import Estimate
+from tests.builders.gap_artifacts import named_effect
 
 
 def number(name, value, half):
@@ -18,7 +19,7 @@ def found(*numbers):
 
 
 def named(name, *coefficients):
-    return NamedEffect(name, None, np.zeros(0), coefficients, 0.001, 0.9, 1.0, "")
+    return named_effect(name, numbers=coefficients, share=0.9)
 
 
 SURE = number("inertia_x", 0.15, 0.02)
@@ -26,7 +27,7 @@ SURE = number("inertia_x", 0.15, 0.02)
 
 def told(*numbers, effects=(), share=0.5):
     effect = wrong_numbers(found(*numbers), effects, np.broadcast_to(share, 6))
-    return () if effect is None else tuple(each.name for each in effect.coefficients)
+    return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
 def test_sure_numbers_are_told():

@@ -6,19 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.weak_flight import Candidate, rotation_balance
+from cpfls_cli.gap.balance.weak_flight import rotation_balance
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, extend, plain
-from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
+from tests.builders.gap_artifacts import named_effect
 
 VEHICLE = VehicleSettings()
 INERTIA = np.array([0.6, 0.6, 1.2])
@@ -65,11 +64,11 @@ def effect_wrench(model, signals):
 
 def test_gap_is_the_missing_torque():
     found = compared([recording_of_sines(1, bias), recording_of_sines(2, bias)])
-    assert found.rms[1] == pytest.approx(0.1, rel=0.02)
-    assert (found.rms[[0, 2]] < 0.03).all()
+    assert found.sizes.rms[1] == pytest.approx(0.1, rel=0.02)
+    assert (found.sizes.rms[[0, 2]] < 0.03).all()
     assert found.floors[1] > 5
-    assert np.isnan(found.rms[3:]).all()
-    assert np.isnan(found.residual[:, 3:]).all()
+    assert np.isnan(found.sizes.rms[3:]).all()
+    assert np.isnan(found.residual.value[:, 3:]).all()
 
 
 def test_no_gap_is_about_one_floor():
@@ -84,15 +83,15 @@ def test_gap_follows_the_signal_that_makes_it():
     best = {channel: next(d for d in found.dependence if d.channel == channel) for channel in ("torque x", "torque y")}
     assert [best[channel].signal for channel in best] == ["body rate x", "body rate y"]
     assert all(d.r2 > 0.9 and d.p_value < 0.05 for d in best.values())
-    assert found.worst is not None
-    assert found.worst.signals[0].endswith(found.worst.channel[-1])
+    assert found.heat_map is not None
+    assert found.heat_map.signals[0].endswith(found.heat_map.channel[-1])
 
 
 def test_stretch_is_where_the_gap_is():
     def burst(time, _rate):
         return np.column_stack([np.where((time > 10) & (time < 13), 0.2, 0.0), 0 * time, 0 * time])
 
-    first = compared([recording_of_sines(1), recording_of_sines(2, burst)]).stretches[0]
+    first = compared([recording_of_sines(1), recording_of_sines(2, burst)]).worst[0]
     assert (first.flight, first.channel) == (1, "torque x")
     assert first.start_s == pytest.approx(10, abs=0.6)
     assert first.end_s == pytest.approx(13, abs=0.6)
@@ -108,7 +107,7 @@ def test_model_with_the_effect_leaves_the_noise():
     recordings = [recording_of_sines(1, damping), recording_of_sines(2, damping)]
     found = compared(recordings, with_effect("linear_damping", 0.12, 0.12, 0.12))
     assert (found.floors[:3] < 1.4).all()
-    after, before = (each.playback.models["model"].body_rate.mae[-1] for each in (found, compared(recordings)))
+    after, before = (each.playback.of("model", "body_rate").mae[-1] for each in (found, compared(recordings)))
     assert after < 0.3 * before
 
 
@@ -159,7 +158,7 @@ def test_a_missing_signal_is_named():
 
 
 def named(name):
-    return NamedEffect(name, Candidate(CATALOGUE[name], {}), np.zeros(0), (), 0.001, 1.0, 1.0, "")
+    return named_effect(name)
 
 
 def extension(names, extra):
@@ -170,7 +169,7 @@ def extension(names, extra):
 
 def test_extension_refits_and_shrinks_the_unseen_gap():
     found, held = extension(["linear_damping"], damping)
-    values = {c.name: c for c in found.effects[0].coefficients}
+    values = {c.name: c for c in found.effects[0].numbers}
     assert len(values) == 3
     for estimate in values.values():
         assert estimate.low < 0.12 < estimate.high or estimate.value == pytest.approx(0.12, rel=0.02)
@@ -195,18 +194,18 @@ def test_what_comes_again_is_gone_with_the_effect():
     """Judged on pairs with the held-out run; about all axes the damping of 0.12 comes again, and then only noise."""
     training, held = [rerun(0, damping), rerun(1, damping)], [rerun(2, damping)]
     compared_runs = compared([*training, *held])
-    assert (compared_runs.again.share[:3, 0] > 0.7).all()
+    assert (compared_runs.comes_again.share[:3, 0] > 0.7).all()
     found = extend(training, held, [named("linear_damping")], compared_runs.audit, SETTINGS, None)
     shown = before_after(training, held, found.unseen, found.model, SETTINGS)
     before, after = shown.again_before, shown.again_after
-    assert before.again[:3, 0] == pytest.approx(compared_runs.again.again[:3, 0], rel=0.05)
+    assert before.again[:3, 0] == pytest.approx(compared_runs.comes_again.again[:3, 0], rel=0.05)
     assert (np.abs(after.again[:3, 0]) < 0.02 * before.again[:3, 0]).all()
     assert (after.explained[:3, 2] > 0.99).all()
 
 
 def test_other_paths_are_not_split():
     found = compared([recording_of_sines(1, damping), recording_of_sines(2, damping)])
-    assert found.again is None
+    assert found.comes_again is None
 
 
 def test_extension_that_does_not_help_is_refused():

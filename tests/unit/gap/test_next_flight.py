@@ -9,7 +9,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.naming.odds import likely
-from cpfls_cli.gap.naming.results import Alternative, NamedEffect
+from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import (
     physical_values,
@@ -35,6 +35,7 @@ from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.limits import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import windows
+from tests.builders.gap_artifacts import named_effect
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 FLOOR = np.array([0.02, 0.02, 0.02, 0.1, 0.1, 0.1])
@@ -308,7 +309,7 @@ def test_the_plan_counts_on_nothing_that_is_not_logged():
 def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     named, size = candidate("linear_damping"), np.array([0.1, 0.1, 0.1])
     silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
-    effect = NamedEffect("linear_damping", named, size, (), 0.0, 1.0, 1.0, "")
+    effect = named_effect("linear_damping", linear=size)
     rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
     first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR, GapSettings())
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
@@ -320,7 +321,7 @@ def test_a_rival_takes_the_size_that_imitates_the_named_effect():
     """Over flights with almost one thrust a bias is the offset times that thrust."""
     named, size = candidate("com_offset"), np.array([0.004, 0.0])
     flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
-    effect = NamedEffect("com_offset", named, size, (), 0.0, 1.0, 1.0, "")
+    effect = named_effect("com_offset", linear=size)
     rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
     first, second, *others = questions_left([effect], rivals, [], flights, FLOOR, GapSettings())
     # What else looks like either by the catalogue must not take the place of the rival.

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.gap_flights import FlightsGroup
-from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.repeated import RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.balances import band_windows
@@ -132,6 +131,6 @@ def test_runs_within_one_flight_are_found_by_what_was_asked_for_and_kept_with_th
     whole = Signals(time=time, body_rate=rate, vehicle=VEHICLE, stated_torque=torque, setpoints={"position": asked})
     flight = Recording("mission", whole)
     assert len(RepeatedRuns.of([flight]).pairs) == 6
-    (kept,) = FlightsGroup.of([flight], ["given"]).recordings(Study())
+    kept = RecordedFlight.of(flight, "given").recording(VEHICLE, 0.0)
     assert RepeatedRuns.of([kept]).pairs == RepeatedRuns.of([flight]).pairs
     assert RepeatedRuns.of([replace(flight, signals=replace(whole, setpoints={}))]) is None

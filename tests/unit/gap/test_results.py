@@ -6,20 +6,20 @@ import pytest
 from cpfls_cli.gap.naming.results import (
     Alternative,
     GapVerdict,
-    NamedEffect,
     Unexplained,
     gap_stays,
     matters,
     verdict_of,
 )
 from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_artifacts import named_effect
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
 LEFT = Unexplained("torque y", 5.2, "yaw rate", 0.8, None, "neither")
 
 
 def effect(name="com_offset", share=0.9):
-    return NamedEffect(name, None, np.zeros(0), (), 0.001, share, 1.0, "")
+    return named_effect(name, share=share)
 
 
 BIG, SMALL = effect(), effect("com_offset", 0.05)

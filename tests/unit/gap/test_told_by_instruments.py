@@ -15,11 +15,11 @@ from cpfls_cli.gap.naming import by_instruments
 from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
 from cpfls_cli.gap.naming.causes import JudgedEffect
 from cpfls_cli.gap.naming.estimate import NamedFit
-from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import _growing, _gusty
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import held as stays
 from cpfls_cli.playback.newness import PER_WINDOW, news
+from tests.builders.gap_artifacts import named_effect
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
@@ -167,7 +167,7 @@ def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
 
 @pytest.mark.parametrize(("name", "rivals"), [("rotor_drag", ("wind",)), ("motor_lag", ())])
 def test_in_gusts_chance_is_what_instruments_say_and_rivals_of_what_is_late_too(name, rivals):
-    by_fit = NamedEffect(name, None, np.zeros(0), (), 1e-30, 1.0, 1.0, "")
+    by_fit = named_effect(name, p_value=1e-30)
     named = _Named([], [], None, None, [], (), sure={name: 0.003})
     told = named.in_gusts(JudgedEffect(by_fit, ("wind",), {}))
     assert (told.effect.p_value, told.alternatives) == (0.003, rivals)

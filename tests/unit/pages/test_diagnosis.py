@@ -1,12 +1,6 @@
 import pytest
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from tests.builders import gap_artifacts as made
-
-
-def diagnosis(**given):
-    artifact = made.diagnosis(**given)
-    return DiagnosisRecord.of_data(artifact.header, artifact.data)
 
 
 @pytest.mark.parametrize(
@@ -20,4 +14,4 @@ def diagnosis(**given):
     ],
 )
 def test_two_names_are_explained_only_where_the_forces_decided(given, said):
-    assert diagnosis(**given).forces_decide is said
+    assert made.diagnosis(**given).forces_decide is said

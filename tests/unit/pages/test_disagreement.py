@@ -5,18 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.pages.disagreement import answer, flight_offsets, signal_words
+from cpfls_cli.stages.compare import _offsets, _signal_words
 from tests.builders import gap_artifacts as made
-from tests.builders.forms import in_all_forms, source_of_record
+from tests.builders.forms import in_all_forms
 
 # What the example of docs/gap.md shows with nothing hidden and seed 13: five of six channels above one floor.
 NOTHING_HIDDEN = np.array([1.01, 1.15, 0.908, 1.01, 1.06, 1.10])
 
 
 def disagreement(floors):
-    artifact = made.disagreement(**{"gap/floors": floors})
-    return DisagreementRecord.of_data(artifact.header, artifact.data)
+    return made.disagreement(**{"gap/floors": floors})
 
 
 @pytest.mark.parametrize(
@@ -29,9 +27,8 @@ def disagreement(floors):
 )
 def test_every_form_calls_the_same_channels_above_noise(floors, above):
     record = disagreement(floors)
-    assert "".join("y" if record.gap.above_noise[index] else "n" for index in record.gap.known) == above
-    source = source_of_record(record)
-    for form, text in in_all_forms(source, answer(source)).items():
+    assert "".join("y" if index in record.sizes.above_noise else "n" for index in record.sizes.known) == above
+    for form, text in in_all_forms(made.source_of(record, "compare"), made.blocks_of(record, "compare")).items():
         begins = ("roll t", "pitch t", "yaw t", "force")
         rows = [line.split() for line in text.splitlines() if line.startswith(begins) and line.endswith("%")]
         assert "".join(row[-3][0] for row in rows) == above, form
@@ -41,16 +38,14 @@ def test_every_form_calls_the_same_channels_above_noise(floors, above):
 
 
 def test_no_signal_is_drawn_where_nothing_is_above_noise():
-    drawn = in_all_forms(source_of_record(disagreement(NOTHING_HIDDEN)), [])["json"]
-    assert "dependence-1" not in drawn
-    assert "No channel has a gap above noise, so there is nothing to follow." in drawn
+    assert "(dependence)" not in made.text_of(disagreement(NOTHING_HIDDEN), "compare")
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.integers(1, 30)), min_size=1, max_size=5))
 def test_flights_stand_one_after_another_without_overlap(flights):
     clock = np.concatenate([start + 0.2 * np.arange(windows) for start, windows in flights])
     flight = np.repeat(np.arange(len(flights)), [windows for _, windows in flights])
-    shifted = clock + flight_offsets(flight, clock)[flight]
+    shifted = clock + _offsets(flight, clock)[flight]
     assert shifted[0] == pytest.approx(0.0, abs=1e-9)
     assert np.all(np.diff(shifted) > -1e-9)
 
@@ -60,4 +55,4 @@ def test_flights_stand_one_after_another_without_overlap(flights):
     [("body rate x", "body rate x, rad/s"), ("height", "height, m"), ("rotor speed 2", "rotor speed 2, rad/s")],
 )
 def test_signals_carry_their_units(signal, words):
-    assert signal_words(signal) == words
+    assert _signal_words(signal) == words

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup
-from cpfls_cli.pages.first_screen import first_lines
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.report.content import Facts, Table, Text, unfolded
 from cpfls_cli.result import plain
@@ -79,9 +77,8 @@ def test_machines_read_sizes():
 
 
 def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
-    given = made.diagnosis(named=({},) * 3)
-    told = DisturbanceGroup.of(FOUND, np.isfinite(FOUND.size))
-    diagnosed = replace(DiagnosisRecord.of_data(given.header, given.data), disturbance=told)
-    rows = [row for block in first_lines(diagnosed, 1) if isinstance(block, Facts) for row in block.rows]
+    air = DisturbanceGroup.of(FOUND, np.isfinite(FOUND.size))
+    blocks = made.blocks_of(replace(made.diagnosis(named=({},) * 3), air=air), "diagnose")
+    rows = [row for block in blocks if isinstance(block, Facts) for row in block.rows]
     (words,) = [words for name, words in rows if name == "Gusts"]
     assert words.startswith("What is left is gusts, ")

@@ -4,30 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, LikelySetGroup
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.results import Estimate, LikelySet, NamedEffect
-from cpfls_cli.pages.effects import (
-    closest_sentence,
-    coefficients_table,
-    effect_sentence,
-    effect_title,
-    named_sentences,
-    sets_table,
-)
+from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.pages.effects import effect_sentence, effect_title, named_sentences
+from cpfls_cli.report.content import Table, unfolded
 from tests.builders import gap_artifacts as made
 
-OFFSET = NamedEffect(
+OFFSET = made.named_effect(
     "com_offset",
-    Candidate(CATALOGUE["com_offset"], {}),
-    np.array([0.01]),
-    (Estimate("c_x", "m", 0.0100000015, 0.0099995, 0.0100012, (-0.1, 0.1)),),
-    1e-9,
-    0.998,
-    1.0,
-    "Off centre.",
+    linear=[0.01],
+    numbers=(Estimate("c_x", "m", 0.0100000015, 0.0099995, 0.0100012, (-0.1, 0.1)),),
+    p_value=1e-9,
+    share=0.998,
+    sentence="Off centre.",
 )
+
+
+def closest_sentence(effect):
+    box, *_ = made.blocks_of(replace(made.diagnosis("UNEXPLAINED", named=()), closest=(effect,)), "diagnose")
+    return box.sentences[0]
+
+
+def tables(found):
+    return [each for each in unfolded(made.blocks_of(found, "diagnose")) if isinstance(each, Table)]
 
 
 def test_every_effect_has_a_title():
@@ -58,15 +57,15 @@ def test_shares_of_effects_that_overlap_are_what_returns_without_each():
 
 def test_a_power_of_ten_that_all_three_have_stands_once():
     torque = Estimate("M_x", "N m", 2e-6, -6.86e-5, 7.28e-5, (-1e-3, 1e-3))
-    assert "M_x = 0.2 [−6.9, 7.3] × 10⁻⁵ N m (p" in effect_sentence(replace(OFFSET, coefficients=(torque,)))
+    assert "M_x = 0.2 [−6.9, 7.3] × 10⁻⁵ N m (p" in effect_sentence(replace(OFFSET, numbers=(torque,)))
     alone = Estimate("M_x", "N m", 2e-6, np.nan, np.nan, (-1e-3, 1e-3))
-    assert "M_x = 2 × 10⁻⁶ [—, —] N m (p" in effect_sentence(replace(OFFSET, coefficients=(alone,)))
+    assert "M_x = 2 × 10⁻⁶ [—, —] N m (p" in effect_sentence(replace(OFFSET, numbers=(alone,)))
 
 
 def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     def said(name, *number, effect="parameter_error"):
         numbers = (Estimate(name, "1", *number, (-0.9, 3.0)),)
-        return effect_sentence(replace(OFFSET, name=effect, coefficients=numbers))
+        return effect_sentence(replace(OFFSET, name=effect, numbers=numbers))
 
     assert "(parameter_error): Izz +24.0 % [+19.9, +28.1] (p" in said("inertia_z", 0.24, 0.199, 0.281)
     assert "Ixx −8 % [−20, +4] (p" in said("inertia_x", -0.08, -0.2, 0.04)
@@ -74,20 +73,23 @@ def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     assert "thrust −9.00 % [−9.11, −8.89] (p" in said("thrust_scale", -0.09, -0.0911, -0.0889)
 
 
+def test_templates_say_of_effects_what_other_pages_say():
+    pair = (replace(OFFSET, share=0.7), replace(OFFSET, name="wind", share=0.6))
+    for named in ((OFFSET,), pair):
+        box, *_ = made.blocks_of(replace(made.diagnosis(), effects=named), "diagnose")
+        assert list(box.sentences) == named_sentences(named)
+
+
 def test_an_effect_stands_once_beside_its_coefficients():
-    artifact = made.diagnosis(named=({}, {"name": "of_another_version"}))
-    record = DiagnosisRecord.of_data(artifact.header, artifact.data)
-    rows = coefficients_table("coefficients", record.effects).rows
-    assert [row[0] for row in rows] == ["com_offset", "of_another_version"]
-    assert [effect.name for effect in record.effects.named] == ["com_offset", "of_another_version"]
+    found = made.diagnosis(named=({}, {"name": "wind"}))
+    (table,) = [each for each in tables(found) if each.header[:2] == ["Effect", "Coefficient"]]
+    assert [row[0].text for row in table.cells] == ["com_offset", "wind"]
 
 
 def test_sets_stand_in_a_table_with_how_likely_each_is():
-    sets = (LikelySet(("com_offset", "motor_lag"), 0.954), LikelySet(("torque_bias", "motor_lag"), 0.046))
-    group = LikelySetGroup.of(sets)
-    assert group.rows() == list(sets)
-    listed = sets_table("sets", group.rows())
-    assert listed.rows == [
+    found = made.diagnosis(sets=[(("com_offset", "motor_lag"), 0.954), (("torque_bias", "motor_lag"), 0.046)])
+    (table,) = [each for each in tables(found) if each.header[0] == "Set of effects"]
+    assert [[cell.text for cell in row] for row in table.cells] == [
         ["offset of the centre of mass and motor lag", "95 %"],
         ["constant torque and motor lag", "5 %"],
     ]

@@ -5,29 +5,55 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.pages.first_screen import counted_notes, first_screen, model_words, next_steps, notes_on_flights
-from cpfls_cli.report.content import Box, Facts, Table, Text
+from cpfls_cli import page
+from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
+from cpfls_cli.result import plain
 from tests.builders import gap_artifacts as made
 from tests.builders.vehicle_search import CONFIG
 
+BEFORE_AND_AFTER = "held-out flights before and after, and what to know of the verdict"
 RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
 USE = "Take the model with it, extended.h5"
 WRONG = "the inertia about z would have to be 29 times that of the config"
 
 
-def diagnosis(*args, lacking=(), **given):
-    artifact = made.without(made.diagnosis(*args, **given), *lacking)
-    return DiagnosisRecord.of_data(artifact.header, artifact.data)
+def diagnosis(*args, **given):
+    return made.diagnosis(*args, **given)
 
 
-def screen(record):
+def screen(found, **origin):
     """The box, the facts by term, the rows of the table by what they are, its caption, and all facts below."""
-    box, facts, table, *more = first_screen(record, 1)
+    box, facts, *rest = (
+        each for each in blocks(found, **origin) if not isinstance(each, Folded) or "effects" not in each.summary
+    )
+    below = next(each.blocks for each in rest if isinstance(each, Folded) and each.summary == BEFORE_AND_AFTER)
+    table, caption, *more = below
     assert (type(box), type(facts), type(table)) == (Box, Facts, Table)
-    rows = {row[0].text: [cell.text for cell in row[1:]] for row in table.cells}
-    below = [row for block in more if isinstance(block, Facts) for row in block.rows]
-    return box, dict(facts.rows), rows, table, below
+    rows = {row[0].text: row[1:] for row in table.cells}
+    return (
+        box,
+        dict(facts.rows),
+        rows,
+        caption.text,
+        [row for each in more if isinstance(each, Facts) for row in each.rows],
+    )
+
+
+def blocks(found, **origin):
+    return page.blocks(made.text_of(found, "diagnose", **origin))
+
+
+def texts(row):
+    return [cell.text for cell in row]
+
+
+def remarks(found):
+    below = next(each.blocks for each in blocks(found) if isinstance(each, Folded) and each.summary == BEFORE_AND_AFTER)
+    return [each.text for each in below[2:] if isinstance(each, Text)]
+
+
+def next_steps(found):
+    return screen(found)[1]["Next"]
 
 
 @pytest.mark.parametrize(
@@ -74,7 +100,7 @@ def test_every_verdict_has_a_headline(given, words):
 
 def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
     box, facts, _, _, below = screen(diagnosis())
-    assert box.sentences == [
+    assert list(box.sentences) == [
         "Offset of the centre of mass (com_offset): c_x = 0.0100 [0.0090, 0.0111] m (p < 10⁻⁶, 93 % of the gap)."
     ]
     assert facts["How sure"] == (
@@ -85,7 +111,7 @@ def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
 
 def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
     box, *_ = screen(diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)))
-    assert box.sentences == [
+    assert list(box.sentences) == [
         "Wrong inertia or thrust scale (parameter_error): Izz +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of the gap)."
     ]
 
@@ -102,16 +128,15 @@ GUESSED = "guesses from mass and arms are used for what the config leaves open (
     ],
 )
 def test_a_number_is_wrong_against_what_was_taken_for_it(moments, cautions, against):
-    record = diagnosis(named=({"name": "parameter_error", "kind": "parameter"},))
-    made_with = replace(record.origin, config=CONFIG.replace("[0.0040, 0.0044, 0.0075]", moments), cautions=cautions)
-    box, *_ = screen(record.with_header(made_with))
+    config = CONFIG.replace("[0.0040, 0.0044, 0.0075]", moments)
+    box, *_ = screen(
+        diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)), config=config, cautions=cautions
+    )
     assert box.title == f"A number of the vehicle is wrong: Izz +24.0 % against {against}."
 
 
 def test_what_speaks_against_the_model_stands_in_the_box():
-    record = diagnosis()
-    cautions = (GUESSED, "vehicle.h5: DO NOT USE: predicts no better.", "more")
-    box, *_ = screen(record.with_header(replace(record.origin, cautions=cautions)))
+    box, *_ = screen(diagnosis(), cautions=(GUESSED, "vehicle.h5: DO NOT USE: predicts no better.", "more"))
     assert box.sentences[0] == "The gap is that of vehicle.h5: DO NOT USE: predicts no better."
     assert "The gap is that of" not in "".join(screen(diagnosis())[0].sentences)
 
@@ -120,16 +145,16 @@ def test_what_speaks_against_the_model_stands_in_the_box():
 def test_a_model_that_plays_back_worse_is_not_to_be_taken(verdict):
     worse = made.played_pair(body_rate=(0.5, 0.3, 0.3, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
     said = next_steps(diagnosis(verdict, **worse))
-    assert said[-1] == ("Leave the model as it is: with what is named, held-out flights play back worse in body rate.")
+    assert said.endswith("Leave the model as it is: with what is named, held-out flights play back worse in body rate.")
     alike = made.played_pair(body_rate=(0.4001, 0.5, 0.5, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
-    assert "ake the model with it" in next_steps(diagnosis(verdict, **alike))[-1]
+    assert "ake the model with it" in next_steps(diagnosis(verdict, **alike))
 
 
 def test_names_that_make_no_forecast_come_with_what_does():
     losing = made.played_pair(body_rate=(0.4, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
-    assert "`cpfls vehicle` looks for one that forecasts" in next_steps(diagnosis("PARTIAL", **losing))[-1]
+    assert "`cpfls vehicle` looks for one that forecasts" in next_steps(diagnosis("PARTIAL", **losing))
     winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
-    assert "cpfls vehicle" not in " ".join(next_steps(diagnosis("PARTIAL", **winning)))
+    assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", **winning))
 
 
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():
@@ -145,7 +170,7 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
     assert facts["Next"] == f"To tell {told}. {planned} Until then t{USE[1:]}."
     untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity", "")])
     assert planned not in next_steps(untried)
-    assert next_steps(untried)[0] == "To tell steady wind from offset of the centre of mass: log velocity."
+    assert next_steps(untried).startswith("To tell steady wind from offset of the centre of mass: log velocity.")
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
     assert "To tell" not in dict(below)
 
@@ -177,9 +202,7 @@ def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tel
     ],
 )
 def test_every_verdict_says_what_to_do_next(given, first):
-    record = diagnosis(**given)
-    assert next_steps(record)[0].startswith(first)
-    assert screen(record)[1]["Next"] == " ".join(next_steps(record))
+    assert next_steps(diagnosis(**given)).startswith(first)
 
 
 def test_where_says_channel_time_and_how_long():
@@ -188,60 +211,60 @@ def test_where_says_channel_time_and_how_long():
         "Force along z (up), above the noise 75 % of the time, most from 1.0 to 2.5 s of two.csv; also torque x, "
         "force x, force y and torque y."
     )
-    _, facts, *_ = screen(diagnosis(lacking=["stretch"], force=False))
+    _, facts, *_ = screen(replace(diagnosis(force=False), worst=()))
     assert facts["Where"] == "Torque about x (roll), above the noise 75 % of the time; also torque y."
 
 
 def test_where_nothing_is_above_the_noise_nothing_is_located():
     quiet = np.array([0.4, 0.5, 0.6, 0.7, 1.42, 0.9])
     record = diagnosis("NO_GAP", named=(), **{"gap/before_floors": quiet, "gap/after_floors": quiet})
-    _, facts, rows, table, _ = screen(record)
+    _, facts, rows, caption, _ = screen(record)
     assert facts["Where"] == "Nowhere above the noise."
     assert facts["How sure"] == (
         "The largest gap is 1.4 noise floors; not ruled out, as listed below: 1 of the catalogue."
     )
     assert [row for row in rows if row.startswith("gap")] == ["gap, force y"]
-    assert "Within the noise: torque x, torque y, torque z, force x, force z." in table.caption
-    assert record.summary["where"] is None
+    assert "Within the noise: torque x, torque y, torque z, force x, force z." in caption
+    assert record.where is None
 
 
 def test_the_gap_stands_before_and_after_beside_the_noise():
-    _, _, rows, table, _ = screen(diagnosis())
-    assert rows["gap, roll torque"] == [
-        "N\N{NO-BREAK SPACE}m",
+    _, _, rows, caption, _ = screen(diagnosis())
+    assert texts(rows["gap, roll torque"]) == [
+        "N m",
         "0.494",
         "0.0136",
         "0.0123",
         "40 → 1.1 floors",
     ]
     assert "gap, yaw torque" not in rows
-    assert "Within the noise: torque z." in table.caption
+    assert "Within the noise: torque z." in caption
     grew = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
-    _, _, rows, table, _ = screen(diagnosis(**grew))
-    assert rows["gap, roll torque"][-1] == "40 → 60 floors, worse"
-    assert [cell.tone for cell in table.cells[0]][-1] == "warning"
+    _, _, rows, caption, _ = screen(diagnosis(**grew))
+    worse = rows["gap, roll torque"][-1]
+    assert (worse.text, worse.tone) == ("40 → 60 floors, worse", "warning")
 
 
 def test_playback_stands_before_and_after_beside_what_knows_no_model():
     ends = {"velocity": (0.1, 0.5, 0.3, 0.2), "position": (0.4, 0.3, 0.5, 0.6)}
-    _, _, rows, table, _ = screen(diagnosis(**made.played_pair(**ends)))
-    assert rows["playback, body rate"] == ["rad/s", "2.0", "0.10", "1.0", "better than “nothing moves”"]
-    assert rows["playback, attitude"] == ["°", "17", "0.57", "5.7", "better than “rate stays”"]
-    assert rows["playback, velocity"] == ["m/s", "0.20", "0.10", "0.30", "better than “rate stays”"]
-    assert rows["playback, position"] == ["m", "0.60", "0.40", "0.30", "worse than “nothing moves”"]
-    assert table.cells[-1][-1].tone == "warning"
-    assert "Playback: mean error after 0.5 s." in table.caption
+    _, _, rows, caption, _ = screen(diagnosis(**made.played_pair(**ends)))
+    assert texts(rows["playback, body rate"]) == ["rad/s", "2.0", "0.10", "1.0", "better than “nothing moves”"]
+    assert texts(rows["playback, attitude"]) == ["°", "17", "0.57", "5.7", "better than “rate stays”"]
+    assert texts(rows["playback, velocity"]) == ["m/s", "0.20", "0.10", "0.30", "better than “rate stays”"]
+    assert texts(rows["playback, position"]) == ["m", "0.60", "0.40", "0.30", "worse than “nothing moves”"]
+    assert rows["playback, position"][-1].tone == "warning"
+    assert "Playback: mean error after 0.5 s." in caption
 
 
 def test_what_cannot_be_played_back_is_said():
-    _, _, rows, table, _ = screen(diagnosis())
-    assert "Playback: mean error after 0.5 s; velocity and position cannot be played back, " in table.caption
+    _, _, rows, caption, _ = screen(diagnosis())
+    assert "Playback: mean error after 0.5 s; velocity and position cannot be played back, " in caption
     assert not {"playback, velocity", "playback, position"} & set(rows)
     still = made.played_pair(body_rate=(0.0,) * 4, attitude=(0.0,) * 4)
-    _, _, rows, table, _ = screen(diagnosis(**still))
-    assert "The flights show no motion that could be played back." in table.caption
-    _, _, rows, table, _ = screen(diagnosis(lacking=["playback"]))
-    assert "layback" not in table.caption
+    _, _, rows, caption, _ = screen(diagnosis(**still))
+    assert "The flights show no motion that could be played back." in caption
+    _, _, rows, caption, _ = screen(replace(diagnosis(), playback=None))
+    assert "layback" not in caption
     assert not any(row.startswith("playback") for row in rows)
 
 
@@ -271,12 +294,12 @@ def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
 
 
 def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
-    box, facts, _, table, below = screen(diagnosis("UNEXPLAINED", named=({"named": 0},), share=0.31))
+    box, facts, _, caption, below = screen(diagnosis("UNEXPLAINED", named=({"named": 0},), share=0.31))
     assert box.sentences[0].startswith(
         "The closest was offset of the centre of mass, which does not explain the gap: com_offset, "
     )
     assert facts["How sure"] == "With the closest effects, of the held-out gap above the noise, 31 % is gone."
-    assert "After: with the closest effects, offset of the centre of mass, which are not the answer." in table.caption
+    assert "After: with the closest effects, offset of the centre of mass, which are not the answer." in caption
     assert "What it is" in dict(below)
 
 
@@ -290,10 +313,9 @@ def test_flights_held_out_and_why_stand_below():
 def test_remarks_are_told_but_those_that_are_told_elsewhere():
     notes = made.texts("A note that readers need.", WRONG, "The motion follows the rotors by 12 ms.")
     record = diagnosis("CONTRADICTED", named=(), note=notes, impossible=made.texts(WRONG))
-    texts = [block.text for block in first_screen(record, 1) if isinstance(block, Text)]
-    assert texts == ["A note that readers need."]
-    assert record.summary["contradictions"] == [WRONG]
-    assert record.summary["notes"] == notes.tolist()
+    assert remarks(record) == ["A note that readers need."]
+    assert plain(record)["contradictions"] == [WRONG]
+    assert plain(record)["notes"] == notes.tolist()
 
 
 def test_what_is_gone_is_said_of_torque_and_force_where_both_had_a_gap():
@@ -318,7 +340,7 @@ def test_what_differs_between_flights_stands_above_and_not_below():
     differ = made.texts("the gap about y is in training alone")
     record = diagnosis("FLIGHTS_DIFFER", named=({"named": 0},), difference=differ, note=differ)
     assert screen(record)[1]["Differs"] == "The gap about y is in training alone."
-    assert not [block for block in first_screen(record, 1) if isinstance(block, Text)]
+    assert not remarks(record)
 
 
 @pytest.mark.parametrize(
@@ -330,23 +352,18 @@ def test_what_differs_between_flights_stands_above_and_not_below():
     ],
 )
 def test_the_second_model_is_said_to_be_what_it_is(named, words):
-    assert model_words(diagnosis(named=named)) == words
+    assert f"; after: {words}." in made.text_of(diagnosis(named=named), "diagnose")
 
 
-def test_notes_on_flights_are_folded_and_each_stands_once():
-    first, second = (
-        diagnosis(warning=made.texts("a.csv: gaps", "b.csv: late")),
-        diagnosis(warning=made.texts("a.csv: gaps")),
-    )
-    (folded,) = notes_on_flights([first, second])
-    assert folded.summary == "2 notes on the flights and their import"
-    assert [row[0] for row in folded.blocks[0].rows] == ["a.csv: gaps.", "b.csv: late."]
-    assert list(notes_on_flights([diagnosis()])) == []
-    assert counted_notes(["one"]) == "1 note on the flights and their import"
+def test_notes_on_flights_are_folded():
+    said = blocks(diagnosis(warning=made.texts("a.csv: gaps", "b.csv: late")))
+    assert said[-1].summary == "2 notes on the flights and their import"
+    assert [row[0].text for row in said[-1].blocks[0].cells] == ["a.csv: gaps.", "b.csv: late."]
+    assert "notes on the flights" not in str(blocks(diagnosis()))
 
 
 def test_machines_read_what_people_read():
-    summary = diagnosis(warning=made.texts("a.csv: gaps")).summary
+    summary = plain(diagnosis(warning=made.texts("a.csv: gaps")))
     assert summary["where"] == {
         "channels": ["force z", "torque x", "force x", "force y", "torque y"],
         "flight": "two.csv", "start_s": 1.0, "end_s": 2.5, "floors": 80.0, "share_of_time": 0.75,
@@ -355,6 +372,6 @@ def test_machines_read_what_people_read():
         "before": 2.0, "after": pytest.approx(0.1), "rival": "nothing-moves", "without_model": 1.0, "worse": False,
     }  # fmt: skip
     assert set(summary["playback"]["models"]) == {"after", "nothing-moves", "rate-stays", "before"}
-    assert summary["playback"]["models"]["before"]["attitude"][-1] == pytest.approx(0.3)
+    assert summary["playback"]["models"]["before"]["attitude"]["mae"][-1] == pytest.approx(0.3)
     assert summary["warnings"] == ["a.csv: gaps"]
     assert summary["contradictions"] == []

@@ -1,0 +1,314 @@
+"""Name the physical effect that a model misses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import product
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arguments import DisagreementArgument, HeldOutOption
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.job import Job, go_on
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs, learned_in
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.commands.numbers import to_fly
+from cpfls_cli.config.study import Study, generator
+from cpfls_cli.config.unknown import is_of_guesses
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
+from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
+from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.gap.whole_vehicle import known_already
+from cpfls_cli.pages.disturbance import axis_words
+from cpfls_cli.pages.effects import intervals_drawn, wrong_numbers
+from cpfls_cli.pages.gap import (
+    AXES,
+    BEFORE,
+    MEASURED,
+    channel_unit,
+    channel_words,
+    hidden_gaps,
+    keep_in_view,
+    leaves_view,
+    marked,
+    sizes_drawn,
+)
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
+from cpfls_cli.pages.playback import SIGNALS, WHO
+from cpfls_cli.pages.repeats import again_drawn
+from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
+from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.source import Source
+from cpfls_cli.rounding import less
+from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
+from cpfls_cli.words import joined
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_BAND = 1.96
+_VISIBLE = 0.05
+"""Share of the error without a model by which a playback has to grow to be called worse."""
+
+
+def _curves(run: FreeRuns) -> dict[str, Array]:
+    return {"measured": run.measured, "before": run.before, "after": run.after}
+
+
+def _draw_free_runs(r: Diagnosis, figure: Figure) -> None:
+    """Draw measured and simulated body rates over the stretch in which they disagreed most."""
+    run = r.run
+    assert run is not None, "asked before"
+    curves = _curves(run)
+    parts = np.split(np.arange(len(run.time)), np.searchsorted(run.time, run.restart[1:] - 1e-9))
+    panels = stacked(figure, len(AXES) + 1)
+    for axes, start in product(panels, run.restart):
+        axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
+    for index, (axes, axis) in enumerate(zip(panels, AXES, strict=False)):
+        about = {key: values[:, index] for key, values in curves.items()}
+        _draw_runs(axes, run.time, about, parts, f"body rate about {axis}")
+        keep_in_view(axes, (about["measured"], about["after"]), about["before"])
+    errors = {key: curves[key][:, run.axis] - run.measured[:, run.axis] for key in ("before", "after")}
+    _draw_runs(panels[-1], run.time, errors, parts, f"simulated less measured about {AXES[run.axis]}")
+    panels[-1].axhline(0.0, color="black", linewidth=0.8)
+    legend_over(figure, panels[0])
+    panels[-1].set_xlabel("time, s")
+
+
+def _draw_runs(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence[IntArray], title: str) -> None:
+    labels = {"measured": "measured", "before": "simulated before", "after": "simulated after"}
+    styles = {"measured": MEASURED, "before": BEFORE, "after": marked(len(time) // len(runs))}
+    for index, rows in enumerate(runs):
+        for key, values in curves.items():
+            axes.plot(time[rows], values[rows], label=labels[key] if index == 0 else None, **styles[key])
+    plain_ticks(axes.yaxis)
+    axes.set_title(title)
+    axes.set_ylabel("rad/s")
+
+
+def _leaving(run: FreeRuns) -> list[str]:
+    """Name the axes about which the model as given runs away from the figure."""
+    rates = [{key: values[:, index] for key, values in _curves(run).items()} for index in range(len(AXES))]
+    pairs = zip(AXES, rates, strict=True)
+    return [axis for axis, own in pairs if leaves_view((own["measured"], own["after"]), own["before"])]
+
+
+def _draw_picture(r: Diagnosis, figure: Figure) -> None:
+    """Draw the channel with the largest gap over the stretch in which it is largest."""
+    picture = r.picture
+    assert picture is not None, "asked before"
+    axes = figure.subplots()
+    axes.plot(picture.time, picture.measured, label="measured", **MEASURED)
+    axes.plot(picture.time, picture.before, label="simulated before", **BEFORE)
+    axes.plot(picture.time, picture.after, label="simulated after", **marked(len(picture.time)))
+    keep_in_view(axes, (picture.measured, picture.after), picture.before)
+    plain_ticks(axes.yaxis)
+    axes.set_ylabel(f"{channel_words(picture.channel)}, {channel_unit(picture.channel)}")
+    axes.set_xlabel("time, s")
+    legend_over(figure, axes)
+
+
+def _rows(r: Diagnosis) -> int:
+    return ceil(len(r.gap.known) / len(AXES))
+
+
+def _draw_whiteness(r: Diagnosis, figure: Figure) -> None:
+    """Draw the autocorrelation of the gap by channel, torques above forces, with the band of white noise."""
+    white, known = r.whiteness, r.gap.known
+    assert white is not None, "asked before"
+    steps = np.diff(r.residual.time)
+    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    # Windows a lag apart share no sample.
+    independent = len(r.residual.time) * hop / float(white.lag[0])
+    band = _BAND / np.sqrt(max(independent, 1.0))
+    panels = in_columns(figure, len(known), len(AXES), share_y=True).ravel()[: len(known)]
+    for axes, index in zip(panels, known, strict=True):
+        axes.set_title(CHANNELS[index])
+        plain_ticks(axes.yaxis)
+        axes.axhspan(-band, band, color="#e6e6e6", label="white noise", zorder=0)
+        axes.axhline(0.0, color="#999999", linewidth=0.7)
+        axes.plot(white.lag, white.before[:, index], label="before", **BEFORE)
+        axes.plot(white.lag, white.after[:, index], label="after", **marked(len(white.lag)))
+        axes.set_ylim(-1.05, 1.05)
+    middle = min(len(AXES) * (_rows(r) - 1) + 1, len(panels) - 1)
+    panels[middle].set_xlabel("distance in time, s")
+    panels[0].set_ylabel("correlation")
+    legend_over(figure, panels[0])
+
+
+def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
+    """Count wrong numbers, and say how far they are off, and from what: what was taken where the config has null."""
+    guessed = any(map(is_of_guesses, source.header.cautions))
+    taken = "the guess" if guessed else "the vehicle that was found"
+    found, by_place = wrong_numbers(r.effects), dict[str, list[str]]()
+    for name, words in found.items():
+        quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
+        by_place.setdefault(taken if quantity in source.vehicle.unknown else "the config", []).append(words)
+    return len(found), [f"{joined(words)} against {place}" for place, words in by_place.items()]
+
+
+def _farther_off(playback: PlaybackChange) -> list[str]:
+    """List the signals that the model with the effects plays back visibly worse than the model as given."""
+    return [
+        SIGNALS[signal][0]
+        for signal, end in playback.at_end.items()
+        if less(end.before + _VISIBLE * end.without_model, end.after)
+    ]
+
+
+def _unplayed(playback: PlaybackChange) -> list[str]:
+    """List the signals that cannot be played back."""
+    return [words for name, (words, _, _) in SIGNALS.items() if name not in playback.signals]
+
+
+def _finite(value: Any) -> bool:
+    return bool(np.isfinite(value))
+
+
+FIGURES = {
+    "comes-again": again_drawn(lambda r: (r.again_before, r.again_after)),
+    "free-runs": Drawn(
+        "Body rates about three axes, measured and simulated before and after, over time",
+        6.4,
+        _draw_free_runs,
+        lambda r: r.run is not None and r.run.measured.any(),
+    ),
+    "gap-picture": Drawn(
+        "The channel with the largest gap over time, measured and simulated",
+        2.9,
+        _draw_picture,
+        lambda r: r.picture is not None,
+    ),
+    "gap-sizes": sizes_drawn(lambda r: r.gap),
+    "playback": playback_drawn(),
+    "whiteness": Drawn(
+        "Autocorrelation of the gap before and after, by channel",
+        lambda r: 0.9 + 1.6 * _rows(r),
+        _draw_whiteness,
+        lambda r: r.whiteness is not None and len(r.whiteness.lag) > 1 and r.gap.known,
+    ),
+    "intervals": intervals_drawn(lambda r: [*r.effects, *r.closest]),
+}
+WORDS = {
+    **GAP_WORDS,
+    "axes": AXES,
+    "farther_off": _farther_off,
+    "finite": _finite,
+    "gust_words": axis_words,
+    "hidden_gaps": hidden_gaps,
+    "leaving": _leaving,
+    "of_guesses": is_of_guesses,
+    "signals": SIGNALS,
+    "unplayed": _unplayed,
+    "who": WHO,
+    "wrong_numbers": _wrong,
+}
+
+
+@stage(Diagnosis, title="What the model misses", figures=FIGURES, words=WORDS, study=True)
+def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOption = None) -> Diagnosis | None:
+    """Name what a model misses, judged on flights that the fit did not see."""
+    held_out = held_out or []
+    inputs = run.take({"disagreement": disagreement} | numbered_roles("held-out", held_out))
+    check_ignored(run.study)
+    compared, origin = read_result_of_vehicle(disagreement, Disagreement, run.study)
+    if not compared.is_base(run.study.vehicle):
+        raise InputError(
+            f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
+            "misses, so compare without --model, or with an identified model"
+        )
+    flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
+    learned = learned_in(origin.inputs, compared.learned, MODEL_FLIGHT)
+    unseen = [inputs[role] for role in numbered_roles("held-out", held_out)]
+    refuse_seen(flights.values(), unseen)
+    held, study = read_flights(held_out, run.study), run.study
+    given = [each.recording(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
+    split = split_flights(given, held.recordings, study.gap)
+    if run.dry_run:
+        return None
+    found = diagnosed(study, split, (*compared.warnings, *held.warnings), compared.base, progress_of(run.progress))
+    found = learned_from(run, found, flights, learned, unseen, model=disagreement.name)
+    to_extend = go_on(run, "extend", run.output, output=run.beside("extended.h5"))
+    to_report = ("cpfls", "report", run.config, disagreement, run.output, "-o", run.beside("report.html"))
+    run.next.append(next_command(run, found, to_extend, to_report, run.output))
+    return found
+
+
+def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, diagnosis: Path) -> Command:
+    """Give the command that goes on by the verdict.
+
+    Parameters
+    ----------
+    named, unnamed : Command
+        For a gap with a name, and for one without.
+    diagnosis : Path
+        Where the verdict is written.
+    """
+    if found.contradictions:
+        return to_correct(job)
+    match found.verdict:
+        case GapVerdict.NAMED | GapVerdict.PARTIAL:
+            return named
+        case GapVerdict.AMBIGUOUS:
+            return go_on(job, "trajectory", "--for", diagnosis, output=job.beside("path.h5"))
+        case GapVerdict.NO_GAP | GapVerdict.NOT_EXCITED:
+            return to_fly(job)
+    return unnamed
+
+
+def learned_from(
+    run: Run,
+    found: Diagnosis,
+    flights: dict[str, InputFile],
+    learned: Sequence[LearnedFlight],
+    held_out: Sequence[InputFile],
+    *,
+    model: str,
+    of: str = "",
+) -> Diagnosis:
+    """Take the flights of a disagreement, and those that its model learned from, as inputs of a diagnosis.
+
+    Parameters
+    ----------
+    held_out : sequence of InputFile
+        Of these it is said where the model has learned from them.
+    model : str
+        Name of the disagreement that the model is of.
+    of : str
+        Name of the diagnosis among the results of the run.
+    """
+    of_model, parts = as_inputs(MODEL_FLIGHT, learned)
+    run.take_also({**flights, **of_model}, of)
+    hashes = [(file.name, (file.sha256,)) for file in held_out]
+    seen = (*seen_twice(flights.values()), *seen_warnings(f"the model of {model}", learned, hashes))
+    return replace(found, learned=parts, seen=seen)
+
+
+def diagnosed(
+    study: Study,
+    split: FlightSplit,
+    warnings: Sequence[str],
+    base: VehicleModel,
+    progress: Callable[[float, str], None],
+) -> Diagnosis:
+    """Diagnose flights; of a base with effects of its own, those that come on top."""
+    model, settings = base.fuzzy, replace(study.gap, ignore=(*study.gap.ignore, *known_already(base)))
+    rng, parts = generator(study, "diagnose"), (split.training, split.held_out)
+    found = diagnose_flights(*parts, settings, rng, whole=split.whole, model=model, progress=progress)
+    change = before_after(*parts, found.held_out, found.model(model), settings, base)
+    return Diagnosis.of(found, change, *parts, split.sentence, warnings, base)

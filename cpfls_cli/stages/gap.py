@@ -1,0 +1,139 @@
+"""Compare, diagnose and extend in one go, with a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.job import go_on
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.commands.extend import extended, with_learned
+from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
+from cpfls_cli.pages.extended import model_with, warnings
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.outcome import Command
+from cpfls_cli.result import described_fields, part, result
+from cpfls_cli.stage import Filled, Run, stage
+from cpfls_cli.stages import diagnose as of_diagnosis
+from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
+
+PARTS = {
+    "disagreement": ("compare", ""),
+    "diagnosis": ("diagnose", "disagreement"),
+    "extended": ("extend", "diagnosis"),
+}
+"""Files of the folder, each with the command whose result it is, and what it is made of."""
+
+
+@result
+class Gap:
+    """What is missing in a model, and the model with it; what is asked of it besides is of its diagnosis."""
+
+    SHOWN: ClassVar = (
+        *Diagnosis.SHOWN,
+        *(each.name for each in described_fields(Diagnosis) if each.brief),
+        "disagreement",
+        "extension",
+    )
+
+    disagreement: Disagreement = part(brief=False)
+    diagnosis: Diagnosis = part(brief=False)
+    extended: ExtendedRecord | None = part(brief=False)
+    refused: str
+    """Why the model is not extended."""
+
+    @property
+    def extension(self) -> dict[str, Any]:
+        """Whether the model with the effects is written, and why not."""
+        return {"written": self.extended is not None, "reason": self.refused}
+
+    def __getattr__(self, name: str) -> Any:
+        """Give what its diagnosis holds."""
+        return getattr(self.diagnosis, name)
+
+
+@stage(
+    Gap,
+    words={**of_diagnosis.WORDS, "extension_warnings": warnings, "model_with": model_with},
+    fills=Filled(PARTS),
+    study=True,
+)
+def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, model: ModelOption = None) -> Gap | None:
+    """Find where a model and flights disagree, name what is missing, and put it into the model.
+
+    The search adds one effect after another until nothing more can be named, so once through is all the way.
+    """
+    held_out = held_out or []
+    with_numbers(run, "gap", model)
+    why = "" if run.found is None else why_no_body_found(run, run.found)
+    if why:
+        raise InputError(
+            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
+            f"arms, or fly what tells its inertia: {WHAT_TO_FLY}"
+        )
+    trained = numbered_roles("flight", flights)
+    inputs = dict(run.take(trained | ({} if model is None else {"model": model}), "disagreement"))
+    unseen = dict(run.take(numbered_roles("held-out", held_out), "diagnosis"))
+    for caution in run.cautions_of("disagreement", "diagnosis"):
+        run.caution(caution)
+    check_ignored(run.study)
+    base = read_base(model, run.study)
+    given, split = _flights(run, flights, held_out, base, [*(inputs[role] for role in trained), *unseen.values()])
+    learned = learned_by(model)
+    given = with_seen(given, model, learned, known_by(trained, inputs))
+    if run.dry_run:
+        return None
+    study = run.study
+    disagreement = compared(study, given, base, progress_of(run.progress, 0.0, 0.15), split.whole)
+    disagreement = learned_from(run, disagreement, learned, "disagreement")
+    found = of_diagnosis.diagnosed(study, split, disagreement.warnings, base, progress_of(run.progress, 0.15, 0.85))
+    trained_on = {role: inputs[role] for role in trained}
+    found = of_diagnosis.learned_from(
+        run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
+    )
+    run.progress(0.85, 1, "extend")
+    extension, refused = None, ""
+    try:
+        extension = extended(study, split.training, split.held_out, found, base)
+    except ComputationError as error:
+        refused = str(error)
+    if extension is not None:
+        extension, of_effects = with_learned(extension, found.learned_from({**trained_on, **unseen}), learned)
+        run.take_also(of_effects, "extended")
+    run.progress(0.97, 1, "report")
+    answer = Gap(disagreement=disagreement, diagnosis=found, extended=extension, refused=refused)
+    run.next.append(_next(run, answer, [*flights, *held_out], model))
+    return answer
+
+
+def _flights(
+    run: Run, flights: Sequence[Path], held_out: Sequence[Path], base: VehicleModel, files: Sequence[InputFile]
+) -> tuple[Recordings, FlightSplit]:
+    """Read all flights together, so that one battery is full in all of them, and split them."""
+    read = read_flights([*flights, *held_out], run.study)
+    flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
+    balanced = beside_rotors(read.recordings, base)
+    split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
+    # Those held out are behind those learned from, whoever chose them.
+    refuse_seen(files[: len(split.training)], files[len(split.training) :])
+    return Recordings(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
+
+
+def _next(run: Run, found: Gap, flights: Sequence[Path], model: Path | None) -> Command:
+    folder, output = run.output, run.beside("replay.h5")
+    to_replay: Command = ("cpfls", "replay", run.config, folder / "extended.h5", *flights, "-o", output)
+    given = () if model is None else ("--model", model)
+    to_answer = go_on(run, "response", *flights, *given, output=run.beside("response.h5"))
+    named = to_answer if found.extended is None else to_replay
+    return of_diagnosis.next_command(run, found.diagnosis, named, to_answer, folder / "diagnosis.h5")

@@ -1,0 +1,193 @@
+"""Fly a trajectory, exactly or in closed loop; or a flight's own setpoints, to see where simulator and it part."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cpfls_cli.arguments import FlownArgument
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.job import require_numbers
+from cpfls_cli.artifacts.store import format_name
+from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
+from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.logs.formats import is_log
+from cpfls_cli.pages.disturbance import still_air_text
+from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.simulation.inverse import simulate as fly_exactly
+from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
+from cpfls_cli.stage import Run, stage, stage_named
+from cpfls_cli.stages._demand import infeasible_sentence
+from cpfls_cli.stages._flight import FIGURES, WORDS
+from cpfls_cli.store import read
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.model import VehicleModel
+
+_MOVED = ("position", "velocity", "acceleration")
+_EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfls effects NAME`"
+
+
+def option_overrides(
+    mode: str | None, effect: Sequence[str] | None, gusts: bool, autopilot: str | None, **_: Any
+) -> list[str]:
+    """Write options as overrides of the config, which its file then holds."""
+    given: dict[str, list[float] | dict[str, float]] = {}
+    for text in effect or ():
+        _add_effect(text, given)
+    mode = "closed-loop" if (gusts or autopilot) and mode is None else mode
+    chosen = [] if mode is None else [f"simulation.mode={mode}"]
+    chosen += ["simulation.closed_loop.gusts=true"] if gusts else []
+    chosen += [] if autopilot is None else [f"simulation.closed_loop.autopilot={autopilot}"]
+    # JSON is YAML, and numbers keep all their digits.
+    return [*chosen, *(f"simulation.closed_loop.effects.{name}={json.dumps(value)}" for name, value in given.items())]
+
+
+def _add_effect(text: str, given: dict[str, list[float] | dict[str, float]]) -> None:
+    key, _, written = text.partition("=")
+    name, dot, entry = key.strip().partition(".")
+    find(name)
+    values = _numbers(text, written)
+    before = given.get(name)
+    if not dot and before is None:
+        given[name] = values
+        return
+    if not dot or isinstance(before, list) or entry in (before or {}):
+        raise InputError(f"--effect {text}: {name} is given twice; {_EFFECT_FORM}")
+    if len(values) != 1 or not entry:
+        raise InputError(f"--effect {text}: a coefficient takes one value; {_EFFECT_FORM}")
+    given[name] = {**(before or {}), entry: values[0]}
+
+
+def _numbers(text: str, written: str) -> list[float]:
+    try:
+        return [float(value) for value in written.split(",")] if written.strip() else []
+    except ValueError:
+        raise InputError(f"--effect {text}: {written} is not a number; {_EFFECT_FORM}") from None
+
+
+@stage(Simulated, title="Flight", figures=FIGURES, words=WORDS, study=True, overrides=option_overrides)
+def simulate(
+    run: Run,
+    trajectory: FlownArgument,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            metavar="MODEL",
+            help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
+            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            "--mode",
+            metavar="MODE",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
+            "Overrides simulation.mode.",
+        ),
+    ] = None,
+    effect: Annotated[  # noqa: ARG001  # the config has it
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="NAME=VALUE[,VALUE...]",
+            help="Fly with an effect of `cpfls effects`, in closed loop: its coefficients, then shapes; or "
+            "NAME.coefficient=VALUE; may be repeated.",
+        ),
+    ] = None,
+    gusts: Annotated[  # noqa: ARG001
+        bool,
+        typer.Option(
+            "--gusts",
+            help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop. Along a FLIGHT: beside it "
+            "fly vehicles that the model allows, each in gusts of its own, to see what gusts explain.",
+        ),
+    ] = False,
+    autopilot: Annotated[  # noqa: ARG001
+        str | None,
+        typer.Option(
+            "--autopilot",
+            metavar="NAME",
+            help="px4, ardupilot, betaflight or crazyflie: its own control law flies, in closed loop; along a FLIGHT "
+            "with the gains of its log.",
+        ),
+    ] = None,
+) -> Simulated | Outcome | None:
+    """Simulate a flight along a trajectory, or along the setpoints of a flight."""
+    if is_log(trajectory) or format_name(trajectory) == Flight.FORMAT:
+        if mode not in (None, "closed-loop"):
+            raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
+        return stage_named("twin").run(run, path=trajectory, model=model)
+    if model is not None and mode is None:
+        run.study = _in_closed_loop(run.study)
+    _take_numbers(run, model)
+    closed = run.study.simulation.mode == "closed-loop"
+    if model is not None and not closed:
+        raise InputError(f"{model}: no model is flown in mode inverse; leave the mode out, or add --mode closed-loop")
+    run.take({"trajectory": trajectory} | ({} if model is None else {"model": model}))
+    time, planned = _plan(trajectory, closed)
+    flown = None if model is None else import_module("cpfls_cli.flights.models").read_model(model, run.study)
+    with settings_of("simulation", run.study):
+        with_effects(flown, simulated_effects(run.study.simulation.closed_loop.effects, run.study.vehicle))
+        played_gusts(flown, run.study.simulation.closed_loop.gusts)
+    if run.dry_run:
+        return None
+    return _closed_loop(run, time, planned, flown) if closed else _inverse(run, time, planned, trajectory)
+
+
+def _take_numbers(run: Run, model: Path | None) -> None:
+    """Take what the config leaves open from a model; without one nothing is loaded that reads models."""
+    if model is None:
+        require_numbers(run, "simulate", whole=False)
+        return
+    import_module("cpfls_cli.commands.numbers").with_numbers(run, "simulate", model)
+
+
+def _in_closed_loop(study: Study) -> Study:
+    """Take the mode in which a model is flown, where nothing else is said."""
+    with settings_of("simulation", study):
+        return study.model_copy(update={"simulation": replace(study.simulation, mode="closed-loop")})
+
+
+def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
+    """Read times and signals of a plan; without any translation the vehicle is held at its centre of mass."""
+    source, _ = read(trajectory, PlannedPath)
+    if source.held and closed:
+        raise InputError(
+            f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
+            "closed-loop out, or plan a path in space"
+        )
+    needed = MOTION if source.held else MOTION + _MOVED
+    return source.time, {name: getattr(source, name) for name in needed}
+
+
+def _inverse(run: Run, time: Array, planned: dict[str, Array], trajectory: Path) -> Simulated:
+    with settings_of("simulation", run.study):
+        flight = fly_exactly(planned, run.study.vehicle, run.study.simulation, generator(run.study, "simulate"))
+    if flight.violations and run.study.simulation.infeasible == "stop":
+        problems = [infeasible_sentence(Infeasible.of(each, time)) for each in flight.violations]
+        remedy = "fly more gently, change the vehicle, or set simulation.infeasible: report"
+        raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
+    run.go_on("reduce", run.output, output=run.beside("selection.h5"))
+    return Simulated.of(time, flight)
+
+
+def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: VehicleModel | None) -> Simulated:
+    study, rng = run.study, generator(run.study, "simulate")
+    flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
+    if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
+        run.say(still_air_text().text)
+    run.go_on("gap", run.output, output=run.beside("gap"))
+    return replace(Simulated.of(time, flight), effects=values_of(flight.effects), tracking=Tracking.of(flight))
