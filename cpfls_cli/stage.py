@@ -205,6 +205,14 @@ class Run(Job):
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
 
+def _would(run: Run, *, filled: bool) -> Outcome:
+    """Say of a dry run that it could go on."""
+    where = f"{run.output}: would be {'filled' if filled else 'written'}; " if run.writes else ""
+    named = {"output": str(run.output)} if run.writes else {}
+    config = "the config and " if run.with_config else ""
+    return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+
+
 @dataclass(frozen=True)
 class Stage:
     """A function with everything that makes it a command.
@@ -309,7 +317,7 @@ class Stage:
         with run.until_written:
             found = self.function(run, **given)
             if found is None:
-                return self._would(run)
+                return _would(run, filled=bool(self.folder or self.fills))
             if isinstance(found, Outcome):
                 return found
             streamed = isinstance(found, Parts)
@@ -343,14 +351,6 @@ class Stage:
             next=tuple(run.next),
             written=run.output if run.writes else next(iter(run.texts), None),
         )
-
-    def _would(self, run: Run) -> Outcome:
-        """Say of a dry run that it could go on."""
-        where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
-        where = where if run.writes else ""
-        named = {"output": str(run.output)} if run.writes else {}
-        config = "the config and " if run.with_config else ""
-        return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
 
     def info(self, path: Path) -> Outcome:
         """Say again what a file answers, where it comes from and what it holds; of a long one no values."""

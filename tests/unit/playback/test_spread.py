@@ -131,7 +131,8 @@ def test_a_number_that_no_vehicle_has_is_named():
 def test_what_the_loop_leaves_open_is_between_its_bounds():
     bounds = np.array([[0.9, 1.0, 0.8], [1.0, 1.25, 1.0]])
     record = found_record(flat(truth()), loop=bounds, relative=0.4)
-    narrow = replace(record, found=replace(record.found, low=record.found.value * 0.8, high=record.found.value * 1.25))
+    numbers = (each._replace(low=each.value * 0.8, high=each.value * 1.25) for each in record.numbers)
+    narrow = replace(record, numbers=tuple(numbers))
     spread = spread_of(narrow)
     begun = {number.name: number.value for number in Estimates.of(narrow).numbers}
     shares = {name: own / begun[name] for name, own in zip(spread.names, spread.values.T, strict=True)}
