@@ -36,7 +36,7 @@ def test_it_is_exported(cpfls, extended, tmp_path):
     names = on_numpy(output.read_text())
     # Where the centre of mass is off, equal rotors tilt the vehicle.
     wrench = names["wrench"](np.zeros(3), np.zeros(3), names["steady"](np.full(4, 350.0)))
-    force, torque = wrench[:3], wrench[3:]
+    torque, force = wrench[:3], wrench[3:]
     offset = read_record(extended, ExtendedRecord).vehicle.effect.linear_of("com_offset")
     thrust = 4 * 121.5e-6 * 350.0**2
     np.testing.assert_allclose(torque[:2], [-offset[1] * thrust, offset[0] * thrust], rtol=1e-9)
