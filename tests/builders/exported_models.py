@@ -142,7 +142,7 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
         **dict.fromkeys(("solve", "rules", "front", "history", "baselines", "training_indices")),
     )
     vehicle = VehicleModel(vehicle=VEHICLE, fuzzy=model)
-    return replace(bare_sheet(record, vehicle), name=given["name"], file=given["file"], sha256="a" * 64)
+    return replace(bare_sheet(record, vehicle, record.origin), name=given["name"], file=given["file"], sha256="a" * 64)
 
 
 def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGroup:
