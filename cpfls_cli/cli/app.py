@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cpfls_cli.arguments import (
-    AnywayOption,
     ArtifactsArgument,
     ChooseOnOption,
     DiagnosisArgument,
@@ -19,8 +18,6 @@ from cpfls_cli.arguments import (
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightsArgument,
-    HeldOutOption,
     LogsArgument,
     ModelOption,
     ResumeOption,
@@ -31,7 +28,6 @@ from cpfls_cli.arguments import (
     TrainingArgument,
     ValidateOption,
     WorkersOption,
-    WriteConfigOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -190,30 +186,6 @@ def sweep(
         return command.run(job, flights, validate or [], options, choose_on or [])
 
     _run("sweep", config, output, common, call)
-
-
-@_command()
-def vehicle(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    resume: ResumeOption = False,
-    write_config: WriteConfigOption = None,
-    anyway: AnywayOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
-    if anyway:
-        # The artifact holds it with its config.
-        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
-
-    def call(command: Any, job: Job) -> Any:
-        copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
-        return command.run(job, flights, held_out or [], copy, resume=resume)
-
-    _run("vehicle", config, output, common, call)
 
 
 @_command()

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.flights.flight import Flight
     from cpfls_cli.flights.path import PlannedPath
@@ -72,7 +72,7 @@ class Sources:
     gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
-    vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
     trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")

@@ -27,7 +27,6 @@ def summary_section(sources: Sources) -> Section:
         for extended in sources.extensions
         if sources.by_hash(extended.made_from("diagnosis")) is None
     ]
-    blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     # A comparison that was diagnosed has its answer there.
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
     told = [source for source in sources.all if source.stage and source.sha256 not in answered]
@@ -114,7 +113,7 @@ def _parameters(record: IdentifiedRecord) -> str:
         return fuzzy
     if record.fuzzy_part_off:
         return f"6 of inertia and {fuzzy}, all zero because the fuzzy part is off"
-    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.model.ridge_weight)}"
+    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.chosen.ridge_weight)}"
 
 
 def _search(model: Source[IdentifiedRecord]) -> str:

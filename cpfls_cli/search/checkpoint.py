@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from cpfls_cli.identification.search import Unfinished
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record)
 
@@ -52,6 +51,13 @@ class StoppedSearch:
     unfinished: Unfinished
 
 
+class Written(NamedTuple):
+    """The output of a command that was stopped, or was not: whether it is complete, and where it comes from."""
+
+    complete: bool
+    origin: Header
+
+
 @dataclass(frozen=True)
 class KeptFile:
     """A file beside the output from which a stopped command can go on.
@@ -66,7 +72,7 @@ class KeptFile:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedRecord | SweepRecord | VehicleRecord]]
+    OUTPUT: ClassVar[type[IdentifiedRecord | SweepRecord]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:
@@ -134,13 +140,13 @@ class KeptFile:
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
 
-    def _written(self) -> IdentifiedRecord | SweepRecord | VehicleRecord | None:
+    def _written(self) -> Written | None:
         """Read the output; None where there is none, or another file."""
         if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT.name:
             return None
         written = read_any(self.output)
         assert isinstance(written, self.OUTPUT)
-        return written
+        return Written(written.complete, written.origin)
 
     def _require_same(self, differing: Iterable[str]) -> None:
         """Refuse what is left of another command."""

@@ -13,11 +13,8 @@ from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.evidence import UncertaintyGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
@@ -29,7 +26,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import FlightStretch, check_file, flight_source, flight_stretches, torque_source_of
 from cpfls_cli.flights.inputs import hashes_of
-from cpfls_cli.flights.models import read_model, rebuilt
+from cpfls_cli.flights.models import any_model, is_found, modelled, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -146,8 +143,8 @@ FIGURES = {
 def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | None:
     """Predict along a flight, some samples at a time."""
     inputs = run.take({"model": model, "flight": flight})
-    with_numbers(run, "predict", model, whole=holds(model, VehicleRecord))
-    record = read_record(model, ModelRecord)
+    with_numbers(run, "predict", model, whole=is_found(model))
+    record = any_model(model)
     identified = record if isinstance(record, IdentifiedRecord) else None
     wrong = contradictions(check_file(flight, run.study, driven=identified is None))
     known: dict[str, Any] = {
@@ -165,7 +162,7 @@ def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | N
         }
         found = (predicted(stretch).part(stretch.own) for stretch in stretches)
         return _summed(run, found, len(stretches), known)
-    functions = rebuilt(model, identified).fuzzy
+    functions = modelled(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, Flight, "torque") is not None
     flown = flight_source(flight, torque=torque)

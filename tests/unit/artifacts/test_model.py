@@ -14,7 +14,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 GROUPS = (
     "vehicle",
-    "model",
+    "chosen",
     "solve",
     "rules",
     "front",
@@ -83,8 +83,8 @@ def test_one_rule_holds_everywhere_where_training_went_all_round_and_determined_
 
 
 def test_an_infinite_ridge_switches_the_fuzzy_part_off_and_without_weights_there_is_no_search():
-    off = record(model=model(ridge_weight=np.inf, weights=np.zeros(0)))
-    on = record(model=model(ridge_weight=0.1, weights=np.ones(4)))
+    off = record(chosen=model(ridge_weight=np.inf, weights=np.zeros(0)))
+    on = record(chosen=model(ridge_weight=0.1, weights=np.ones(4)))
     assert (off.fuzzy_part_off, off.searched) == (True, False)
     assert (on.fuzzy_part_off, on.searched) == (False, True)
 
