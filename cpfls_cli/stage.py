@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -95,6 +96,10 @@ class Run(Job):
         Other files that are written with the result.
     said : list of Text
         Of this run alone: its file says none of it again.
+    until_written : ExitStack
+        Contexts that last until the result is written, or it is sure that it will not be.
+    afterwards : list of callable
+        What is done when the result is written.
     """
 
     writes: bool = True
@@ -107,6 +112,8 @@ class Run(Job):
     last_words: str = ""
     texts: dict[Path, str] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
+    until_written: ExitStack = field(default_factory=ExitStack)
+    afterwards: list[Callable[[], object]] = field(default_factory=list)
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -178,6 +185,10 @@ class Stage:
         Whether options that may be repeated take all values that follow.
     overrides : callable or None
         Gives overrides of the config that its options stand for.
+    resumes : bool
+        Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
+    together : callable
+        Gives the sources of a report that show its results: several may be shown as one.
     """
 
     function: Callable[..., Any]
@@ -190,6 +201,8 @@ class Stage:
     study: bool
     several: bool
     overrides: Callable[..., list[str]] | None
+    resumes: bool = False
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -244,23 +257,26 @@ class Stage:
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
-        if run.writes:
+        if run.writes and not self.resumes:
             self._check(run, run.output)
-        found = self.function(run, **given)
+        with run.until_written:
+            found = self.function(run, **given)
+            results = dict(found) if self.folder and found is not None else {"": found}
+            if found is not None:
+                texts = self._texts(run, results)
+                if run.writes:
+                    self._write(run, run.output, results)
         if found is None:
             where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
             where = where if run.writes else ""
             named = {"output": str(run.output)} if run.writes else {}
             config = "the config and " if self.study else ""
             return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
-        results = dict(found) if self.folder else {"": found}
+        for act in run.afterwards:
+            act()
         if self.fills and run.writes:
             run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
         several = len(results) > 1
-        texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
-        texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        if run.writes:
-            self._write(run, run.output, results)
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -275,6 +291,10 @@ class Stage:
             next=tuple(run.next),
             written=run.output if run.writes else None,
         )
+
+    def _texts(self, run: Run, results: Mapping[str, Any]) -> list[str]:
+        index = [self.text(results, f"_{_INDEX}")] if len(results) > 1 else []
+        return index + [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
 
     def info(self, path: Path) -> Outcome:
         """Say again what a file answers, where it comes from and what it holds."""
@@ -397,10 +417,12 @@ def stage(
     study: bool = False,
     several: bool = False,
     overrides: Callable[..., list[str]] | None = None,
+    resumes: bool = False,
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides, resumes, together
     )
 
 

@@ -20,11 +20,10 @@ from benchmarks.paper.printed import (
     PrintedColumn,
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
-from cpfls_cli.artifacts.sweep import SettingRuns
-from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.sweep import joined_sweeps
-from cpfls_cli.report.content import Block, Cell, Plot, Section, Table, Text
+from cpfls_cli.identification.replicates import Setting
+from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.stages.sweep import joined_sweeps
 
 _LACKS_SWEEP = Text(
     "Not shown, because no sweep was given: Table 5 with its means over several seeds; made by: cpfls sweep CONFIG "
@@ -38,7 +37,6 @@ _PAPER_NOTE = Text(
     "numbers to a path that it does not define in full.",
     "note",
 )
-_NUMBER = "Table 5. "
 _FLOOR = " is better conditioned than the full set"
 _SAMPLES, _QUANTITY = 1, 0
 
@@ -49,38 +47,49 @@ def with_the_paper(section: Section, sources: PaperSources) -> Section:
 
 
 def _blocks(section: Section, sources: PaperSources) -> Iterator[Block]:
+    yield from _with_columns(section, section.blocks, sources)
+    told = "models" if len(sources.models) > 1 else "summary"
+    if section.name == told and not sources.sweeps:
+        yield _LACKS_SWEEP
+
+
+def _with_columns(section: Section, blocks: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
     sweeps = [sweep.record.settings for sweep in joined_sweeps(sources.sweeps)]
     shown = [settings for settings in sweeps if not compares_readings(settings)]
     in_sweeps = any(any(printed_beside(settings)) for settings in sweeps)
-    for block in section.blocks:
+    for block in blocks:
         match block:
+            case Folded():
+                yield replace(block, blocks=list(_with_columns(section, block.blocks, sources)))
             case Table(name="table-3-vehicle"):
                 printed = [*PRINTED_VEHICLE, *["0"] * (len(block.rows) - len(PRINTED_VEHICLE) - 1), PRINTED_DURATION_S]
                 yield _with_column(block, printed)
-            case Table(name=name) if name.startswith("peaks-"):
-                caption = f"{block.caption} The paper prints its maxima for intervals of P = 1 s."
-                printed = [number(PRINTED_PEAKS[str(row[_QUANTITY])]) for row in block.rows]
-                yield replace(_with_column(block, printed), caption=caption)
-            case Table(name="table-4-reduction"):
+            case Table(name=name) if (
+                name.startswith("trajectory-") and _text(block.rows[0][_QUANTITY]) in PRINTED_PEAKS
+            ):
+                yield _with_column(block, [number(PRINTED_PEAKS[_text(row[_QUANTITY])]) for row in block.rows])
+                yield Text("The paper prints its maxima for intervals of P = 1 s.")
+            case Table(name=name) if name.startswith("reduce-"):
                 yield _table_4(block)
             case Text(text=text) if text.endswith(f"{_FLOOR}."):
                 floor = "the paper's floor, that a reduced set cannot be, does not hold"
                 yield Text(f"{text.removesuffix('.')}: {floor}.")
             case Table(name="table-5-identification"):
-                yield replace(block, caption=block.caption.removeprefix(_NUMBER)) if in_sweeps else _all_columns(block)
+                yield block if in_sweeps else _all_columns(block)
                 yield Text(_scale_sentence(sources), "note")
-            case Table(name=name) if name.startswith("table-5-replicates-"):
-                printed = printed_beside(shown[int(name.rpartition("-")[2]) - 1])
+            case Table(name=name, header=("Quantity", *_)) if name.startswith("sweep-"):
+                printed = printed_beside(shown[int(name.split("-")[1]) - 1])
                 yield _replicates(block, printed)
                 if any(printed):
                     yield _PAPER_NOTE
-            case Plot(name=name) if name[len("figure-") :][:1].isdigit():
+            case Plot(caption=caption) if caption.startswith("Figure "):
                 yield replace(block, see=("figures-of-the-paper", "What the paper's shows."))
             case _:
                 yield block
-    told = "models" if len(sources.models) > 1 else "summary"
-    if section.name == told and not sources.sweeps:
-        yield _LACKS_SWEEP
+
+
+def _text(cell: str | Cell) -> str:
+    return cell.text if isinstance(cell, Cell) else cell
 
 
 def _with_column(table: Table, printed: Sequence[str]) -> Table:
@@ -91,8 +100,8 @@ def _with_column(table: Table, printed: Sequence[str]) -> Table:
 def _table_4(table: Table) -> Table:
     """Add the printed columns by number of samples, largest sets first; those that nobody repeats stand alone."""
     printed = {str(column.samples): [str(column.condition_number), change(column.change)] for column in TABLE_4}
-    shown = {str(row[_SAMPLES]) for row in table.rows}
-    rows: list[list[str | Cell]] = [[*row, *printed.get(str(row[_SAMPLES]), ["", ""])] for row in table.rows]
+    shown = {_text(row[_SAMPLES]) for row in table.rows}
+    rows: list[list[str | Cell]] = [[*row, *printed.get(_text(row[_SAMPLES]), ["", ""])] for row in table.rows]
     full = TABLE_4[0].samples
     rows += [
         [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples, percent(int(samples) / full), "", "",
@@ -100,7 +109,7 @@ def _table_4(table: Table) -> Table:
         for samples, columns in printed.items() if samples not in shown
     ]  # fmt: skip
     header = [*table.header, "Paper: condition number", "Paper: change"]
-    return replace(table, header=header, rows=sorted(rows, key=lambda row: -int(str(row[_SAMPLES]))))
+    return replace(table, header=header, rows=sorted(rows, key=lambda row: -int(_text(row[_SAMPLES]))))
 
 
 def _all_columns(table: Table) -> Table:
@@ -139,9 +148,9 @@ def _replicates(table: Table, printed: Sequence[PrintedColumn | None]) -> Table:
     rows: list[Sequence[str | Cell]] = []
     for row in table.rows:
         rows.append(row)
-        if (shown := _PRINTED_ROWS.get(str(row[_QUANTITY]))) is not None:
+        if (shown := _PRINTED_ROWS.get(_text(row[_QUANTITY]))) is not None:
             rows.append(["· paper", *(shown(column) if column else UNKNOWN for column in printed)])
-    return replace(table, caption=f"{_NUMBER}{table.caption}", rows=rows)
+    return replace(table, rows=rows)
 
 
 _PRINTED_ROWS = {
@@ -149,13 +158,13 @@ _PRINTED_ROWS = {
     "training points": lambda p: str(p.samples),
     "population × generations": lambda p: f"{p.population} × {p.generations}",
     "runs": lambda _: "10",
-    f"best run: MSE, {SQUARED_TORQUE}": lambda p: p.mse,
-    f"best run: largest error, {TORQUE}": lambda p: p.max_error,
+    "best run: MSE, (N m)²": lambda p: p.mse,
+    "best run: largest error, N m": lambda p: p.max_error,
     "best run: condition number": lambda p: p.condition_number,
-    f"mean MSE, {SQUARED_TORQUE}": lambda p: p.mse_of_runs[0],
-    f"standard deviation of the MSE, {SQUARED_TORQUE}": lambda p: p.mse_of_runs[1],
-    f"mean largest error, {TORQUE}": lambda p: p.max_error_of_runs[0],
-    f"standard deviation of the largest error, {TORQUE}": lambda p: p.max_error_of_runs[1],
+    "mean MSE, (N m)²": lambda p: p.mse_of_runs[0],
+    "standard deviation of the MSE, (N m)²": lambda p: p.mse_of_runs[1],
+    "mean largest error, N m": lambda p: p.max_error_of_runs[0],
+    "standard deviation of the largest error, N m": lambda p: p.max_error_of_runs[1],
     "mean condition number": lambda p: p.condition_number_of_runs[0],
     "standard deviation of the condition number": lambda p: p.condition_number_of_runs[1],
     "mean relative error": lambda _: RELATIVE_ERROR,
@@ -180,6 +189,6 @@ def printed_beside(settings: Settings) -> list[PrintedColumn | None]:
     return [columns.get(index) for index in range(len(settings))]
 
 
-def _fits(setting: SettingRuns, column: PrintedColumn, exact: bool) -> bool:
+def _fits(setting: Setting, column: PrintedColumn, exact: bool) -> bool:
     keys = ("structure", "samples", "population", "generations") if exact else ("structure", "samples")
     return all(getattr(setting, key) == getattr(column, key) for key in keys)

@@ -22,15 +22,15 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.rebuilt import inertia_functions
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
 from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 
-Settings = Sequence[SettingRuns]
+Settings = Sequence[Setting]
 Searches = Sequence[Settings]
 """Settings with their runs, by sweep."""
 
@@ -127,7 +127,7 @@ class Claim:
     of_searches: Callable[[Searches], Measurement] | None = None
 
 
-def reading_of(setting: SettingRuns) -> tuple[str, str]:
+def reading_of(setting: Setting) -> tuple[str, str]:
     """Name what chose the samples of a setting, and on which of them it was judged."""
     return setting.criterion, setting.judged_on
 

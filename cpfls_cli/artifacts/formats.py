@@ -14,7 +14,6 @@ _RECORDS = {
     ("cpfls/flight", ""): "flight.FlightRecord",
     ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
-    ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
     ("cpfls/response", ""): "response.ResponseRecord",

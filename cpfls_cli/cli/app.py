@@ -38,9 +38,7 @@ from cpfls_cli.arguments import (
     ModelOption,
     PlayedArgument,
     ResumeOption,
-    ResumeSweepOption,
     SchedulerOption,
-    SweepTimeLimitOption,
     TimeLimitOption,
     TimeOrder,
     TrainingArgument,
@@ -251,29 +249,6 @@ def identify(
         return command.run(job, flights, selection, validate or [], options, choose_on or [])
 
     _run("identify", config, output, common, call)
-
-
-@_command()
-def sweep(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeSweepOption = False,
-    time_limit: SweepTimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify with several settings, and with several seeds each."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, validate or [], options, choose_on or [])
-
-    _run("sweep", config, output, common, call)
 
 
 @_command()
@@ -717,7 +692,7 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     """Load the study, run one command, given as its module, with a progress bar, and print what it says."""
     with messages_for_errors():
         narration = _narration(title, common)
-        study = common.study(config, sweep=title == "sweep")
+        study = common.study(config)
         narration.reads(config)
 
         def with_numbers(command: Any, job: Job) -> Outcome:

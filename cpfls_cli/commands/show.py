@@ -24,7 +24,6 @@ _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
-    "cpfls/sweep": "sweep",
     "cpfls/prediction": "prediction",
     "cpfls/replay": "replay",
     "cpfls/response": "response",

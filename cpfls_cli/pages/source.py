@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
     from cpfls_cli.artifacts.response import ResponseRecord
-    from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
     from cpfls_cli.flights.path import PlannedPath
+    from cpfls_cli.identification.replicates import Sweep
     from cpfls_cli.reduction.selection import Selection
 
 R = TypeVar("R", default=Any)
@@ -65,7 +65,7 @@ class Sources:
     flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
-    sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
+    sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")

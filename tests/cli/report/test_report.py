@@ -37,7 +37,7 @@ report: {title: "<script>alert(1)</script> & a study"}
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
     "summary", "comparison", "models", "model", "vehicle", "path", "flights", "reduction", "identification",
-    "validation", "replicates", "search", "partitions", "prediction", "rules", "provenance",
+    "validation", "sweep", "search", "partitions", "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

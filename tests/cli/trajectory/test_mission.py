@@ -5,10 +5,10 @@ import shlex
 
 import numpy as np
 import pytest
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from tests.builders.studies import VEHICLE

@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 import pytest
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from tests.builders.studies import VEHICLE
 
 SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")

@@ -8,12 +8,12 @@ import h5py
 import numpy as np
 import pytest
 from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, read_header, write_artifact
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.files import text_sha256
 

@@ -5,8 +5,8 @@ from math import cos, degrees, pi, radians, tan
 
 import numpy as np
 import pytest
-
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
+
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mission import Home, qgc_plan, system_id_lines, waypoint_lines
 from cpfls_cli.gap.next_flight.room import harmonic_trajectory, random_path
