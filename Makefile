@@ -18,7 +18,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
+.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test test-fast decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -30,6 +30,7 @@ help:
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
+	@echo "  make test-fast   the units that fly nothing, in less than a minute"
 	@echo "  make decides     tests of words, names and verdicts once more, as another processor computes"
 	@echo "  make oldest      the same with the oldest packages that are allowed"
 	@echo "  make lint        formatting, lint, types, import contracts"
@@ -351,6 +352,11 @@ PYTEST := $(BIN)/python -m pytest
 test: $(INSTALLED_DEV)
 	$(PYTEST) -n 2 --dist worksteal --assert=plain || { $(PYTEST) --last-failed; exit 1; }
 
+# In less than a minute: units alone, but for rooms whose units simulate flights, fit models or start processes.
+FLYING := changes consistency export gap identification look playback response simulation tuning validation workers
+test-fast: $(INSTALLED_DEV)
+	$(PYTEST) -n 2 --dist worksteal --assert=plain tests/unit $(FLYING:%=--ignore=tests/unit/%)
+
 # What decides (words, names, verdicts, choices), with the linear algebra of the plainest processor.
 DECIDES = $$(grep -rl --include='*.py' mark.decides tests) -m decides --assert=plain
 decides: $(INSTALLED_DEV)
@@ -399,13 +405,11 @@ wheel: $(INSTALLED_RELEASE)
 # Every table is also written to benchmarks/results, as JSON. Programs that measure times run one after the other, the
 # rest two at once. Stopped and started again it goes on where it was, unless the code has changed since.
 TIMED := evaluation whole_run workers long_flights reduction reduction_streamed gap replay vehicle_search \
-	time_to_quality trajectory_planning excitation full_circle attitude_inertia export_speed simulators fuzzy_fitting
-UNTIMED := evolution_hypervolume judging quality_elsewhere full_circle_limit full_circle_noise unseen_path seam \
-	band_coverage
+	excitation full_circle export_speed simulators
+UNTIMED := judging band_coverage
 STUDY := data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
 ON_reduction_streamed := --samples 100000
 ON_judging := configs/paper-gentle.yaml $(STUDY)
-ON_time_to_quality := $(ON_judging)
 ON_report_cost = configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
 bench: $(INSTALLED_BENCH)
 	$(MAKE) --jobs=1 $(STUDY) data/paper/times.json $(TIMED:%=benchmarks/results/%.done)

@@ -1,6 +1,6 @@
 """Vehicles exported for simulators and libraries: flown along flights beside the library, and what a step takes.
 
-    python benchmarks/simulators.py [playback] [steps] [batch]
+    python benchmarks/simulators.py [playback] [steps]
 
 Flights: the example's kind (a vehicle with lag, damping, drag and flapping, noise in its log), RotorPy's with its own
 hidden effects, and a real Crazyflie with motor commands and a gyroscope alone, by the vehicle that its config states
@@ -19,7 +19,7 @@ from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.shared.measure import in_turn, pin_threads, table
+from benchmarks.shared.measure import pin_threads, table
 
 pin_threads()
 
@@ -28,8 +28,7 @@ import numpy as np
 from cpfls_cli.config.load import load_study
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.registry import TARGETS, exported
-from cpfls_cli.export.source import c_source, python_source
-from cpfls_cli.export.verify import verified
+from cpfls_cli.export.source import c_source
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
@@ -37,6 +36,7 @@ from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.playback_flights import MIDDLING, ROTORPY, ROTORPY_HIDDEN, flown, rotorpy_flight, truth
 from tests.builders.recorded_flights import FLIGHTS
+from tests.builders.verified_exports import verified
 
 ROOT = Path(__file__).resolve().parents[1]
 WINDOWS, BATCH = 4, 1000
@@ -132,37 +132,7 @@ def in_c(model, folder):
     return call
 
 
-def ready(step, *given):
-    return step(*given).block_until_ready()
-
-
-def batch() -> None:
-    """Take one step of a thousand vehicles at once in JAX, compiled, beside the NumPy module."""
-    import jax
-
-    model, rng = truth(), np.random.default_rng(0)
-    numpy_form, jax_form = {"__name__": "n"}, {"__name__": "j"}
-    exec(python_source(sheet_of_vehicle(model), "v.py"), numpy_form)
-    exec(exported(sheet_of_vehicle(model), "jax", "v.py").text, jax_form)
-    rotor = np.tile(numpy_form["steady"](np.full(4, 570.0)), (BATCH, 1))
-    rate = rng.normal(size=(BATCH, 3))
-    parts = np.zeros((BATCH, 3)), rng.normal(size=(BATCH, 3)), np.tile(np.eye(3), (BATCH, 1, 1)), rate
-    state = np.hstack([part.reshape(BATCH, -1) for part in parts])
-    rows = []
-    for exact in (True, False):
-        with jax.enable_x64(exact):
-            step = jax.jit(jax.vmap(lambda s, r: jax_form["step"](s, r, 0.01)))
-            given = jax.numpy.array(state), jax.numpy.array(rotor)
-            call = partial(ready, step, *given)
-            begin = seconds(call)
-            ratio = in_turn(partial(numpy_form["step"], *parts, rotor, 0.01), call, 9, process_time)
-        bits = 64 if exact else 32
-        rows.append((bits, f"{1e3 * ratio.slow_s:.3g}", f"{1e3 * ratio.fast_s:.3g}", ratio.range, f"{begin:.2g}"))
-    columns = ("bits of JAX", "NumPy, ms", "JAX, ms", "NumPy over JAX (range)", "JAX compiles in, s")
-    table("simulators_batch", columns, rows)
-
-
-PARTS = {"playback": playback, "steps": steps, "batch": batch}
+PARTS = {"playback": playback, "steps": steps}
 
 if __name__ == "__main__":
     main(*sys.argv[1:])

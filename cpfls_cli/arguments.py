@@ -203,13 +203,10 @@ HoldOption = Annotated[
 
 TimeOrder = StrEnum("TimeOrder", "date name given")
 """What tells which flight came first."""
-ExportFormat = StrEnum(
-    "ExportFormat", "json c python sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv"
-)
+ExportFormat = StrEnum("ExportFormat", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv")
 """What a model is exported as."""
 AutopilotChoice = StrEnum("AutopilotChoice", "px4 ardupilot betaflight crazyflie")
 """Whose control law is meant."""
-Flown = StrEnum("Flown", "sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax")
 """What an exported vehicle is flown in."""
 
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]

@@ -13,6 +13,7 @@ from cpfls_cli.errors import ComputationError
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+ComplexArray = npt.NDArray[np.complex128]
 Numbers = npt.NDArray[Any]
 """Real, or complex for a derivative by a complex step."""
 

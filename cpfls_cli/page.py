@@ -49,7 +49,7 @@ TONES = ("good", "note", "warning", "unsure")
 _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
-_VERDICT = re.compile(r"([A-Z][A-Z -]+): (.+)")
+_VERDICT = re.compile(r"([A-Z][A-Z ,;:-]*[A-Z]): (.+)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _LONG = 36
@@ -141,8 +141,24 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 }
 
 
+_NOTHING: Mapping[str, Any] = {}
+
+
+class _Added:
+    """What templates know beside what all do, the same for one mapping as long as that lives."""
+
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        self.names = names
+
+    def __hash__(self) -> int:
+        return id(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Added) and other.names is self.names
+
+
 @cache
-def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environment:
+def _environment(folder: Path, added: _Added) -> Environment:
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -153,11 +169,16 @@ def _environment(folder: Path, added: tuple[tuple[str, Any], ...]) -> Environmen
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **dict(added))
-    functions = {name: each for name, each in added if callable(each)}
+    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **added.names)
+    functions = {name: each for name, each in added.names.items() if callable(each)}
     made.filters.update(functions)
     made.tests.update(functions)
     return made
+
+
+def environment(folder: Path, added: Mapping[str, Any] = _NOTHING) -> Environment:
+    """Make what renders the templates of a folder, with what a stage adds."""
+    return _environment(folder, _Added(added))
 
 
 def words(
@@ -172,8 +193,7 @@ def words(
     **more : object
         What it knows of this result.
     """
-    environment = _environment(folder, tuple((added or {}).items()))
-    return environment.get_template(f"{template}.md.j2").render(r=given, **more)
+    return environment(folder, added or _NOTHING).get_template(f"{template}.md.j2").render(r=given, **more)
 
 
 @dataclass

@@ -8,12 +8,27 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
-from types import NoneType
-from typing import Any, Literal, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
+from typing_extensions import Doc
+
+from cpfls_cli.settings import Settings
 
 T = TypeVar("T")
+_UNIONS = (Union, UnionType)
 
 AXES = {"axis": 3}
 """Axes of arrays whose name says their length."""
@@ -38,6 +53,8 @@ class About(NamedTuple):
         Whether each value is above the one before, and there are two at least.
     brief : bool
         Whether `--json` shows it too; what is not is in the file alone.
+    ragged : bool
+        Whether each row of a table has a length of its own of it.
     """
 
     text: str
@@ -48,16 +65,26 @@ class About(NamedTuple):
     least: float = -np.inf
     ascends: bool = False
     brief: bool = True
+    ragged: bool = False
 
 
 def about(text: str, *axes: str, default: Any = MISSING, **more: Any) -> Any:
-    """Describe a field; one with a default may be missing in a file."""
+    """Describe a field; one with a default may be missing in a file.
+
+    Fields of a named tuple say the same by ``Annotated[Array, About("text", ("axis",))]``.
+    """
     return field(default=default, metadata={"about": About(text, axes, **more)})
 
 
-def part(default: Any = MISSING) -> Any:
-    """Make a field a result itself, a mapping from names to results, or a tuple of results: a table."""
-    return field(default=default, metadata={"about": None})
+def part(default: Any = MISSING, kind: Any = None) -> Any:
+    """Make a field a result itself, a mapping from names to results, or a tuple of results: a table.
+
+    Parameters
+    ----------
+    kind : type or None
+        What is written, where the field may hold more than that.
+    """
+    return field(default=default, metadata={"about": None, "kind": kind})
 
 
 @dataclass_transform(eq_default=False, kw_only_default=True, frozen_default=True, field_specifiers=(about, part))
@@ -95,8 +122,16 @@ class Described(NamedTuple):
     @property
     def named(self) -> bool:
         """Whether it maps names to results."""
-        origin = get_origin(self.kind)
-        return self.about is None and isinstance(origin, type) and issubclass(origin, Mapping)
+        return self.about is None and maps(self.kind)
+
+    @property
+    def rows(self) -> Any:
+        """Class of the rows as which values by name, or arrays of several lengths, are written; None of all others."""
+        if self.about is None:
+            return None
+        if maps(self.kind):
+            return _TextByName if self.scalar is str else _NumberByName
+        return _Line if self.many and get_origin(get_args(self.kind)[0]) is np.ndarray else None
 
     @property
     def table(self) -> bool:
@@ -110,7 +145,7 @@ class Described(NamedTuple):
 
     @property
     def scalar(self) -> type:
-        """Type of a value, or of each of many: bool, int, float or str."""
+        """Type of a value, or of each of many: bool, int, float, complex or str."""
         return _scalar(self.kind)
 
     @property
@@ -119,8 +154,16 @@ class Described(NamedTuple):
         return self.about is not None and get_origin(self.kind) is tuple
 
 
+def maps(kind: Any) -> bool:
+    """Tell whether a type maps names to something."""
+    origin = get_origin(kind)
+    return isinstance(origin, type) and issubclass(origin, Mapping)
+
+
 def _scalar(kind: Any) -> type:
     origin, inner = get_origin(kind), get_args(kind)
+    if maps(kind):
+        return _scalar(inner[1])
     if origin is Literal:
         return type(inner[0])
     if origin is tuple:
@@ -130,7 +173,13 @@ def _scalar(kind: Any) -> type:
         return float
     if origin is np.ndarray:
         return _scalar(get_args(inner[1])[0])
-    kinds = {bool: (bool, np.bool_), int: (int, np.integer), str: (str, np.str_), float: (float, np.floating)}
+    kinds = {
+        bool: (bool, np.bool_),
+        int: (int, np.integer),
+        str: (str, np.str_),
+        float: (float, np.floating),
+        complex: (complex, np.complexfloating),
+    }
     return next(own for own, alike in kinds.items() if issubclass(kind, alike))
 
 
@@ -141,22 +190,44 @@ def described_fields(cls: Any) -> tuple[Described, ...]:
 
 @cache
 def _described(cls: Any) -> tuple[Described, ...]:
-    hints = get_type_hints(cls)
-    written = [each for each in fields(cls) if "about" in each.metadata]
-    kinds = [(each, hints[each.name]) for each in written]
+    hints, annotated = get_type_hints(cls), get_type_hints(cls, include_extras=True)
     return tuple(
-        Described(each.name, _without_none(kind), each.metadata["about"], each.default, NoneType in get_args(kind))
-        for each, kind in kinds
+        Described(name, kind or _alone(hints[name]), known, default, NoneType in get_args(hints[name]))
+        for name, known, default, kind in _written(cls, annotated)
     )
 
 
-def _without_none(hint: Any) -> Any:
-    return next(kind for kind in get_args(hint) if kind is not NoneType) if NoneType in get_args(hint) else hint
+def _written(cls: Any, annotated: Mapping[str, Any]) -> Iterator[tuple[str, About | None, Any, Any]]:
+    """List fields that are described, or parts, with defaults and kinds: of named tuples and of settings all."""
+    for name in getattr(cls, "_fields", ()):
+        own = (each for each in get_args(annotated[name]) if isinstance(each, About))
+        yield name, next(own, None), cls._field_defaults.get(name, MISSING), None
+    for each in fields(cls) if is_dataclass(cls) else ():
+        if "about" in each.metadata:
+            yield each.name, each.metadata["about"], each.default, each.metadata.get("kind")
+        elif issubclass(cls, Settings):
+            yield each.name, _about_setting(each.name, annotated[each.name]), MISSING, None
+
+
+def _about_setting(name: str, hint: Any) -> About | None:
+    """Describe a setting by its own words; one that holds settings is a part."""
+    kind, *more = get_args(hint)
+    kind = _alone(kind)
+    if any(isinstance(each, type) and issubclass(each, Settings) for each in (kind, *get_args(kind))):
+        return None
+    text = next((each.documentation for each in more if isinstance(each, Doc)), "")
+    return About(text, (name,) if get_origin(kind) is tuple else (), "SI")
+
+
+def _alone(hint: Any) -> Any:
+    """Give what a hint allows but None: several values rather than one, of several kinds the first."""
+    allowed = [kind for kind in get_args(hint) if kind is not NoneType] if get_origin(hint) in _UNIONS else [hint]
+    return next((kind for kind in allowed if get_origin(kind) is tuple), allowed[0])
 
 
 def plain(given: Any) -> Any:
     """Write a result as JSON knows it: brief fields, and properties in its ``SHOWN``; what is not finite is null."""
-    if is_dataclass(given) and not isinstance(given, type):
+    if (is_dataclass(given) or hasattr(given, "_fields")) and not isinstance(given, type):
         own = [each.name for each in described_fields(type(given)) if each.about is None or each.about.brief]
         return {name: plain(getattr(given, name)) for name in (*getattr(given, "SHOWN", ()), *own)}
     if isinstance(given, Mapping):
@@ -182,6 +253,20 @@ def datasets(cls: Any, prefix: str = "", row: str = "", required: bool = True) -
         else:
             inner = own.name if row or own.table else ""
             yield from datasets(own.inner, f"{prefix}{own.name}/{'*/' if own.named else ''}", inner, needed)
+
+
+class _NumberByName(NamedTuple):
+    name: Annotated[str, About("whose value it is")]
+    value: Annotated[float, About("value", gaps=True)]
+
+
+class _TextByName(NamedTuple):
+    name: Annotated[str, About("what the text is about")]
+    value: Annotated[str, About("text")]
+
+
+class _Line(NamedTuple):
+    values: Annotated[np.ndarray[Any, np.dtype[np.float64]], About("values", ("value",), ragged=True)]
 
 
 @result

@@ -18,7 +18,15 @@ from typing import Any
 
 from cpfls_cli import page, store
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, check_output, filled_folder, refuse_inputs, write_files, write_text
+from cpfls_cli.artifacts.output import (
+    check_folder,
+    check_output,
+    filled_folder,
+    refuse_inputs,
+    refuse_own,
+    write_files,
+    write_text,
+)
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
@@ -100,6 +108,8 @@ class Run(Job):
         Contexts that last until the result is written, or it is sure that it will not be.
     afterwards : list of callable
         What is done when the result is written.
+    data : callable
+        Gives the config as plain data, with what the command line changes of it.
     """
 
     writes: bool = True
@@ -114,6 +124,7 @@ class Run(Job):
     said: list[Text] = field(default_factory=list)
     until_written: ExitStack = field(default_factory=ExitStack)
     afterwards: list[Callable[[], object]] = field(default_factory=list)
+    data: Callable[[], dict[str, Any]] = dict
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -154,6 +165,14 @@ class Run(Job):
         """Name a command that goes on with the config of this run."""
         self.next.append(go_on(self, command, *words, output=output))
 
+    def write_text(self, path: Path, text: str, what: str) -> None:
+        """Have a file of text written behind the result, or alone where none is written; `what` says what it is."""
+        if self.writes:
+            refuse_own(path, self.output)
+        check_output(path, self.force, self.inputs)
+        self.texts[path] = text
+        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
@@ -183,10 +202,10 @@ class Stage:
         Whether it takes a config.
     several : bool
         Whether options that may be repeated take all values that follow.
-    overrides : callable or None
-        Gives overrides of the config that its options stand for.
     resumes : bool
         Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
+    overrides : callable or None
+        Gives overrides of the config that its options stand for.
     together : callable
         Gives the sources of a report that show its results: several may be shown as one.
     """
@@ -200,8 +219,8 @@ class Stage:
     fills: Filled | None
     study: bool
     several: bool
+    resumes: bool
     overrides: Callable[..., list[str]] | None
-    resumes: bool = False
     together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -261,22 +280,20 @@ class Stage:
             self._check(run, run.output)
         with run.until_written:
             found = self.function(run, **given)
-            results = dict(found) if self.folder and found is not None else {"": found}
-            if found is not None:
-                texts = self._texts(run, results)
-                if run.writes:
-                    self._write(run, run.output, results)
-        if found is None:
-            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
-            where = where if run.writes else ""
-            named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if self.study else ""
-            return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
+            if found is None:
+                return self._would(run)
+            results = dict(found) if self.folder else {"": found}
+            if self.fills and run.writes:
+                run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
+            several = len(results) > 1
+            texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
+            texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+            if run.writes:
+                self._write(run, run.output, results)
+            else:
+                write_files(run.texts)
         for act in run.afterwards:
             act()
-        if self.fills and run.writes:
-            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
-        several = len(results) > 1
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -289,12 +306,16 @@ class Stage:
             ),
             run.exit_code,
             next=tuple(run.next),
-            written=run.output if run.writes else None,
+            written=run.output if run.writes else next(iter(run.texts), None),
         )
 
-    def _texts(self, run: Run, results: Mapping[str, Any]) -> list[str]:
-        index = [self.text(results, f"_{_INDEX}")] if len(results) > 1 else []
-        return index + [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+    def _would(self, run: Run) -> Outcome:
+        """Say of a dry run that it could go on."""
+        where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
+        where = where if run.writes else ""
+        named = {"output": str(run.output)} if run.writes else {}
+        config = "the config and " if self.study else ""
+        return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
 
     def info(self, path: Path) -> Outcome:
         """Say again what a file answers, where it comes from and what it holds."""
@@ -416,13 +437,13 @@ def stage(
     fills: Filled | None = None,
     study: bool = False,
     several: bool = False,
-    overrides: Callable[..., list[str]] | None = None,
     resumes: bool = False,
+    overrides: Callable[..., list[str]] | None = None,
     together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, overrides, resumes, together
+        function, kind, title, figures or {}, words or {}, folder, fills, study, several, resumes, overrides, together
     )
 
 

@@ -23,9 +23,9 @@ from cpfls_cli.artifacts.check import dataset_of, old_file, opened_file, origin_
 from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
-from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION, DatasetSpec
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.result import AXES, About, Described, described_fields
+from cpfls_cli.result import AXES, About, Described, described_fields, maps
 from cpfls_cli.words import some
 
 T = TypeVar("T")
@@ -37,8 +37,8 @@ _LARGEST = 1e150
 _BLOCK = 1 << 18
 """Rows that are checked at a time."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
-_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, str: np.str_}
-_HELD = {bool: "bui", int: "iub", float: "fiub", str: "US"}
+_NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
+_HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
 """Kinds of arrays that hold values of a type."""
 
 Lengths = MutableMapping[str, tuple[int, str]]
@@ -112,10 +112,10 @@ def _write(group: h5py.Group, given: Any, rows: int = 0) -> None:
         value = getattr(given, own.name)
         if value is None:
             continue
-        if own.about:
+        if own.rows or own.table:
+            _write_table(group.create_group(own.name), own.rows or own.inner, _rows(own, value))
+        elif own.about:
             _write_values(group, own.name, value, own, own.about, rows if own.name in streamed else 0)
-        elif own.table:
-            _write_table(group.create_group(own.name), own.inner, value)
         else:
             inner = group.create_group(own.name, track_order=own.named)
             for name, each in value.items() if own.named else [("", value)]:
@@ -132,11 +132,11 @@ def _write_table(group: h5py.Group, kind: type, rows: Sequence[Any]) -> None:
             inner, values = group.create_group(own.name), [line for each in lines for line in each]
             row = np.repeat(np.arange(len(rows)), [len(each) for each in lines])
             _write_values(inner, "row", row, Described("row", int, _ROW, MISSING, False), _ROW)
-            if own.about:
-                about = own.about._replace(axes=("line", *own.about.axes[own.many :]))
+            if own.about and not own.rows:
+                about = own.about._replace(axes=("line", *own.about.axes[own.many or own.about.ragged :]))
                 _write_values(inner, "values", values, own, about)
             else:
-                _write_table(inner, own.inner, values)
+                _write_table(inner, own.rows or own.inner, values)
         elif own.about:
             _write_values(group, own.name, values, own, own.about._replace(axes=(axis, *own.about.axes)))
         else:
@@ -145,11 +145,27 @@ def _write_table(group: h5py.Group, kind: type, rows: Sequence[Any]) -> None:
 
 def _in_lines(own: Described) -> bool:
     """Tell whether rows of a table may lack it or hold several."""
-    return own.optional or own.table or own.many
+    return own.optional or own.table or _several(own)
+
+
+def _several(own: Described) -> bool:
+    """Tell whether rows of a table may hold several values of it."""
+    return bool(own.rows or own.many or (own.about and own.about.ragged))
 
 
 def _lines(own: Described, value: Any) -> Sequence[Any]:
-    return () if value is None else value if own.table or own.many else (value,)
+    return () if value is None else _rows(own, value) if own.table or _several(own) else (value,)
+
+
+def _rows(own: Described, value: Any) -> Sequence[Any]:
+    """Give values by name, or arrays of several lengths, as rows of a table; others as they are."""
+    if not own.rows:
+        return value  # type: ignore[no-any-return]
+    return [own.rows(*each) for each in (value.items() if isinstance(value, Mapping) else zip(value))]
+
+
+def _of_rows(own: Described, rows: Sequence[Any]) -> Any:
+    return dict(rows) if maps(own.kind) else tuple(values for (values,) in rows)
 
 
 def _write_values(group: h5py.Group, name: str, value: Any, own: Described, about: About, rows: int = 0) -> None:
@@ -192,6 +208,28 @@ def examine(path: Path, kind: type[T]) -> tuple[T, Origin, list[str]]:
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
     return given, origin, findings(given)
+
+
+def flat(path: Path) -> dict[str, tuple[DatasetSpec, Any]]:
+    """Read the datasets of a result by path, each with what its attributes say of it."""
+    found: dict[str, tuple[DatasetSpec, Any]] = {}
+
+    def take(name: str, held: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(held, h5py.Dataset) and name != CONFIG.strip("/"):
+            labels = tuple(each.label for each in held.dims)
+            words = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
+            values = np.asarray(held[()])
+            values = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
+            found[name] = DatasetSpec(name, labels, *words), values
+
+    with opened_file(path) as file, patient(path):
+        file.visititems(take)
+    return found
+
+
+def format_of(given: Any) -> str:
+    """Name the format of a record or a result, or of its class."""
+    return str(getattr(given.FORMAT, "name", given.FORMAT))
 
 
 def count_rows(path: Path, kind: Any, name: str) -> int | None:
@@ -276,6 +314,8 @@ def _read(kind: Any, group: h5py.Group, missing: list[str]) -> Any:
     for own in described_fields(kind):
         if own.name not in group:
             given |= _absent(own, group, missing)
+        elif own.rows:
+            given[own.name] = _of_rows(own, _read_table(own.rows, group[own.name], missing))
         elif own.about:
             given[own.name] = _value(own, _values(group, own.name, own))
         elif own.table:
@@ -318,13 +358,17 @@ def _read_table(kind: Any, group: h5py.Group, missing: list[str]) -> tuple[Any, 
 
 def _read_lines(own: Described, group: h5py.Group, rows: int, missing: list[str]) -> list[Any]:
     lines: Sequence[Any] = (
-        [_value(own, each, single=own.many) for each in _values(group, "values", own)]
-        if own.about
-        else _read_table(own.inner, group, missing)
+        [_value(own, each, single=_several(own)) for each in _values(group, "values", own)]
+        if own.about and not own.rows
+        else _read_table(own.rows or own.inner, group, missing)
     )
     by_row: list[list[Any]] = [[] for _ in range(rows)]
     for row, line in zip(group["row"][()].tolist(), lines, strict=True):
         by_row[row].append(line)
+    if own.rows:
+        return [_of_rows(own, each) for each in by_row]
+    if own.about and own.about.ragged:
+        return [np.array(each, _NUMPY[own.scalar]) for each in by_row]
     if own.table or own.many:
         return [tuple(each) for each in by_row]
     return [each[0] if each else None for each in by_row]
@@ -361,12 +405,12 @@ def _findings(given: Any, prefix: str, lengths: Lengths, *, row: bool = False) -
         path, value = f"{prefix}{own.name}", getattr(given, own.name)
         if value is None:
             yield from () if own.optional else (f"{path}: is missing",)
-        elif own.about:
-            # What rows of a table hold is as long in each of them, but for tuples.
-            yield from _wrong(path, value, own, own.about, ChainMap({}, lengths) if row and own.many else lengths)
-        elif own.table:
+        elif own.about and not own.rows:
+            # What rows of a table hold is as long in each of them, but for what they may hold several of.
+            yield from _wrong(path, value, own, own.about, ChainMap({}, lengths) if row and _several(own) else lengths)
+        elif own.rows or own.table:
             shared: Lengths = ChainMap({}, lengths)
-            for index, each in enumerate(value):
+            for index, each in enumerate(_rows(own, value)):
                 yield from _findings(each, f"{path}/{index}/", shared, row=True)
         else:
             for name, each in value.items() if own.named else [("", value)]:
@@ -389,7 +433,7 @@ def _wrong(path: str, value: Any, own: Described, about: About, lengths: Lengths
         known, where = (fixed, "its description") if fixed else lengths.setdefault(label, (length, path))
         if length != known:
             yield f"{path}: {length} along '{label}', but {known} by {where}"
-    if array.dtype.kind == "f" and not about.gaps and not np.isfinite(array).all():
+    if array.dtype.kind in "fc" and not about.gaps and not np.isfinite(array).all():
         yield f"{path}: {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite"
     if array.dtype.kind == "f" and np.any(np.abs(array, dtype=float) > _LARGEST, where=np.isfinite(array)):
         yield f"{path}: holds values beyond {_LARGEST:g}"

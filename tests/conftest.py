@@ -7,7 +7,7 @@ import signal
 import pytest
 from hypothesis import settings
 
-from tests.builders import command_line
+from tests.builders import command_line, compiled_loops
 
 # A shell without job control has what it starts in the background ignore interrupts, and all that this starts in turn.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -18,6 +18,11 @@ os.fsync = lambda _: None
 # As the program itself does, and later still: a tenth of the time of the tests went into looking for garbage among what
 # stays.
 gc.set_threshold(100_000, *gc.get_threshold()[1:])
+
+
+def pytest_xdist_setupnodes():
+    """Compile the loops once, and not in each worker that first calls them."""
+    compiled_loops.compile_missing()
 
 
 def pytest_collection_finish():

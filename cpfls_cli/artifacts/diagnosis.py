@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.comes_again import ComesAgainGroup
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.gap_effects import (
     GapChangeGroup,
     NamedEffectsGroup,
@@ -29,6 +29,7 @@ from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGrou
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.naming.results import Alternative, LikelySet, Unexplained
+from cpfls_cli.playback.gusts import GustAxis
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
@@ -349,7 +350,7 @@ class DiagnosisRecord(Record):
         training = lengths[: self.flights.each.role.count(TRAINING)]
         halved = len(files) == 1 and not any(role.startswith("held-out") for role in inputs)
         whole = [sum(lengths)] if halved else training
-        return tuple(map(LearnedFlight, files, training, whole))
+        return tuple(map(LearnedFlight.in_file, files, training, whole))
 
     @property
     def effects_of_motion(self) -> tuple[str, ...]:

@@ -14,12 +14,12 @@ from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summa
 from cpfls_cli.artifacts.gap_flights import FlightsGroup, NotExcitedGroup
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
+from cpfls_cli.artifacts.playback import PlaybackGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.playback.errors import STATED
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
@@ -172,7 +172,7 @@ class DisagreementRecord(Record):
             playback=PlaybackGroup.of(
                 disagreement.played,
                 disagreement.playback,
-                {name: name for name in disagreement.playback.predictions if name != STATED},
+                {name: name for name in disagreement.playback.models if name != STATED},
             ),
             not_excited=columns_of(NotExcitedGroup, disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),

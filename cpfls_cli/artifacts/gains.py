@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.response import CurveGroup
 from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.twin import CurveGroup
 
 if TYPE_CHECKING:
     from cpfls_cli.autopilots.parameters import Autopilot

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.replay import FADING, PlaybackGroup, played_row, rival_row, row_of
+from cpfls_cli.artifacts.playback import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, paired, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.gap.settings import CLEAR, OFF
-from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED
+from cpfls_cli.playback.errors import AFTER, BEFORE, FADING, MODEL, NOTHING_MOVES, STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import GapSize
@@ -390,27 +390,22 @@ class PlaybackChangeGroup(PlaybackGroup):
 
     fading_s: float | None = dataset(FADING, units="s", default=None)
 
-    @property
-    def played(self) -> str:
-        """What is played back."""
-        return "the model with the effects"
-
     @classmethod
     def of_pairs(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay of a model with effects and the model as given, without its windows."""
         names = {MODEL: AFTER, STATED: BEFORE}
-        every = {name: names.get(name, name) for name in replay.predictions}
+        every = {name: names.get(name, name) for name in replay.models}
         return cls.of(flights, replay, every, fading_s=flights[0].fading_s)
 
     @property
     def at_end(self) -> dict[str, EndError]:
         """Errors at the longest horizon by signal, of those that move."""
-        before, after, nothing = row_of(self, BEFORE), played_row(self), row_of(self, NOTHING_MOVES)
-        ends = {}
-        for name, found in self.errors.items():
-            if found is not None and found.total[nothing] > 0:
-                rival, error = rival_row(self, found), found.mae[:, -1].tolist()
-                ends[name] = EndError(error[before], error[after], self.prediction[rival], error[rival])
+        own, ends = self.by_horizon, {}
+        for signal in own.signals:
+            if own.of(NOTHING_MOVES, signal).sum > 0:
+                rival = own.rival(signal)
+                before, after, other = (float(own.of(name, signal).mae[-1]) for name in (BEFORE, own.judged, rival))
+                ends[signal] = EndError(before, after, rival, other)
         return ends
 
     @property

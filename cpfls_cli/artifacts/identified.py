@@ -133,9 +133,10 @@ class IdentifiedRecord(ModelRecord):
         ("flight", "selection", "validate", "choose-on"),
         kind="identified",
     )
+    MADE_BY: ClassVar = "identify"
 
     vehicle: IdentifiedVehicleGroup = group()
-    model: ChosenGroup = group()
+    chosen: ChosenGroup = group("model")
     solve: SolveGroup = group()
     rules: RulesGroup = group()
     front: FrontGroup = group()
@@ -171,7 +172,7 @@ class IdentifiedRecord(ModelRecord):
         return cls(
             vehicle=IdentifiedVehicleGroup.of(vehicle),
             learned=parts,
-            model=group_of(ChosenGroup, result.fit, weights=result.front.chromosomes[result.front.chosen], base=base),
+            chosen=group_of(ChosenGroup, result.fit, weights=result.front.chromosomes[result.front.chosen], base=base),
             solve=group_of(SolveGroup, result.system),
             rules=group_of(RulesGroup, result.excitation),
             front=group_of(FrontGroup, result.front),
@@ -186,6 +187,12 @@ class IdentifiedRecord(ModelRecord):
             findings=tuple(result.findings),
             **({} if evidence is None else evidence_groups(evidence)),
         )
+
+    @property
+    def chosen_on(self) -> frozenset[str]:
+        """Hashes of the flights that it was chosen on, among several."""
+        inputs = {} if self.header is None else self.header.inputs
+        return frozenset(file.sha256 for role, file in inputs.items() if role.startswith("choose-on"))
 
     @property
     def functions(self) -> InertiaFunctionsGroup:
@@ -210,17 +217,17 @@ class IdentifiedRecord(ModelRecord):
     @property
     def searched(self) -> bool:
         """Whether it has partitions to search for; without, one chromosome was evaluated."""
-        return bool(np.size(self.model.weights))
+        return bool(np.size(self.chosen.weights))
 
     @property
     def on_rigid_body(self) -> bool:
         """Whether a rigid body lies under the fuzzy part."""
-        return self.model.base == "rigid-body"
+        return self.chosen.base == "rigid-body"
 
     @property
     def fuzzy_part_off(self) -> bool:
         """Whether cross-validation switched the fuzzy part off."""
-        return bool(np.isinf(self.model.ridge_weight))
+        return bool(np.isinf(self.chosen.ridge_weight))
 
     @property
     def same_everywhere(self) -> bool:
@@ -267,7 +274,7 @@ class IdentifiedRecord(ModelRecord):
             "choice_error": None if self.front.held_out is None else float(np.min(self.front.held_out)),
             "samples": judged.samples_of(TRAINING),
             "learned": len(self.training_indices),
-            "ridge_weight": self.model.ridge_weight,
+            "ridge_weight": self.chosen.ridge_weight,
             "fuzzy_part": "off" if self.fuzzy_part_off else "on",
             "inertia_kg_m2": {
                 "found": dict(zip(INERTIA_PARAMETERS, self.baselines.rigid_body.tolist(), strict=True)),

@@ -15,6 +15,8 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
+from cpfls_cli.result import About
+
 SCHEMA_VERSION = 3
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
 
@@ -129,6 +131,7 @@ class Format:
         return next((spec for spec in self.datasets if spec.path == path), None)
 
 
+# A group is a part of a result too, until it is a result itself: "about" describes its fields as `result.about` does.
 def dataset(
     description: str,
     *dimensions: str,
@@ -155,7 +158,8 @@ def dataset(
         SI units; text is told by the type of the field.
     """
     spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least, holds)
-    return field(default=default, metadata={_DATASET: spec, _PATH: path or None})
+    own = About(description, dimensions, units, frame, gaps, least)
+    return field(default=default, metadata={_DATASET: spec, _PATH: path or None, "about": own})
 
 
 def group(path: str | None = None, *, default: Any = MISSING, apart: bool = False) -> Any:
@@ -168,7 +172,7 @@ def group(path: str | None = None, *, default: Any = MISSING, apart: bool = Fals
     apart : bool
         Whether its axes are as long as they like, though another group is a record of the same kind.
     """
-    return field(default=default, metadata={_PATH: path, _APART: apart})
+    return field(default=default, metadata={_PATH: path, _APART: apart, "about": None})
 
 
 _Class = TypeVar("_Class")

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
 from cpfls_cli.artifacts.flight import ClockGroup
-from cpfls_cli.artifacts.replay import played_words
-from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, CurveGroup, DeviationGroup, response_word
 from cpfls_cli.artifacts.spec import WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.response.mismatch import Deviation
+from cpfls_cli.playback.settings import VEHICLE
+from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, Deviation, response_word
+from cpfls_cli.response.spectra import decibels, degrees
+from cpfls_cli.result import plain
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.flight import LoggedFlight
@@ -25,6 +26,36 @@ CHANNEL = (
     "roll rate, pitch rate, yaw rate: rad/s, body; roll, pitch, yaw: rad; velocity x, y, z: m/s, world; thrust: "
     "specific force along z, m/s^2, body"
 )
+
+
+def played_words(played: str) -> str:
+    """Name what is played: a file, or the vehicle of the config."""
+    return "the vehicle of the config" if played == VEHICLE else played
+
+
+@record
+class CurveGroup:
+    """Complex gains by response and frequency, as decibels and degrees."""
+
+    magnitude: Array = dataset("20 log10 of the gain in SI units", "response", "frequency", units="dB", gaps=True)
+    phase: Array = dataset("from -180 to 180", "response", "frequency", units="deg", gaps=True)
+
+    @classmethod
+    def of(cls, gains: Numbers) -> Self:
+        """Arrange complex gains, shape (response, frequency), NaN where not known."""
+        return cls(magnitude=decibels(gains), phase=degrees(gains))
+
+
+@record
+class DeviationGroup:
+    """Stretches of the band of a response, each one in which the model is right, or off in one way."""
+
+    response: IntArray = dataset("index of the response", "deviation", into="response")
+    low: Array = dataset("from this frequency", "deviation", units="Hz")
+    high: Array = dataset("to this one", "deviation", units="Hz")
+    right: BoolArray = dataset("1 where the model is right", "deviation")
+    gain: Array = dataset("gain of the model over the measured one, geometric mean", "deviation")
+    phase: Array = dataset("phase of the model less the measured one, mean", "deviation", units="deg")
 
 
 @record
@@ -70,8 +101,8 @@ class AnswersGroup:
         ]
         frequency = np.unique(np.concatenate([np.zeros(0), *(found.frequency for _, _, found, _ in rows)]))
 
-        def spread(values: Sequence[Array], found: Sequence[Array], kind: type) -> Array:
-            whole: Array = np.full((len(values), len(frequency)), np.nan, dtype=kind)
+        def spread(values: Sequence[Numbers], found: Sequence[Array], kind: type) -> Numbers:
+            whole: Numbers = np.full((len(values), len(frequency)), np.nan, dtype=kind)
             for row, own, places in zip(whole, values, found, strict=True):
                 row[np.searchsorted(frequency, places)] = own
             return whole
@@ -328,7 +359,7 @@ class TwinRecord(Record):
             "word": self.word(vehicle, channel),
             "cost": self.cost(vehicle, channel),
             "band_hz": None if row is None else self.answers.band[row].tolist(),
-            "deviations": [] if row is None else [each._asdict() for each in self.answers.deviations(row)],
+            "deviations": [] if row is None else [plain(each) for each in self.answers.deviations(row)],
             "floor": float(self.floor[vehicle, channel]),
             "first_apart_s": self.first_apart(vehicle, channel),
             "apart_share": float(apart.mean()) if len(apart) else 0.0,

@@ -15,7 +15,6 @@ from cpfls_cli.consistency.check import flown
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.filters import parabolas
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.lag import delayed
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
@@ -302,8 +301,10 @@ def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None
     halves = [max(1, round(0.5 / (each * period))) for each in hertz]
     if 0.5 / period < 1.5 * _ABOVE_HZ or len(values) < 4 * max(halves) + 4:
         return None
-    smooth = [parabolas(values[:, [axis]], half, 0) for axis, half in enumerate(halves)]
-    return np.asarray((values - np.hstack(smooth)) ** 2)
+    from scipy.signal import savgol_filter
+
+    smooth = [savgol_filter(column, 2 * half + 1, 2) for column, half in zip(values.T, halves, strict=True)]
+    return np.asarray((values - np.stack(smooth, axis=1)) ** 2)
 
 
 def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:

@@ -11,32 +11,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cpfls_cli.arguments import (
-    AnywayOption,
     ArtifactsArgument,
     AutopilotChoice,
     ChooseOnOption,
     DiagnosisArgument,
     DisagreementArgument,
-    EveryOption,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
     FlightArgument,
     FlightsArgument,
-    Flown,
     FlownArgument,
     FolderOption,
     HeldOutOption,
-    HistoryOption,
-    HoldOption,
-    HorizonOption,
-    JudgedOption,
     LogArgument,
     LogsArgument,
     ModelArgument,
     ModelOption,
-    PlayedArgument,
     ResumeOption,
     SchedulerOption,
     TimeLimitOption,
@@ -44,7 +36,6 @@ from cpfls_cli.arguments import (
     TrainingArgument,
     ValidateOption,
     WorkersOption,
-    WriteConfigOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -252,73 +243,11 @@ def identify(
 
 
 @_command()
-def vehicle(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    resume: ResumeOption = False,
-    write_config: WriteConfigOption = None,
-    anyway: AnywayOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
-    if anyway:
-        # The artifact holds it with its config.
-        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
-
-    def call(command: Any, job: Job) -> Any:
-        copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
-        return command.run(job, flights, held_out or [], copy, resume=resume)
-
-    _run("vehicle", config, output, common, call)
-
-
-@_command()
 def predict(
     config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
 ) -> None:
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
     _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def replay(
-    config: ConfigArgument,
-    model: PlayedArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    horizon: HorizonOption = None,
-    every: EveryOption = 1,
-    hold: HoldOption = None,
-    history: HistoryOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
-        )
-        return command.run(job, model, flights, options)
-
-    _run("replay", config, output, common, call)
-
-
-@_command()
-def response(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    model: JudgedOption = None,
-    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
-    *,
-    common: Common,
-) -> None:
-    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
-    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
 
 
 @_command()
@@ -558,8 +487,8 @@ def export(
         ExportFormat | None,
         typer.Option(
             "--format",
-            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
+            "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
             "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
             "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
             "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
@@ -603,28 +532,6 @@ def spread(
         return command.run(job, model, count, seed, anyway=anyway)
 
     _run_without_config("spread", output, common, call)
-
-
-@_command("verify-export")
-def verify_export(
-    model: ModelArgument,
-    flight: Annotated[
-        Path, typer.Argument(metavar="FLIGHT", help="A flight, or a log that the config of the model describes.")
-    ],
-    form: Annotated[Flown, typer.Option("--format", help="What the exported vehicle is flown in.")],
-    horizon: HorizonOption = None,
-    windows: Annotated[int, typer.Option("--windows", metavar="N", min=1, help="Runs, spread over the flight.")] = 10,
-    hold: HoldOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Export a model, fly that along a flight from measured states, and compare it with the model's own playback."""
-    with messages_for_errors():
-        command = _of("verify-export")
-        options = command.Options(
-            form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
-        )
-        tell(command.run(model, flight, options, force=common.force, dry_run=common.dry_run), common)
 
 
 @_command()

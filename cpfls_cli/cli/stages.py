@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -117,6 +117,7 @@ def run_of(
     if config:
         reads(config)
         run.inputs.append(config)
+        run.data = partial(common.data, config)
         run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
         if common.numbers is not None:
             run = import_module("cpfls_cli.commands.numbers").with_numbers_of(run, common.numbers)

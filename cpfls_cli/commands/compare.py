@@ -7,18 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
 from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -36,7 +33,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     roles = numbered_roles("flight", flights)
     inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
-    job = with_numbers(job, "compare", model, whole=model is not None and holds(model, VehicleRecord))
+    job = with_numbers(job, "compare", model, whole=model is not None and is_found(model))
     read, learned = read_flights(flights, job.study), learned_by(model)
     base = VehicleModel(vehicle=job.study.vehicle) if model is None else read_model(model, job.study)
     given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))
@@ -67,7 +64,7 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
     """Give the command that names what is missing, from the model on where `cpfls gap` can start from it."""
     if job.found is not None and why_no_body_found(job, job.found):
         return to_fly(job)
-    starts = model is not None and (holds(model, VehicleRecord) or holds(model, IdentifiedRecord))
+    starts = model is not None and (is_found(model) or is_identified(model))
     given: Sequence[str | Path] = ("--model", model) if model is not None and starts else ()
     return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
 

@@ -1,4 +1,4 @@
-"""Command `export`: any model as JSON, C or Python, or as a vehicle for simulators and for libraries."""
+"""Command `export`: any model as JSON or C, or as a vehicle for simulators and for libraries."""
 
 from __future__ import annotations
 
@@ -77,13 +77,13 @@ def _summary(job: Job, form: str, sheet: Sheet, made: Exported, sizes: dict[str,
 
 def _form_of(output: Path) -> str:
     """Choose a form by the suffix of a file."""
+    if output.suffix == ".py":
+        raise InputError(f"{output}: rotorpy, casadi and jax write Python; name one of them with --format")
     for form, ending in ENDINGS.items():
         if output.suffix == ending:
             return form
-    told: dict[str, str] = {}
-    for form, ending in ENDINGS.items():
-        told.setdefault(ending, form)
-    endings = ", ".join(f"{ending} ({form})" for ending, form in told.items())
+    first = {ending: form for form, ending in reversed(ENDINGS.items()) if ending != ".py"}
+    endings = ", ".join(f"{ending} ({form})" for ending, form in reversed(first.items()))
     raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
 
 

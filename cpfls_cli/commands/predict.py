@@ -14,11 +14,9 @@ from cpfls_cli.artifacts.evidence import UncertaintyGroup
 from cpfls_cli.artifacts.flight import CLOCK, ClockGroup, FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_number, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.store import count_rows, read_number
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
@@ -36,7 +34,7 @@ from cpfls_cli.flights.flight_source import (
     torque_source_of,
 )
 from cpfls_cli.flights.inputs import hashes_of
-from cpfls_cli.flights.models import read_model, rebuilt
+from cpfls_cli.flights.models import any_model, is_found, modelled, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -58,8 +56,8 @@ _Predicted = Callable[[FlightStretch], PredictionRecord]
 def run(job: Job, model: Path, flight: Path) -> Outcome:
     """Predict along a flight and write it."""
     inputs = begin(job, {"model": model, "flight": flight})
-    job = with_numbers(job, "predict", model, whole=holds(model, VehicleRecord))
-    record = read_record(model, ModelRecord)
+    job = with_numbers(job, "predict", model, whole=is_found(model))
+    record = any_model(model)
     identified = record if isinstance(record, IdentifiedRecord) else None
     findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
     seen = seen_words(record, hashes_of(flight, inputs["flight"]))
@@ -74,7 +72,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         finish_parts(job, _on_clock(parts, stretches.begins), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(findings)))
-    functions = rebuilt(model, identified).fuzzy
+    functions = modelled(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)

@@ -12,11 +12,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup, ParameterRow
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, refuse_own, write_text
-from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
+from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST
 from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.autopilots.motors import straightening
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -25,7 +24,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import file_of, parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.models import read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
 from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
@@ -34,9 +33,9 @@ from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.vibration import Change, vibration_of
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.look_gains import answer as answer_of_log
+from cpfls_cli.pages.model import slow_words
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.pages.vehicle_model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
@@ -268,29 +267,29 @@ def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str
         )
 
 
-def _trusted(job: Job, model: Path) -> VehicleRecord:
+def _trusted(job: Job, model: Path) -> Vehicle:
     """Read a vehicle that is good for simulation and control, and refuse others with the flight that is missing."""
-    if not holds(model, VehicleRecord):
-        what = "an identified model" if holds(model, ModelRecord) else "no model"
+    if not is_found(model):
+        what = "an identified model" if is_model(model) else "no model"
         raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
-    record = read_record(model, VehicleRecord)
+    record = found_vehicle(model)
     if record.verdict is not Trust.SIMULATION:
         good = trust_words(Trust.SIMULATION).short
-        untold = f"; not told: {joined(record.untold)}" if record.untold else ""
+        weak = f"; not determined: {joined(record.not_determined)}" if record.not_determined else ""
         raise InputError(
-            f"{model}: {trust_words(record.verdict).short}{untold}. Gains need a vehicle that is {good}: a body "
+            f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good}: a body "
             f"that is too heavy gives gains that are too high. {_missing(job, record)}"
         )
     return record
 
 
-def _missing(job: Job, record: VehicleRecord) -> str:
+def _missing(job: Job, record: Vehicle) -> str:
     """Say which flight would make a vehicle good."""
     judged = record.held_out is not None or record.instruments is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     planned = command_line(to_fly(job))
-    slow = next(slow_words(record), "")
+    slow = slow_words(record)
     if slow:
         return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
     return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
@@ -301,7 +300,7 @@ class _Work:
     """What gains are found from."""
 
     autopilot: Autopilot
-    record: VehicleRecord
+    record: Vehicle
     model: VehicleModel
     study: Study
     asked: AskedMargins
@@ -345,14 +344,14 @@ class _Work:
 
     def _spreads(self) -> tuple[Spread, Spread, Spread]:
         """Give what flights leave open of each axis, and take note of what they do not tell."""
-        known = {each.key: each for each in parameters_of(self.record)}
+        known = self.record.parameters
         intervals, stated = {}, []
         for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
             each = known[key]
             if each.determined and each.value and each.low is not None and each.high is not None:
                 # An end at or below zero says no more than that the number is small.
                 intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
-            elif key in INERTIA[:3] and FOUND_AS[key] in self.record.untold:
+            elif key in INERTIA[:3] and FOUND_AS[key] in self.record.not_determined:
                 intervals[key] = _ASSUMED_GAIN
                 stated.append(each.name)
         if stated:
@@ -443,9 +442,7 @@ def _heard(
     return NoiseGroup.of(noise, lines, np.array([noise.of_commands(autopilot.law(values)) for values in sets]))
 
 
-def _hover_notes(
-    autopilot: Autopilot, today: Mapping[str, float], hover: HoverPlant, record: VehicleRecord
-) -> Iterator[str]:
+def _hover_notes(autopilot: Autopilot, today: Mapping[str, float], hover: HoverPlant, record: Vehicle) -> Iterator[str]:
     """Say where the hover thrust of a log is not that of the vehicle: the full thrust is another, and all gains too."""
     held = autopilot.by_role("motors.hover")
     if held is None or held.name not in today:
@@ -454,7 +451,7 @@ def _hover_notes(
         yield (
             f"{held.name} is {today[held.name]:.3g} in the log, but the vehicle hovers at "
             f"{percent(hover.share, 2)} of its full thrust: if the log is right, vehicle.rotor_speed_max_rad_s is not "
-            f"{record.vehicle.rotor.speed_max:.6g}, and gains are off as thrust is"
+            f"{record.model.vehicle.rotor_speed_max_rad_s:.6g}, and gains are off as thrust is"
         )
 
 

@@ -11,32 +11,28 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.rebuilt import estimates
-from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.twin import GainsGroup, TwinRecord, WindowsGroup
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
-from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flights.inputs import known_by
-from cpfls_cli.flights.models import learned_by, read_model
-from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
+from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.pages.twin import answer
-from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.spread import drawn
+from cpfls_cli.playback.settings import VEHICLE
+from cpfls_cli.playback.spread import Estimates, drawn
 from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.simulation.model import SimulatedEffects, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
@@ -114,11 +110,10 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
 def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Sequence[VehicleModel], Lack | None]:
     """Draw vehicles that the flights of a model allow, as `cpfls spread` does; of other models there is only one."""
     assert model is not None, "it is the model that holds the gusts"
-    record = read_record(path, ModelRecord)
-    if not isinstance(record, VehicleRecord):
+    if not is_found(path):
         return [model] * DRAWS, None
     with about(path, InputError, ComputationError):
-        spread = drawn(model, estimates(record), DRAWS, generator(study, "spread"))
+        spread = drawn(model, Estimates.of(found_vehicle(path)), DRAWS, generator(study, "spread"))
     return spread.models, spread.lack
 
 
@@ -187,7 +182,7 @@ def record_of(
         rotor_lag_s=settings.rotor_time_constant_s,
         instruments=moved_by.kind,
         warning=tuple(warnings),
-        contradiction=contradictions_of([flight]),
+        contradiction=contradictions_of([flight]) or None,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_files
-from cpfls_cli.artifacts.store import read_any
+from cpfls_cli.commands.report import read_sources
 from cpfls_cli.export.mcap_form import mcap_bytes
 from cpfls_cli.export.tracks import TIME, View, csv_text
 from cpfls_cli.export.viewed import view_of
@@ -22,7 +22,8 @@ def run(job: Job, artifact: Path, form: str) -> Outcome:
     """Write the quantities of an artifact."""
     take_inputs(job, {"artifact": artifact})
     check_outputs(job, job.output)
-    view = view_of(artifact, read_any(artifact))
+    (source,) = read_sources([artifact], [""])
+    view = view_of(artifact, source.record, source.header.config)
     content = mcap_bytes(view) if form == "mcap" else csv_text(view)
     if not job.dry_run:
         write_files({job.output: content})

@@ -18,6 +18,7 @@ from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
 from cpfls_cli.effects.hooks import ReadingError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import capitalised
 
@@ -29,33 +30,19 @@ _BY_CHANCE = 4.0
 
 @dataclass(frozen=True)
 class Audit:
-    """Result of the sensor audit.
+    """Result of the sensor audit."""
 
-    Attributes
-    ----------
-    findings : tuple of AuditFinding
-        Faults that were tested, named or not.
-    untested : mapping of str to str
-        Faults that could not be tested, with the reason.
-    warnings : tuple of str
-        Sentences about channels that disagree or look broken; nothing is repaired for them.
-    contradictions : tuple of str
-        Sentences on what no verdict can stand beside; nothing repairs it.
-    notes : tuple of str
-        Sentences for information.
-    repairs : tuple of ChannelRepair
-        Channels that contradict two others, in the order in which they are set right or left out.
-    filtered : tuple of str
-        Sentences on filters before the log, which noise floors depend on.
-    """
-
-    findings: tuple[AuditFinding, ...]
-    untested: Mapping[str, str]
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
-    repairs: tuple[ChannelRepair, ...] = ()
-    filtered: tuple[str, ...] = ()
-    contradictions: tuple[str, ...] = ()
+    findings: tuple[AuditFinding, ...] = part()
+    """Faults that were tested, named or not."""
+    untested: Mapping[str, str] = about("faults that could not be tested, with the reason")
+    warnings: tuple[str, ...] = about("channels that disagree or look broken; nothing is repaired for them", "warning")
+    notes: tuple[str, ...] = about("for information", "note")
+    repairs: tuple[ChannelRepair, ...] = part(default=())
+    """Channels that contradict two others, in the order in which they are set right or left out."""
+    filtered: tuple[str, ...] = about("filters before the log, which noise floors depend on", "filter", default=())
+    contradictions: tuple[str, ...] = about(
+        "contradictions that rule out a verdict; nothing repairs them", "contradiction", default=()
+    )
 
     @property
     def named(self) -> tuple[AuditFinding, ...]:

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.result import About, about, part
 
 _CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
 
@@ -58,43 +59,34 @@ class Finding:
 
 
 class FaultNumber(NamedTuple):
-    """One number of a fault.
+    """One number of a fault."""
 
-    Attributes
-    ----------
-    low, high : float
-        Interval of 95 %, widened by what noise of the gyroscope can have pulled.
-    named : bool
-        Whether it is significant and of practical size.
-    """
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
-    named: bool
+    name: Annotated[str, About("name of the number")]
+    value: Annotated[float, About("estimate", unit="SI")]
+    unit: Annotated[str, About("unit of the number")]
+    low: Annotated[
+        float,
+        About(
+            "lower end of the 95 % interval, widened by what noise of the gyroscope can have pulled",
+            unit="SI",
+            gaps=True,
+        ),
+    ]
+    high: Annotated[float, About("upper end of it", unit="SI", gaps=True)]
+    named: Annotated[bool, About("1 where it is significant and of practical size")]
 
 
 @dataclass(frozen=True)
 class AuditFinding:
-    """A fault that was tested.
+    """A fault that was tested."""
 
-    Attributes
-    ----------
-    name : str
-        Of the effect.
-    p_value : float
-        Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
-    named : bool
-        Whether any coefficient is named.
-    """
-
-    name: str
-    coefficients: tuple[FaultNumber, ...]
-    p_value: float
-    named: bool
-    sentence: str
+    name: str = about("effect, see `cpfls effects`")
+    coefficients: tuple[FaultNumber, ...] = part()
+    p_value: float = about(
+        "probability that chance takes the most significant coefficient past half of the size that matters, after Holm"
+    )
+    named: bool = about("1 where any coefficient is")
+    sentence: str = about("what was found, in words")
 
     def named_values(self, names: Sequence[str]) -> Array:
         """Give the named values of coefficients, 0 for those that are not."""

@@ -9,6 +9,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
+from cpfls_cli.result import About, about
 from cpfls_cli.words import capitalised
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -23,25 +24,24 @@ _SCALED = 0.1
 class ChannelRepair:
     """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
 
-    Other fields are described at `AuditRepairGroup`.
-
     Attributes
     ----------
-    channel : str
-        Field of `Signals`, shape (time, 3); of ``rotor_speed`` the delay alone counts.
-    sentence : str
-        What is wrong, who says so, what is done and what to mend; empty for a channel that goes along with another.
     finding : Finding or None
-        The same where nothing is done about it.
+        The same as the sentence, where nothing is done about it.
     """
 
-    channel: str
-    dropped: bool = False
-    delay_s: float = 0.0
-    in_body: bool = False
-    matrix: Array = field(default_factory=lambda: np.eye(3))
-    gravity_m_s2: float = 0.0
-    sentence: str = ""
+    channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")
+    dropped: bool = about("1 where it is left out, and nothing else counts", default=False)
+    delay_s: float = about("delay of the channel", unit="s", default=0.0)
+    in_body: bool = about("1 where world axes were logged in body axes", default=False)
+    matrix: Array = field(
+        default_factory=lambda: np.eye(3),
+        metadata={"about": About("unit and axes, after the turn to world axes", ("axis", "axis"))},
+    )
+    gravity_m_s2: float = about("added along the vertical, last", unit="m/s^2", default=0.0)
+    sentence: str = about(
+        "what is wrong, what shows it, and what to correct; empty for a channel that goes with another", default=""
+    )
     finding: Finding | None = None
 
     def told(self, finding: Finding, done: str) -> Self:

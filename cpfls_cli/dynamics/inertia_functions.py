@@ -14,6 +14,7 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
+from cpfls_cli.result import about, part
 from cpfls_cli.rotations import wrapped
 
 CELLS = 72
@@ -59,29 +60,33 @@ def _cells(angle: Array) -> IntArray:
 _BATCH = 8192
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InertiaFunctions:
-    """A grey-box model of rotational dynamics.
+    """A grey-box model of rotational dynamics: inertia over attitude by fuzzy systems."""
 
-    Attributes
-    ----------
-    ranges : tuple of InputRange
-        Of roll and pitch over the training data.
-    partitions : tuple of array, shape (functions,)
-        Breakpoints.
-    coefficients : array, shape (parameters,), kg m^2
-    rigid_body : array, shape (6,), kg m^2
-        Ixx, Iyy, Izz, Ixy, Ixz, Iyz under the fuzzy part.
-    visited : array of bool, shape (cells, cells)
-        Cells of roll and pitch that the training data visited.
-    """
-
-    structure: ModelStructure
-    ranges: tuple[InputRange, InputRange]
-    partitions: tuple[Array, ...]
-    coefficients: Array
-    rigid_body: Array
-    visited: BoolArray
+    structure: ModelStructure = part()
+    ranges: tuple[InputRange, InputRange] = part()
+    """Of roll and pitch over the training data."""
+    partitions: tuple[Array, ...] = about(
+        "peaks of the membership functions on [0, 1], of each partition", "partition", brief=False
+    )
+    coefficients: Array = about(
+        "of the rule consequents, by inertia function, rule and feature",
+        "rule_coefficient",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    rigid_body: Array = about(
+        "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", unit="kg m^2", frame="body (FLU)"
+    )
+    visited: BoolArray = about(
+        "cells of roll and pitch that training visited",
+        "cell",
+        "cell",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
 
     def torque(self, motion: Motion) -> Array:
         """Predict the generalised torque, ``J qdd + C qd``.

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.errors import InputError, about, install_command
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
@@ -23,7 +22,7 @@ from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
 from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
-from cpfls_cli.export.source import c_source, python_source
+from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 
@@ -139,7 +138,6 @@ TARGETS = {
 FORMS: dict[str, Form] = {
     "json": Form("JSON", ".json", _whole, lambda sheet, _held, told, _file: json_text(sheet, told)),
     "c": Form("C", ".c", _whole, _c, also=".h"),
-    "python": Form("Python", ".py", _whole, lambda sheet, _held, told, file: python_source(sheet, file, told=told)),
     **TARGETS,
 }
 """All, by the word of ``--format``."""
@@ -206,12 +204,3 @@ def _probe_course(model: VehicleModel, held: Held, step_s: float) -> Course:
     horizon = len(flight) // len(flight.stretches) - 1
     finer = max(1, round(flight.motion.period / step_s))
     return Course(flight, flight.starts(horizon, 1), horizon, finer, gravity=held.body.gravity)
-
-
-def require_package(form: str) -> None:
-    """Refuse to fly with a package that is not installed."""
-    package = TARGETS[form].package
-    if package and find_spec(package) is None:
-        raise InputError(
-            f"--format {form}: flying the file needs the package {package}; {install_command('simulators')}"
-        )

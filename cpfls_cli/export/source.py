@@ -1,11 +1,11 @@
-"""A model as source code without dependencies: C99, and modules of Python for NumPy, CasADi and JAX."""
+"""A model as source code: C99 without dependencies, and modules of Python for CasADi and JAX."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -131,13 +131,11 @@ def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
     return _c_braces(part, indent)
 
 
-def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequence[str] = ()) -> str:
+def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], told: Sequence[str] = ()) -> str:
     """Write a model as a module of Python that computes with one library, with further paragraphs in its head."""
     weights, rules = sheet.weights, sheet.rules
-    points, runs, attitudes = sheet.references
     coefficients = np.zeros(0) if rules is None else rules.coefficients
     parameters = _parameters(sheet, weights.weight, delayed=library == "jax")
-    tests = library == "numpy"
     words = {
         **_common_words(sheet, told),
         "library": library,
@@ -152,10 +150,6 @@ def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequenc
         "parameter_rows": filled(", ".join(map(number, parameters)), 4),
         "peaks": airflow_of(sheet.model.remainder).breakpoints.tolist(),
         **({} if rules is None else _python_rules(rules)),
-        "visited_rows": [] if sheet.identified is None else visited_rows(sheet.identified),
-        "points": [_python_entries(point) for point in points_of(points)] if tests else [],
-        "attitude_points": [_python_entries(point) for point in attitudes_of(attitudes)] if tests else [],
-        "runs": [_python_entries(run_of(run)) for run in runs] if tests else [],
     }
     return fill_template("model.py.j2", words)
 
@@ -202,17 +196,6 @@ def visited_rows(model: InertiaFunctions) -> list[str]:
 
 def _whole(values: Array | IntArray) -> str:
     return filled(", ".join(map(str, values.tolist())), 4)
-
-
-def _python_entries(entries: dict[str, Any]) -> str:
-    lines = [filled(f'"{name}": {_plain(values)!r},', 8) for name, values in entries.items()]
-    return "\n".join(["    {", *lines, "    },"])
-
-
-def _plain(values: Any) -> Any:
-    if isinstance(values, list):
-        return [_plain(value) for value in values]
-    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 def fill_template(template: str, words: dict[str, Any]) -> str:

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gap_flights import FlightsGroup
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
 from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
@@ -36,7 +34,10 @@ from cpfls_cli.export.tracks import (
     View,
 )
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.playback.along_flights import Playback
+from cpfls_cli.response.flown import Responses
 from cpfls_cli.simulation.twin import FRAMES, UNITS
+from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
 
 _ASKED = "setpoint_"
@@ -45,21 +46,21 @@ _OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
 """Signals whose unit is that of the import."""
 
 
-def view_of(path: Path, record: Record) -> View:
-    """Gather what is to be drawn of an artifact.
+def view_of(path: Path, given: Any, config: str) -> View:
+    """Gather what is to be drawn of an artifact that was made with a config.
 
     Raises
     ------
     InputError
         If there is nothing.
     """
-    study = stored_study(record.origin.config, path)
+    study = stored_study(config, path)
     for kind, made in _KINDS.items():
-        if isinstance(record, kind):
-            return made(path.name, record, study)
-    *others, last = (kind.FORMAT.name for kind in _KINDS)
+        if isinstance(given, kind):
+            return made(path.name, given, study)
+    *others, last = map(format_of, _KINDS)
     raise InputError(
-        f"{path}: is a {record.FORMAT.name}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
+        f"{path}: is a {format_of(given)}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
         f"and {last}"
     )
 
@@ -164,66 +165,63 @@ def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
     return View(title, tracks, stamps=_stamps(study), on_log_clock=record.clock is not None)
 
 
-def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
-    begins = np.full(len(record.flown), np.nan) if record.flight.begins is None else record.flight.begins
-    several = len(record.flown) > 1
-    period = float(record.horizon_s[0])
+def _of_replay(title: str, given: Playback, study: Study) -> View:
+    begins = {flight.name: flight.begins_s for flight in given.flights}
+    several, period = len(given.flights) > 1, float(given.horizon_s[0])
 
-    def run(name: str, windows: IntArray, values: Mapping[str, Array | None], unit: str, about: str) -> Iterator[Track]:
+    def run(name: str, flight: str, starts: Array, runs: Mapping[str, Array], unit: str, about: str) -> Track:
         """Put runs one after another; the last sample of a run is the first one of the next."""
-        known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in values.items() if own is not None}
-        if len(known) < len(values):
-            return
+        known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in runs.items()}
         known[DIFFERENCE] = known[MEASURED] - known[MODEL]
-        flight = int(record.window.flight[windows[0]])
-        times = record.window.start[windows][:, None] + period * np.arange(len(record.horizon_s))
+        times = starts[:, None] + period * np.arange(len(given.horizon_s))
         order = np.argsort(times.ravel(), kind="stable")
-        time = _log_time(times.ravel()[order], float(begins[flight]))
-        yield Track(
+        return Track(
             name=name,
-            time=time,
+            time=_log_time(times.ravel()[order], begins[flight]),
             values={what: own[order] for what, own in known.items()},
             unit=unit,
             frame=BODY if unit == "rad/s" else WORLD,
             description=about,
-            flight=_short(record.flown[flight]) if several else "",
+            flight=_short(flight) if several else "",
             axes=AXES,
         )
 
-    drawn, worst = record.drawn, record.worst
-    told = "runs of the model one after another, each from a measured state"
-    tracks = list(run("body_rate", drawn.window, {MEASURED: drawn.measured, MODEL: drawn.model}, "rad/s", told))
-    positions = {MEASURED: drawn.measured_position, MODEL: drawn.model_position}
-    tracks += run("position", drawn.window, positions, "m", told)
-    for index in range(len(worst.window)):
-        own, rates = slice(index, index + 1), f"the run in which the model is off most, number {index + 1}"
-        pair = {MEASURED: worst.measured[own], MODEL: worst.model[own]}
-        tracks += run(f"worst_{index + 1}/body_rate", worst.window[own], pair, "rad/s", rates)
-    for flight, name in enumerate(record.flown):
-        at = np.flatnonzero(record.window.flight == flight)
+    drawn, about = given.drawn, "runs of the model one after another, each from a measured state"
+    rates = {MEASURED: drawn.measured, MODEL: drawn.model}
+    tracks = [run("body_rate", drawn.flight, drawn.start_s, rates, "rad/s", about)]
+    if drawn.measured_position is not None and drawn.model_position is not None:
+        positions = {MEASURED: drawn.measured_position, MODEL: drawn.model_position}
+        tracks.append(run("position", drawn.flight, drawn.start_s, positions, "m", about))
+    for number, worst in enumerate(given.worst, 1):
+        own = {MEASURED: worst.measured[None], MODEL: worst.model[None]}
+        about = f"the run in which the model is off most, number {number}"
+        start = np.array([worst.start_s])
+        tracks.append(run(f"worst_{number}/body_rate", worst.flight, start, own, "rad/s", about))
+    for index, flight in enumerate(given.flights):
+        at = np.flatnonzero(given.window_flight == index)
         tracks.append(
             Track(
                 name="error_from_here",
-                time=_log_time(record.window.start[at], float(begins[flight])),
-                values={each: record.window.error[row, at] for row, each in enumerate(record.prediction)},
+                time=_log_time(given.window_start[at], flight.begins_s),
+                values={name: given.errors_of(name)[at] for name in given.models},
                 unit="rad/s",
                 frame=BODY,
                 description="mean norm of the error of the body rate over the horizon of a run that begins here",
-                flight=_short(name) if several else "",
+                flight=_short(flight.name) if several else "",
             )
         )
     curves = [
         Curve(
             name=f"error_{signal}",
             over="horizon_s",
-            x=record.horizon_s,
-            values=dict(zip(record.prediction, errors.mae, strict=True)),
+            x=given.horizon_s,
+            values={name: given.of(name, signal).mae for name in given.models},
             description=f"mean error of {signal} by horizon, SI",
         )
-        for signal, errors in record.errors.items()
-        if errors is not None
+        for signal in given.signals
     ]
-    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=record.flight.begins is not None)
+    on_log_clock = bool(np.isfinite(list(begins.values())).any())
+    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=on_log_clock)
 
 
 def _short(name: str) -> str:
@@ -304,17 +302,17 @@ def _of_diagnosis(title: str, record: DiagnosisRecord, study: Study) -> View:
     return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
 
 
-def _of_response(title: str, record: ResponseRecord, study: Study) -> View:
+def _of_response(title: str, given: Responses, study: Study) -> View:
     del study
     curves = [
         Curve(
             name=name.replace(" ", "_"),
             over="frequency_hz",
-            x=record.frequency,
-            values={column: values[row] for column, values in record.columns.items()},
+            x=own.frequency,
+            values=own.columns,
             description=f"frequency response: {name}",
         )
-        for row, name in enumerate(record.name)
+        for name, own in given.responses.items()
     ]
     return View(title, (), curves)
 
@@ -358,12 +356,12 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
     return names
 
 
-_KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
+_KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
     PredictionRecord: _of_prediction,
-    ReplayRecord: _of_replay,
+    Playback: _of_replay,
     DisagreementRecord: _of_disagreement,
     DiagnosisRecord: _of_diagnosis,
-    ResponseRecord: _of_response,
+    Responses: _of_response,
     TwinRecord: _of_twin,
 }

@@ -7,7 +7,6 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
-from cpfls_cli.filters import butterworth
 
 _PADDED_PERIODS = 3
 
@@ -38,16 +37,12 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
         return values
     if cutoff_hz >= rate_hz / 2:
         raise SettingError("lowpass_hz", f"is not below half of the log's rate, {rate_hz / 2:.4g} Hz")
-    sections = butterworth(cutoff_hz / rate_hz, order)
-    padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))
+    from scipy.signal import butter, sosfiltfilt
+
     # Turned about its ends, so that level and slope go on while the filter settles.
-    before, after = 2 * values[0] - values[padding:0:-1], 2 * values[-1] - values[-2 : -padding - 2 : -1]
-    filtered = np.concatenate([before, values, after]).astype(float)
-    for _ in ("forward", "backward"):
-        for section in sections:
-            filtered = section.along(filtered)
-        filtered = filtered[::-1]
-    return filtered[padding : padding + len(values)]
+    padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))
+    sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    return np.asarray(sosfiltfilt(sections, values.astype(float), axis=0, padlen=padding))
 
 
 def derivative(time: Array, values: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,7 @@ from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
+from cpfls_cli.words import joined
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
@@ -186,7 +187,11 @@ def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -
     return Played(along, player, player_of(VehicleModel(vehicle=stated), as_logged))
 
 
-def repairs_of(model: VehicleModel) -> tuple[str, ...]:
-    """Say which faults of sensors a model takes out of a flight first."""
+def model_notes(name: str, model: VehicleModel, flights: Sequence[LoggedFlight]) -> Iterator[str]:
+    """Say what a model of this name does to flights, and what it lacks in them."""
     audit = model.repairs
-    return () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named))
+    for repair in () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named)):
+        yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
+    still = [flight.name for flight in flights if model.table.feels_air and not flight.playback.translates]
+    if still:
+        yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"

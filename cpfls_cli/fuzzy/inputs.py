@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
 
 InputMap = Literal["full-circle", "data-range"]
@@ -15,16 +16,10 @@ InputMap = Literal["full-circle", "data-range"]
 
 @dataclass(frozen=True)
 class InputRange:
-    """Smallest and largest value of one mapped angle over the training data.
+    """Smallest and largest value of one mapped angle over the training data."""
 
-    Attributes
-    ----------
-    minimum, maximum : float
-        Of the seesaw (circular systems) or of the wrapped angle in rad (classic systems).
-    """
-
-    minimum: float
-    maximum: float
+    minimum: float = about("of the seesaw (circular systems) or of the wrapped angle in rad (classic systems)")
+    maximum: float = about("the same, the largest")
 
     @property
     def width(self) -> float:

@@ -17,10 +17,11 @@ from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
+from cpfls_cli.playback.errors import MODEL, STATED
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
-from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, fading, replay
+from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 

@@ -11,15 +11,15 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.regressor import kernels
-from cpfls_cli.regressor.kernels import Chunk, Table
+from cpfls_cli.regressor.kernels import Chunk, Runs, Table, motion_lines
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 
-# Samples that are kept ready for the compiled loops, 96 to 240 bytes each; more are made ready each time anew.
+# Samples that are kept ready for the compiled loops, 136 bytes each to 424; more are made ready each time anew.
 _KEPT = 200_000
 
 
@@ -76,7 +76,7 @@ class MovedProducts:
 
 @dataclass(frozen=True)
 class Ready:
-    """Samples in the layout of the compiled loops, chunk by chunk.
+    """Samples in the layout of the compiled loops, chunk by chunk: attitude, and `kernels.motion_lines`.
 
     Attributes
     ----------
@@ -91,17 +91,19 @@ class Ready:
         """Pickle the source alone; workers convert it themselves."""
         return type(self), (self.source, self.rigid)
 
-    def __iter__(self) -> Iterator[Chunk]:
+    def __iter__(self) -> Iterator[tuple[Array, Array]]:
         """Convert one chunk after the other, or take those that are kept."""
         return iter(self._kept) if len(self.source) <= _KEPT else self._made()
 
     @cached_property
-    def _kept(self) -> list[Chunk]:
+    def _kept(self) -> list[tuple[Array, Array]]:
         return list(self._made())
 
-    def _made(self) -> Iterator[Chunk]:
+    def _made(self) -> Iterator[tuple[Array, Array]]:
         for data in self.source.chunks():
-            yield _chunk(data, self.rigid)
+            motion, columns = data.motion, [data.torque[:, :, None]]
+            dense = np.concatenate(columns + [rigid_columns(motion)] * self.rigid, axis=2)
+            yield motion.attitude, motion_lines(motion.rate, motion.acceleration, dense)
 
 
 @dataclass(frozen=True)
@@ -143,8 +145,8 @@ class Samples:
         P, dense = self.table.parameters, self._dense_products
         gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
         breakpoints = padded_breakpoints(partitions)
-        for chunk, label in self._chunks():
-            kernels.add_gram(self.table, breakpoints, chunk, self.scale, label, gram, moment)
+        for chunk, runs, label in self._runs(breakpoints):
+            kernels.add_gram(self.table, breakpoints, chunk, runs, self.scale, label, gram, moment)
         gram = gram + gram.swapaxes(1, 2)
         gram[:, np.arange(P), np.arange(P)] *= 0.5
         rigid = moment[:, :, 1:]
@@ -168,9 +170,9 @@ class Samples:
         """
         square, largest = np.zeros((self.labels, 1)), np.zeros((self.labels, 1))
         breakpoints, weights = padded_breakpoints(partitions), self._weights(rigid_body)
-        for chunk, label in self._chunks():
+        for chunk, runs, label in self._runs(breakpoints):
             kernels.add_errors(
-                self.table, breakpoints, chunk, self.scale, label, coefficients[None], weights, square, largest
+                self.table, breakpoints, chunk, runs, self.scale, label, coefficients[None], weights, square, largest
             )
         return square[:, 0], largest[:, 0]
 
@@ -197,9 +199,9 @@ class Samples:
         square, columns = np.zeros((len(models), len(models))), 1 + rigid
         back, dense_back = np.zeros((self.table.parameters, 1)), np.zeros((columns, 1))
         breakpoints, coefficients = padded_breakpoints(partitions), np.ascontiguousarray(models[:, rigid:])
-        for chunk, _ in self._chunks():
+        for chunk, runs, _ in self._runs(breakpoints):
             kernels.add_combined(
-                self.table, breakpoints, chunk, self.scale, coefficients, weights, square, back, dense_back
+                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, square, back, dense_back
             )
         return _mirrored(square)[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
 
@@ -216,8 +218,10 @@ class Samples:
         cross, square = np.zeros((self.table.parameters, B + 1)), np.zeros((B + 1, B + 1))
         dense = np.zeros((len(weights), B + 1))
         breakpoints = padded_breakpoints(partitions)
-        for chunk, _ in self._chunks():
-            kernels.add_moved(self.table, breakpoints, chunk, self.scale, coefficients, weights, cross, dense, square)
+        for chunk, runs, _ in self._runs(breakpoints):
+            kernels.add_moved(
+                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, cross, dense, square
+            )
         square = _mirrored(square)
         return MovedProducts(
             np.vstack([dense[1:, :B], cross[:, :B]]), square[:B, :B], square[:B, B], float(square[B, B])
@@ -229,10 +233,10 @@ class Samples:
         columns = 1 + (RIGID if self.ready.rigid else 0)
         total = np.zeros((self.labels, columns, columns))
         for chunk, label in self._chunks():
-            dense = chunk.dense * self.scale[:, None]
+            dense = chunk.motion[kernels.MOTION :].reshape(columns, 3, -1) * self.scale[:, None]
             for value in np.unique(label):
-                rows = dense[label == value].reshape(-1, columns)
-                total[value] += rows.T @ rows
+                rows = dense[:, :, label == value].reshape(columns, -1)
+                total[value] += rows @ rows.T
         return total
 
     @cached_property
@@ -240,14 +244,30 @@ class Samples:
         return list(self._mapped())
 
     def _mapped(self) -> Iterator[Chunk]:
-        for chunk in self.ready:
-            yield chunk._replace(inputs=mapped_inputs(self.table, chunk.attitude))
+        for attitude, motion in self.ready:
+            yield Chunk(motion, mapped_inputs(self.table, attitude))
 
     def _chunks(self) -> Iterator[tuple[Chunk, IntArray]]:
         start = 0
         for chunk in self._kept if len(self.ready.source) <= _KEPT else self._mapped():
-            yield chunk, self.label[start : start + len(chunk.attitude)]
-            start += len(chunk.attitude)
+            stop = start + chunk.motion.shape[1]
+            yield chunk, self.label[start:stop]
+            start = stop
+
+    def _runs(self, breakpoints: Array) -> Iterator[tuple[Chunk, Runs, IntArray]]:
+        """Chunks with their samples in the order of what they fire, kept until other partitions are asked for."""
+        kept = self._ordered.get(breakpoints.tobytes(), [])
+        for number, (chunk, label) in enumerate(self._chunks()):
+            if number == len(kept):
+                kept.append(kernels.runs_of(self.table, breakpoints, chunk.inputs))
+            yield chunk, kept[number], label
+        self._ordered.clear()
+        if len(self.ready.source) <= _KEPT:
+            self._ordered[breakpoints.tobytes()] = kept
+
+    @cached_property
+    def _ordered(self) -> dict[bytes, list[Runs]]:
+        return {}
 
     def _weights(self, rigid_body: Array) -> Array:
         return np.concatenate([[1.0], -rigid_body])[None] if self.ready.rigid else np.ones((1, 1))
@@ -258,11 +278,3 @@ def _mirrored(triangle: Array) -> Array:
     total = triangle + triangle.T
     total[np.diag_indices(len(total))] *= 0.5
     return total
-
-
-def _chunk(data: TorqueData, rigid: bool) -> Chunk:
-    columns = [data.torque[:, :, None], rigid_columns(data.motion)] if rigid else [data.torque[:, :, None]]
-    motion = data.motion
-    attitude, rate, acceleration = map(np.ascontiguousarray, (motion.attitude, motion.rate, motion.acceleration))
-    dense = np.ascontiguousarray(np.concatenate(columns, axis=2))
-    return Chunk(attitude, rate, acceleration, dense, np.empty((8, 0)))

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from cpfls_cli.artifacts.spec import DatasetSpec, Record
+    from cpfls_cli.artifacts.spec import DatasetSpec, Header
+    from cpfls_cli.report.source import Source
+    from cpfls_cli.store import Origin
 
 
 def read(path: str | os.PathLike[str]) -> Artifact:
@@ -34,10 +36,28 @@ def read(path: str | os.PathLike[str]) -> Artifact:
     InputError
         If it is no good artifact; the message says why.
     """
+    file = Path(path)
+    made = _read(file)
+    made._path = file
+    return made
+
+
+def _read(file: Path) -> Artifact:
+    """Read an artifact that is in memory alone."""
+    from cpfls_cli import store
     from cpfls_cli.artifacts.store import read_any
 
-    file = Path(path)
-    return Artifact(read_any(file), file)
+    if not (name := store.stage_of(file)):
+        return _of_record(read_any(file))
+    result, origin = store.read(file, import_module("cpfls_cli.stage").loaded(name).kind)
+    held = store.flat(file)
+    specs = {path: spec for path, (spec, _) in held.items()}
+    return Artifact(result, origin, {path: values for path, (_, values) in held.items()}, specs)
+
+
+def _of_record(record: Any) -> Artifact:
+    specs = {spec.path: spec for spec in record.spec().datasets}
+    return Artifact(record, record.origin, record.data, specs)
 
 
 class Artifact(Mapping[str, Any]):
@@ -47,10 +67,11 @@ class Artifact(Mapping[str, Any]):
     does.
     """
 
-    def __init__(self, record: Record, path: Path | None = None) -> None:
-        self._record = record
-        self._path = path
-        self._data = record.data
+    def __init__(
+        self, record: Any, origin: Header | Origin, data: Mapping[str, Any], specs: Mapping[str, DatasetSpec]
+    ) -> None:
+        self._record, self._origin, self._data, self._specs = record, origin, data, specs
+        self._path: Path | None = None
 
     def __getitem__(self, name: str) -> Any:
         value = self._data[name]
@@ -68,9 +89,17 @@ class Artifact(Mapping[str, Any]):
     def __str__(self) -> str:
         from cpfls_cli.artifacts.store import Outline, artifact_of
         from cpfls_cli.commands.show import description
+        from cpfls_cli.report.content import Table
         from cpfls_cli.report.terminal import terminal_lines
 
-        return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record))), whole=True))
+        if not self._of_result:
+            return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record))), whole=True))
+        rows = [
+            (name, "x".join(map(str, own.shape)) or "scalar", self.about(name).units, self.about(name).description)
+            for name, own in self._data.items()
+        ]
+        header = ("Dataset", "Shape", "Unit", "What it holds")
+        return "\n".join(terminal_lines([Table("datasets", self.format, header, rows, frozenset(range(4)))]))
 
     @property
     def path(self) -> Path:
@@ -88,13 +117,18 @@ class Artifact(Mapping[str, Any]):
     @property
     def format(self) -> str:
         """Its format, such as ``cpfls/flight``."""
-        return self._record.FORMAT.name
+        from cpfls_cli.store import format_of
+
+        return format_of(self._record)
 
     @property
     def summary(self) -> dict[str, Any]:
         """What its command prints with ``--json``, as far as the artifact holds it."""
         from cpfls_cli.report.outcome import as_json
+        from cpfls_cli.result import plain
 
+        if self._of_result:
+            return dict(plain(self._record))
         summary: dict[str, Any] = as_json(getattr(self._record, "summary", {}))
         return summary
 
@@ -103,15 +137,13 @@ class Artifact(Mapping[str, Any]):
         """The resolved config that it was made with, by section and key."""
         from cpfls_cli.config.load import parse_config
 
-        return parse_config(self._record.origin.config, f"{self._path or self.format}: /config")
+        return parse_config(self._origin.config, f"{self._path or self.format}: /config")
 
     def about(self, name: str) -> DatasetSpec:
         """Tell what a dataset holds: ``units``, ``dimensions``, ``frame``, ``description``."""
         if name not in self:
             raise KeyError(name)
-        spec = self._record.spec().dataset(name)
-        assert spec is not None, "a record holds datasets of its format"
-        return spec
+        return self._specs[name]
 
     def to_xarray(self) -> xr.Dataset:
         """Give all datasets with named dimensions; units, frame and description stand in their ``attrs``.
@@ -125,8 +157,7 @@ class Artifact(Mapping[str, Any]):
             If xarray is not installed; the message says how to install it.
         """
         variables = {name: (self._dimensions(name), self[name], self._attributes(name)) for name in self}
-        header = self._record.origin
-        attributes = {"format": self.format, "cpfls_version": header.version, "seed": header.seed}
+        attributes = {"format": self.format, "cpfls_version": self._origin.version, "seed": self._origin.seed}
         made: xr.Dataset = _optional("xarray").Dataset(variables, attrs=attributes)
         return made
 
@@ -162,27 +193,22 @@ class Artifact(Mapping[str, Any]):
         frame.attrs["units"] = units
         return frame if index is not None else frame.rename_axis(wanted)
 
-    def figures(self, *beside: Artifact) -> Figures:
+    def figures(self, *others: Artifact) -> Figures:
         """Give the figures that ``cpfls report`` shows of it, as figures of matplotlib, by name.
 
         Parameters
         ----------
-        *beside : Artifact
+        *others : Artifact
             Given to the report as well: a flight beside its model, models that are compared.
         """
-        from cpfls_cli.commands.report import source_of_record
         from cpfls_cli.config.study import ReportSettings
         from cpfls_cli.pages.page import sections_of
         from cpfls_cli.pages.source import Sources
-        from cpfls_cli.report.content import Plot
+        from cpfls_cli.report.content import Plot, unfolded
 
-        given = {f"{index}": artifact for index, artifact in enumerate((self, *beside))}
-        sources = [
-            source_of_record(one._record, one._path or one.format, one._label(number), number)
-            for number, one in given.items()
-        ]
+        sources = [one._source(str(index)) for index, one in enumerate((self, *others))]
         sections = sections_of(Sources(sources, sources[0].vehicle, ReportSettings()))
-        blocks = (block for section in sections for block in section.blocks)
+        blocks = (block for section in sections for block in unfolded(section.blocks))
         return Figures({block.name: block.picture.figure for block in blocks if isinstance(block, Plot)})
 
     def write(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
@@ -198,13 +224,31 @@ class Artifact(Mapping[str, Any]):
         InputError
             If the file exists, or its folder cannot be written.
         """
+        from cpfls_cli import store
         from cpfls_cli.artifacts.output import check_output
         from cpfls_cli.artifacts.store import write_record
 
         file = Path(path)
         check_output(file, force)
-        write_record(file, self._record)
+        if self._of_result:
+            store.write(file, self._record, self._origin)  # type: ignore[arg-type]  # of a result it is one
+        else:
+            write_record(file, self._record)
         self._path = file
+
+    @property
+    def _of_result(self) -> bool:
+        """Whether it is a result, whose stage knows its page."""
+        return bool(getattr(self._origin, "stage", ""))
+
+    def _source(self, number: str) -> Source:
+        from cpfls_cli.commands.report import source_of_record
+        from cpfls_cli.report.source import source_of_result
+
+        where, label = self._path or self.format, self._label(number)
+        if self._of_result:
+            return source_of_result(self._record, self._origin, where, label, number)  # type: ignore[arg-type]
+        return source_of_record(self._record, where, label, number)
 
     def _label(self, number: str) -> str:
         return self._path.name if self._path else f"{self.format} {number}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cpfls_cli.errors import CpflsError, InputError
-from cpfls_cli.library.artifact import Artifact, read
+from cpfls_cli.library.artifact import Artifact, _read, read
 
 if TYPE_CHECKING:
     import os
@@ -63,12 +63,13 @@ def load_model(path: str | os.PathLike[str], config: str | os.PathLike[str] | No
     InputError
         If the file is no good model; the message says why.
     """
-    from cpfls_cli.artifacts.model import ModelRecord
+    from cpfls_cli.artifacts.model import AnyModel
     from cpfls_cli.config.load import load_study, validate
+    from cpfls_cli.flights.models import MAKERS
 
     artifact = read(path)
-    if artifact.format != ModelRecord.FORMAT.name:
-        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {ModelRecord.spec().makers}")
+    if not isinstance(artifact._record, AnyModel):
+        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {MAKERS}")
     study = validate(artifact.config, f"{path}: /config") if config is None else load_study(Path(config))
     return Model(artifact.path, study, artifact)
 
@@ -81,8 +82,8 @@ def stated_vehicle(config: str | os.PathLike[str]) -> Model:
     ConfigError
         If the config is not good; the message names every wrong key.
     """
-    from cpfls_cli.artifacts.replay import VEHICLE
     from cpfls_cli.config.load import load_study
+    from cpfls_cli.playback.settings import VEHICLE
 
     return Model(Path(VEHICLE), load_study(Path(config)), None)
 
@@ -90,7 +91,7 @@ def stated_vehicle(config: str | os.PathLike[str]) -> Model:
 class Model:
     """A model of a multirotor.
 
-    Besides the methods listed, ``to_c(path)``, ``to_python(path)`` and so on export it, one for each of `formats`.
+    Besides the methods listed, ``to_c(path)``, ``to_jax(path)`` and so on export it, one for each of `formats`.
 
     Attributes
     ----------
@@ -159,13 +160,13 @@ class Model:
         Artifact
             Of the format ``cpfls/replay``, in memory.
         """
-        from cpfls_cli.commands import replay
-        from cpfls_cli.playback.replay import ReplayOptions
-
         if not flights:
             raise InputError("replay needs at least one flight")
-        paths, options = [_path_of(flight) for flight in flights], ReplayOptions(horizon_s, every, hold, history_s)
-        return self._made(lambda job: replay.run(job, self._path, paths, options))
+        from cpfls_cli.arguments import Between
+
+        given = {"flights": [_path_of(flight) for flight in flights], "horizon": horizon_s, "every": every}
+        between = None if hold is None else Between(hold)
+        return self._of_stage("replay", model=self._path, hold=between, history=history_s, **given)
 
     def state(
         self,
@@ -300,13 +301,13 @@ class Model:
     @cached_property
     def _whole(self) -> VehicleModel:
         """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
-        from cpfls_cli.flights.models import rebuilt
+        from cpfls_cli.flights.models import modelled
         from cpfls_cli.playback.model import VehicleModel
 
         if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
-        model = rebuilt(self._path, record)
+        model = modelled(self._path, record)
         if model.beside_table:
             parts = ", ".join(model.beside_table)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")
@@ -325,13 +326,24 @@ class Model:
         """Run a command, and keep in memory what it writes."""
         from tempfile import TemporaryDirectory
 
-        from cpfls_cli.artifacts.store import read_any
         from cpfls_cli.report.outcome import cautioned
 
         with TemporaryDirectory(prefix="cpfls-") as folder:
             job = self._job(Path(folder, "artifact.h5"), force=False)
             _warn(cautioned(command(job), job), 4)
-            return Artifact(read_any(job.output))
+            return _read(job.output)
+
+    def _of_stage(self, name: str, **given: Any) -> Artifact:
+        """Run a stage, and keep in memory what it writes."""
+        from tempfile import TemporaryDirectory
+
+        from cpfls_cli.stage import Run, loaded
+
+        with TemporaryDirectory(prefix="cpfls-") as folder:
+            output = Path(folder, "artifact.h5")
+            run = Run(self._study, output, False, dry_run=False, progress=lambda *_: None, reads=lambda _: None)
+            _warn(loaded(name).run(run, **given), 4)
+            return _read(output)
 
     def _job(self, output: Path, force: bool) -> Job:
         from cpfls_cli.artifacts.job import Job

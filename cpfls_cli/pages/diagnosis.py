@@ -39,8 +39,8 @@ from cpfls_cli.pages.gap import (
     marked,
 )
 from cpfls_cli.pages.model import trust_box
+from cpfls_cli.pages.playback import against_rivals, playback_figure
 from cpfls_cli.pages.repeats import again_blocks
-from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plain_ticks, plot, stacked
@@ -131,8 +131,8 @@ def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     if record.gap.known:
         yield gap_sizes_figure(f"gap-sizes-{index}", record.gap)
     if record.playback is not None:
-        yield from (Text(each) for each in beside_rivals(record.playback))
-        drawn = playback_figure(f"prediction-error-{index}", record.playback)
+        yield from (Text(each) for each in against_rivals(record.playback.by_horizon))
+        drawn = playback_figure(f"prediction-error-{index}", record.playback.by_horizon, "the model with the effects")
         yield from [drawn] if drawn else []
     if record.whiteness is not None and len(record.whiteness.lag) > 1:
         yield whiteness_figure(f"whiteness-{index}", record)

@@ -12,8 +12,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_name, channel_unit, channel_words
+from cpfls_cli.pages.playback import against_rivals, playback_figure
 from cpfls_cli.pages.repeats import NOT_SPLIT, again_blocks, again_box
-from cpfls_cli.pages.replay import playback_figure, playback_text
 from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import in_columns, line, plain_ticks, plot, stacked
@@ -61,7 +61,7 @@ def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     yield from settled_channels(record.audit)
     yield _axes_table(record, 1)
     yield Folded("when the gap is largest, and what it follows", list(_when(record, 1)))
-    played = [*_not_split(record), *playback_text(record.playback)]
+    played = [*_not_split(record), *_played(record)]
     yield from [Folded("what comes again, and playback", played)] if played else []
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
@@ -137,11 +137,17 @@ def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) ->
             yield heat_map_figure(f"heat-map-{index}", record.heat_map)
     else:
         yield Text("No channel has a gap above noise, so there is nothing to follow.")
-    drawn = None if record.playback is None else playback_figure(f"replay-{index}", record.playback)
+    drawn = (
+        None if record.playback is None else playback_figure(f"replay-{index}", record.playback.by_horizon, "the model")
+    )
     if drawn is not None:
         yield Heading("Measured and simulated")
-        yield from playback_text(record.playback)
+        yield from _played(record)
         yield drawn
+
+
+def _played(record: DisagreementRecord) -> Iterator[Text]:
+    yield from map(Text, against_rivals(record.playback and record.playback.by_horizon))
 
 
 def _axes_table(record: DisagreementRecord, index: int) -> Table:

@@ -137,7 +137,7 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
 
 def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup) -> Plot:
     """Draw the cross-validated error (method.md section 8) over the ridge weight; the last point has no fuzzy part."""
-    weight, error, taken = ridge.weight, ridge.error, model.record.model.ridge_weight
+    weight, error, taken = ridge.weight, ridge.error, model.record.chosen.ridge_weight
     finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
     chosen = len(weight) - 1 if np.isinf(taken) else int(np.argmin(np.abs(finite - taken)))
     # The point without a fuzzy part stands a decade beyond the largest weight.

@@ -1,38 +1,26 @@
-"""What `cpfls export`, `verify-export` and `spread` say: files, what speaks against a model, how far off it flies."""
+"""What `cpfls export` and `spread` say: files, and what speaks against a model."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.parameters import name_of
 from cpfls_cli.config.load import stored_study
-from cpfls_cli.export.holding import Missing
-from cpfls_cli.export.registry import TARGETS
 from cpfls_cli.export.samples import Samples
-from cpfls_cli.export.verify import AGREES, Verification
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
-from cpfls_cli.report.content import Block, Box, Folded, Table, Text
+from cpfls_cli.report.content import Block, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.outcome import caution_texts
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
-_SIGNALS = (
-    ("position", "m", 1.0),
-    ("velocity", "m/s", 1.0),
-    ("attitude", "°", 180 / np.pi),
-    ("body rate", "rad/s", 1.0),
-)
 
 
 def export_answer(
@@ -86,74 +74,6 @@ def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
     elif model.verdict.label == "do-not-use":
         against = [reason for reason, speaks in model.verdict.reasons if speaks < 0]
         yield ": ".join([f"{path}: its verdict is do-not-use, exported all the same", *against[:1]])
-
-
-def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, found: Verification) -> Iterator[Block]:
-    """Say whether the flown export beats a state that stays, how far it is from its model, and what it lacks."""
-    title, step = TARGETS[form].title, TARGETS[form]
-    runs = f"{found.windows} runs of {found.horizon_s:.3g} s along {flight.name}"
-    flies = "flies what was exported" if found.agrees else "DOES NOT FLY what was exported"
-    moving = [name for (name, *_), still in zip(_SIGNALS, found.still, strict=True) if still]
-    lost = [name for name, beats in zip(moving, found.beats, strict=True) if not beats]
-    beside = f"loses to “nothing moves” in {joined(lost)}" if lost else f"beats “nothing moves” in {joined(moving)}"
-    good = found.agrees and not lost
-    yield Box(
-        "BETTER THAN NOTHING MOVES" if not lost else "NO BETTER THAN NOTHING MOVES",
-        f"{title} {flies}, and {beside}: {runs}, from measured states along {flight.actuation}.",
-        [
-            f"Its equations are those that were exported within {found.equations.max():.2g} SI"
-            f"{', steps of no length' if step.levels else ''} (bound {AGREES:g})."
-        ],
-        "good" if good else "warning",
-    )
-    scale = np.array([factor for _, _, factor in _SIGNALS])
-
-    def table(name: str, caption: str, rows: Sequence[tuple[str, Array]]) -> Table:
-        header = ("", *(f"{signal}, {unit}" for signal, unit, _ in _SIGNALS))
-        shown = [[row, *(number(value, 3) for value in values * scale)] for row, values in rows]
-        return Table(name, caption, header, shown)
-
-    measured = (
-        (title, found.errors[1]),
-        ("playback of the model", found.errors[0]),
-        ("nothing moves", found.still),
-    )
-    yield table("verification", "Mean error at the end of a run.", measured)
-    apart = (
-        ("in all, mean", found.errors[2]),
-        ("not held by the target, largest", found.missing),
-        ("step of the target, largest", found.step),
-        ("equations, largest", found.equations),
-    )
-    between = table("verification-apart", f"Between {title} and playback at the end of a run.", apart)
-    yield Folded(f"What {title} does not hold, and how large that is", [between, *map(Text, told)])
-    yield from (Text(warning, "warning") for warning in flight.warnings)
-
-
-def verification_summary(form: str, missing: Sequence[Missing], found: Verification) -> dict[str, Any]:
-    """Say the same for machines, SI."""
-    names = [name.replace(" ", "_") for name, _, _ in _SIGNALS]
-
-    def by_signal(values: Any) -> dict[str, float]:
-        return dict(zip(names, values.tolist(), strict=True))
-
-    return {
-        "format": form,
-        "agrees": found.agrees,
-        "beats_nothing_moves": not found.beats or all(found.beats),
-        "windows": found.windows,
-        "horizon_s": found.horizon_s,
-        "playback_error": by_signal(found.errors[0]),
-        "target_error": by_signal(found.errors[1]),
-        "nothing_moves_error": by_signal(found.still),
-        "difference": by_signal(found.errors[2]),
-        "largest": {
-            "not_held": by_signal(found.missing),
-            "step": by_signal(found.step),
-            "equations": by_signal(found.equations),
-        },
-        "missing": [asdict(each) for each in missing],
-    }
 
 
 _SHOWN = 8

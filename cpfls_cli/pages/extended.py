@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, intervals_figure, named_sentences, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
-from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
+from cpfls_cli.pages.playback import against_rivals, playback_figure, trust_sentences
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.content import Block, Facts, Folded, Heading, Table, Text
@@ -20,7 +20,7 @@ from cpfls_cli.words import joined
 
 def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what the gap of an extended model becomes, and about which axes it gets worse."""
-    rest: list[Block] = [_gap_table(extended, 1), *playback_text(extended.record.playback)]
+    rest: list[Block] = [_gap_table(extended, 1), *_played(extended.record)]
     yield Folded("the gap and the playback before and after", rest)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
@@ -32,9 +32,18 @@ def title(record: ExtendedRecord) -> str:
 
 def grounds(record: ExtendedRecord) -> Iterator[str]:
     """Say how far to trust an extended model, what it was extended by, and how its largest gap changes."""
-    yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+    yield from _trusted(record)
     yield from named_sentences(record.effects.named)
     yield _shrunk(record)
+
+
+def _trusted(record: ExtendedRecord) -> list[str]:
+    held = record.playback and record.playback.by_horizon
+    return trust_sentences(record.trust, held, None, record.audit.contradiction)
+
+
+def _played(record: ExtendedRecord) -> Iterator[Text]:
+    yield from map(Text, against_rivals(record.playback and record.playback.by_horizon))
 
 
 def _shrunk(record: ExtendedRecord) -> str:
@@ -45,7 +54,7 @@ def _shrunk(record: ExtendedRecord) -> str:
 def worth(record: ExtendedRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
     if trust_words(record.trust).tone != "warning":
-        yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
+        yield _trusted(record)[0]
     yield _shrunk(record)
     yield from (
         f"Not in the model, to be repaired in the signals that it is given: {fault}"
@@ -56,7 +65,7 @@ def worth(record: ExtendedRecord) -> Iterator[str]:
 def cautions(record: ExtendedRecord) -> Iterator[str]:
     """Say what speaks against an extended model, wherever it is taken."""
     if trust_words(record.trust).tone == "warning":
-        yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+        yield from _trusted(record)
     yield from map(sentence, warnings(record))
 
 
@@ -120,9 +129,12 @@ def _gap_table(extended: Source[ExtendedRecord], index: int) -> Table:
 def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
     if record.gap.known:
         yield gap_sizes_figure(f"extended-gap-sizes-{index}", record.gap)
-    yield from playback_text(record.playback)
+    yield from _played(record)
     drawn = (
-        record.playback and playback_figure(f"extended-prediction-error-{index}", record.playback),
+        record.playback
+        and playback_figure(
+            f"extended-prediction-error-{index}", record.playback.by_horizon, "the model with the effects"
+        ),
         intervals_figure(f"extended-intervals-{index}", record.effects),
     )
     yield from (plot for plot in drawn if plot)

@@ -25,8 +25,8 @@ from cpfls_cli.pages.effects import (
     wrong_numbers,
 )
 from cpfls_cli.pages.gap import channel_name, channel_unit, channel_words
+from cpfls_cli.pages.playback import SIGNALS, WHO
 from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, again_box
-from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
@@ -350,16 +350,16 @@ def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:
 
 def _playback_rows(playback: PlaybackChangeGroup) -> Iterator[list[str | Cell]]:
     for signal, end in playback.at_end.items():
-        words, unit, scale = signal_scale(signal)
+        words, unit, scale = SIGNALS[signal]
         values = [number(scale * value, _PRINTED) for value in (end.before, end.after, end.without_model)]
-        than = f"{'worse' if end.worse else 'better'} than “{prediction_words(end.rival)}”"
+        than = f"{'worse' if end.worse else 'better'} than “{WHO[end.rival]}”"
         yield [f"playback, {words}", unit, *values, Cell(than, "warning" if end.worse else "plain")]
 
 
 def _farther_off(playback: PlaybackChangeGroup) -> list[str]:
     """List the signals that the model with the effects plays back visibly worse than the model as given."""
     return [
-        signal_scale(signal)[0]
+        SIGNALS[signal][0]
         for signal, end in playback.at_end.items()
         if less(end.before + _VISIBLE * end.without_model, end.after)
     ]
@@ -369,7 +369,7 @@ def _playback_words(playback: PlaybackChangeGroup) -> str:
     """Say what the playback is, and what of the motion it cannot judge."""
     if not playback.at_end:
         return "The flights show no motion that could be played back."
-    lacks = [signal_scale(name)[0] for name, found in playback.errors.items() if found is None]
+    lacks = [words for name, (words, _, _) in SIGNALS.items() if name not in playback.by_horizon.signals]
     more = f"; {joined(lacks)} cannot be played back, for lack of signals" if lacks else ""
     return f"Playback: mean error after {plain(round(float(playback.horizon_s[-1]), 3))} s{more}."
 

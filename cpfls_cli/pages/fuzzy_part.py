@@ -46,7 +46,7 @@ def _breakpoints(model: InertiaFunctionsGroup) -> dict[str, Array]:
 
 
 def _tables(record: IdentifiedRecord, index: int) -> Iterator[Table]:
-    weights = [count(weight) for weight in record.model.weights]
+    weights = [count(weight) for weight in record.chosen.weights]
     rows = []
     for name, peaks in _breakpoints(record.functions).items():
         genes, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]

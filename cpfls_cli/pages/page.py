@@ -8,7 +8,6 @@ from operator import attrgetter
 from typing import Any
 
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
@@ -20,19 +19,16 @@ from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks
+from cpfls_cli.pages.model import model_blocks, recorded_models
 from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
-from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.response import response_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
-from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
@@ -82,11 +78,11 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    _of_each("model", "What the model is", lambda given: given.of_kind(ModelRecord), model_blocks, among=True),
+    _of_each("model", "What the model is", recorded_models, model_blocks, among=True),
     _of_each("diagnosis", "Before and after", attrgetter("diagnoses"), diagnosis_blocks),
     _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
-    _of_each("found-vehicle", "The vehicle found in flights", attrgetter("vehicles"), found_vehicle_blocks),
+    _of_stage("vehicle"),
     _of_each("disagreement", "Where they disagree", attrgetter("disagreements"), disagreement_blocks),
     sensors_section,
     unseen_section,
@@ -110,9 +106,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
     _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
-    _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
+    _of_stage("response"),
     _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
-    _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
+    _of_stage("replay"),
     _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
     _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
     _of_each(

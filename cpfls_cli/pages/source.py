@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
-    from cpfls_cli.artifacts.replay import ReplayRecord
-    from cpfls_cli.artifacts.response import ResponseRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.identification.replicates import Sweep
+    from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
+    from cpfls_cli.response.flown import Responses
 
 R = TypeVar("R", default=Any)
 
@@ -67,13 +67,13 @@ class Sources:
     models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
     sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
-    replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
-    responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
+    replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
+    responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
     twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
     gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
-    vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
     trends: ClassVar[_OfFormat[TrendRecord]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")

@@ -11,10 +11,8 @@ from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
-from cpfls_cli.pages.model import cautions_of, trust_box
+from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.provenance import missing
-from cpfls_cli.pages.replay import told_at, verdict_box
-from cpfls_cli.pages.response import response_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trend import trend_box
 from cpfls_cli.pages.trust import learned_words
@@ -30,9 +28,6 @@ def summary_section(sources: Sources) -> Section:
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
-    blocks += [response_box(response.record) for response in sources.responses]
     blocks += [twin_box(twin.record) for twin in sources.twins]
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
@@ -121,7 +116,7 @@ def _parameters(record: IdentifiedRecord) -> str:
         return fuzzy
     if record.fuzzy_part_off:
         return f"6 of inertia and {fuzzy}, all zero because the fuzzy part is off"
-    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.model.ridge_weight)}"
+    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.chosen.ridge_weight)}"
 
 
 def _search(model: Source[IdentifiedRecord]) -> str:

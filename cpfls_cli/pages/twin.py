@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import BoolArray
-from cpfls_cli.artifacts.replay import VEHICLE
-from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED
 from cpfls_cli.artifacts.twin import SETPOINT, STAYS, TwinRecord
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.response import deviation_words, span_words
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import BASELINE, HELD, band, legend_over, line, logarithmic, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text, in_short
 from cpfls_cli.report.numbers import number, sentence
+from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, NOT_JUDGED, Deviation
 from cpfls_cli.simulation.twin import LIFT
 from cpfls_cli.words import joined
 
@@ -50,6 +49,8 @@ _GUSTS_LEGEND = (
     " In gusts: least and most by which {count} vehicles that the model allows, each in gusts of its own and with what "
     "the model lacks, are off from it."
 )
+_VISIBLE_DB, _VISIBLE_DEG = 1.0, 7.6
+"""Differences that are listed: with these J is 20 each."""
 _SHOWN_S = 6.0
 _BEFORE: dict[str, Any] = {**style_of(2), "linewidth": 1.4, "zorder": 3}
 _AFTER: dict[str, Any] = {**style_of(1), "linewidth": 1.4, "zorder": 3.5}
@@ -154,9 +155,9 @@ def _channel(record: TwinRecord, vehicle: int, channel: int) -> str:
     parts, row = [], record.answers.row(vehicle, channel)
     if row is not None and np.isfinite(record.answers.cost[row]):
         off = [each for each in record.answers.deviations(row) if not each.right]
-        where = ", ".join(map(deviation_words, off)) or "right throughout"
+        where = ", ".join(map(_deviation_words, off)) or "right throughout"
         low, high = record.answers.band[row].tolist()
-        parts.append(f"J = {number(float(record.answers.cost[row]), 3)} {span_words(low, high)}; {where}")
+        parts.append(f"J = {number(float(record.answers.cost[row]), 3)} {_span_words(low, high)}; {where}")
     first = record.first_apart(vehicle, channel)
     if np.isfinite(first):
         share = float(record.window.apart[vehicle, :, channel].mean())
@@ -389,3 +390,25 @@ def _time_figure(record: TwinRecord, index: int) -> Plot:
         "what of the difference does not follow them, over the whole flight."
     )
     return plot(f"twin-time-{index}", caption, "Difference by second", 4.4, draw)
+
+
+def _span_words(low: float, high: float) -> str:
+    """Say from which frequency to which, Hz."""
+    return f"from {number(low, 2)} to {number(high, 2)} Hz"
+
+
+def _deviation_words(part: Deviation) -> str:
+    """Say how far a model is off over a stretch of frequencies."""
+    where = _span_words(part.low, part.high)
+    if part.right:
+        return f"right {where}"
+    decibels, said = 20 * np.log10(part.gain), []
+    if abs(decibels) >= _VISIBLE_DB:
+        strong = decibels > 0
+        said.append(f"{number(part.gain if strong else 1 / part.gain, 2)} times too {'strong' if strong else 'weak'}")
+    if abs(part.phase) >= _VISIBLE_DEG:
+        # A difference of phases alone is that of a delay or a lag.
+        delay = 1e3 * abs(part.phase) / 360 / float(np.sqrt(part.low * part.high))
+        of_delay = "" if said else f" ({number(delay, 2)} ms)"
+        said.append(f"{number(abs(part.phase), 2)}° too {'late' if part.phase < 0 else 'early'}{of_delay}")
+    return f"{' and '.join(said) or 'off'} {where}"

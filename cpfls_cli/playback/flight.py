@@ -217,3 +217,8 @@ def _joined(parts: Sequence[Array]) -> Array:
 
 def _or_zero(values: Array | None, part: Signals, columns: int = 3) -> Array:
     return np.zeros((len(part), columns)) if values is None else values
+
+
+def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...]:
+    """Gather what rules out any verdict on a model."""
+    return tuple(each for flight in flights for each in flight.contradictions)

@@ -319,26 +319,14 @@ class _Space(NamedTuple):
     moved: Array
 
 
-@part
 def _new_state() -> _State:
     return _State(np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
 
 
-@part
 def _new_space(used: Terms, slopes: bool) -> _Space:
-    return _Space(
-        np.zeros(6),
-        np.zeros((2, MOST_COLUMNS)),
-        np.zeros(used.total),
-        np.zeros((used.total if slopes else 0, 6)),
-        np.zeros(len(used.active)),
-        np.zeros(9),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-    )
+    turns = (np.zeros((3, 3)) for _ in range(5))
+    terms = np.zeros(used.total), np.zeros((used.total if slopes else 0, 6)), np.zeros(len(used.active))
+    return _Space(np.zeros(6), np.zeros((2, MOST_COLUMNS)), *terms, np.zeros(9), *turns)
 
 
 @_inlined
@@ -405,20 +393,14 @@ def _lost(state: _State) -> bool:
 
 
 @_inlined
-def _dot(first: Array, i: int, second: Array, j: int) -> float:
-    """Multiply a column of a matrix with a column of another."""
-    return float(first[0, i] * second[0, j] + first[1, i] * second[1, j] + first[2, i] * second[2, j])
-
-
-@_inlined
-def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
+def _write_rotation_error(measured: Array, predicted: Array, turn: Array, out: Array) -> None:
     """Write the rotation vector from a measured to a predicted rotation, body frame of the measured one."""
-    x = 0.5 * (_dot(measured, 2, predicted, 1) - _dot(measured, 1, predicted, 2))
-    y = 0.5 * (_dot(measured, 0, predicted, 2) - _dot(measured, 2, predicted, 0))
-    z = 0.5 * (_dot(measured, 1, predicted, 0) - _dot(measured, 0, predicted, 1))
-    sine = np.sqrt(x * x + y * y + z * z)
-    trace = _dot(measured, 0, predicted, 0) + _dot(measured, 1, predicted, 1) + _dot(measured, 2, predicted, 2)
-    cosine = 0.5 * (trace - 1.0)
+    for i in range(3):
+        for j in range(3):
+            turned = measured[0, i] * predicted[0, j] + measured[1, i] * predicted[1, j]
+            turn[i, j] = turned + measured[2, i] * predicted[2, j]
+    x, y, z = 0.5 * (turn[2, 1] - turn[1, 2]), 0.5 * (turn[0, 2] - turn[2, 0]), 0.5 * (turn[1, 0] - turn[0, 1])
+    sine, cosine = np.sqrt(x * x + y * y + z * z), 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
     scale = np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0
     if sine <= 1e-12 and cosine < 0.0:
         # Half a turn: the axis does not show in the skew part, its length is all that is used.
@@ -427,59 +409,12 @@ def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
 
 
 @_inlined
-def _write_errors(motion: MeasuredMotion, sample: int, state: _State, out: Array) -> None:
+def _write_errors(motion: MeasuredMotion, sample: int, state: _State, turn: Array, out: Array) -> None:
     for i in range(3):
         out[0, i] = state.position[i] - motion.position[sample, i]
         out[1, i] = state.velocity[i] - motion.velocity[sample, i]
         out[3, i] = state.rate[i] - motion.rate[sample, i]
-    rotation_error(motion.rotation[sample], state.rotation, out[2])
-
-
-@compiled
-def errors_of_runs(
-    motion: MeasuredMotion, body: Body, used: Terms, weights: Array, starts: IntArray, translates: bool, out: Array
-) -> IntArray:
-    """Simulate free runs and write their errors.
-
-    Parameters
-    ----------
-    weights : array, shape (time, 6, active)
-        Torque (3) and force (3) by term, for the step that begins at each sample.
-    starts : array of int, shape (run,)
-    translates : bool
-        Whether velocity and position are simulated; otherwise they stay.
-    out : array, shape (run, horizon, 4, 3)
-        Written to: predicted less measured position, velocity, rotation vector, rate. A run that diverges stays as it
-        was before the step in which it did.
-
-    Returns
-    -------
-    array of int, shape (run,)
-        Step at which a run diverged; -1 for those that did not.
-    """
-    h = motion.period
-    diverged = np.full(len(starts), -1)
-    state, middle, before, at = _new_state(), _new_state(), _new_state(), _new_space(used, False)
-    for n in range(len(starts)):
-        _start(motion, starts[n], state)
-        for step in range(out.shape[1]):
-            sample = starts[n] + step
-            if diverged[n] < 0:
-                _copy(state, before)
-                here = state
-                # Written once for both halves of a step: what is written twice takes twice as long to compile.
-                for in_middle in (False, True):
-                    _evaluate(body, used, weights[sample], here, at)
-                    if in_middle:
-                        _to_end(state, middle, h, translates, at)
-                    else:
-                        _to_middle(state, middle, h, translates, at)
-                        here = middle
-                if _lost(state):
-                    diverged[n] = step
-                    _copy(before, state)
-            _write_errors(motion, sample + 1, state, out[n, step])
-    return diverged
+    _write_rotation_error(motion.rotation[sample], state.rotation, turn, out[2])
 
 
 @_inlined
@@ -552,6 +487,8 @@ class _Columns(NamedTuple):
     air: Array
     wrench: Array
     by_motion: Array
+    turned: Array
+    pushed: Array
 
 
 @_inlined
@@ -569,9 +506,9 @@ def _by_motion(used: Terms, weights: Array, slope: Array, out: Array) -> None:
 
 
 @_inlined
-def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wrench: Array) -> None:
+def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, work: _Columns) -> None:
     """Write the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
-    turned, pushed = np.empty(3), np.empty(3)
+    turned, pushed, wrench = work.turned, work.pushed, work.wrench
     _clear(wrench, 0)
     for c in range(len(parameters.moves)):
         for e in range(parameters.first[c], parameters.first[c + 1]):
@@ -613,7 +550,7 @@ def _linearise(
     """
     rotation, rate, air, slope, wrench = state.rotation, state.rate, at.motion, work.by_motion, work.wrench
     _by_motion(used, weights, at.slope, slope)
-    _own_change(parameters, sample, rate, at, wrench)
+    _own_change(parameters, sample, rate, at, work)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         for m in range(3):
@@ -702,7 +639,177 @@ def _clear(matrix: Array, first: int) -> None:
             matrix[i, c] = 0.0
 
 
+class _Sums(NamedTuple):
+    """What runs are added to, and what they are written to: errors where `writes`, else an array to work in."""
+
+    group: IntArray
+    gradient: Array
+    hessian: Array
+    writes: bool
+    errors: Array
+    diverged: IntArray
+
+
+class _Work(NamedTuple):
+    """Arrays to work in: made by NumPy, as numba compiles long for each that it makes."""
+
+    state: _State
+    middle: _State
+    before: _State
+    at: _Space
+    tangent: Array
+    half: Array
+    moved: Array
+    columns: _Columns
+    change: Array
+    rows: Array
+
+
+@_inlined
+def _add_rows(loss: Loss, step: int, error: Array, tangent: Array, gradient: Array, rows: Array, filled: int) -> int:
+    """Add the gradient of a step's loss, and write the rows of its Jacobian; give how many there are then."""
+    for signal in range(4):
+        weight, delta = loss.weight[step, signal], loss.delta[step, signal]
+        if weight > 0.0:
+            size = error[signal, 0] ** 2 + error[signal, 1] ** 2 + error[signal, 2] ** 2
+            share = np.sqrt(weight / np.sqrt(1.0 + size / (delta * delta)))
+            for i in range(3):
+                for c in range(len(gradient)):
+                    row = share * tangent[3 * signal + i, c]
+                    rows[filled, c] = row
+                    gradient[c] += share * error[signal, i] * row
+                filled += 1
+    return filled
+
+
+@_inlined
+def _loss_of(loss: Loss, step: int, error: Array) -> float:
+    total = 0.0
+    for signal in range(4):
+        weight, delta = loss.weight[step, signal], loss.delta[step, signal]
+        if weight > 0.0:
+            size = error[signal, 0] ** 2 + error[signal, 1] ** 2 + error[signal, 2] ** 2
+            total += weight * delta * delta * (np.sqrt(1.0 + size / (delta * delta)) - 1.0)
+    return total
+
+
 @compiled
+def _run_all(
+    motion: MeasuredMotion,
+    body: Body,
+    used: Terms,
+    weights: Array,
+    parameters: Parameters,
+    loss: Loss,
+    starts: IntArray,
+    translates: bool,
+    sums: _Sums,
+    work: _Work,
+) -> float:
+    """Simulate free runs, write their errors or sum their loss and its derivatives, see `sensitivities`."""
+    h, count, total = motion.period, len(parameters.moves), 0.0
+    state, middle, at = work.state, work.middle, work.at
+    tangent, half, moved = work.tangent, work.half, work.moved
+    for n in range(len(starts)):
+        _start(motion, starts[n], state)
+        _clear(tangent, 0)
+        filled = 0
+        for step in range(len(loss.weight)):
+            sample, error = starts[n] + step, sums.errors[n if sums.writes else 0, step if sums.writes else 0]
+            if sums.diverged[n] < 0:
+                if sums.writes:
+                    _copy(state, work.before)
+                here, of_here, turn, right, ahead, elapsed = state, tangent, at.half, at.half_right, half, 0.5 * h
+                # Written once for both halves of a step: what is written twice takes twice as long to compile.
+                for in_middle in (False, True):
+                    _evaluate(body, used, weights[sample], here, at)
+                    if count:
+                        _linearise(
+                            body,
+                            used,
+                            weights[sample],
+                            parameters,
+                            sample,
+                            here,
+                            of_here,
+                            at,
+                            work.columns,
+                            work.change,
+                        )
+                    if in_middle:
+                        _to_end(state, middle, h, translates, at)
+                    else:
+                        _to_middle(state, middle, h, translates, at)
+                    if count:
+                        _tangent_moved(tangent, of_here, work.change, elapsed, translates, turn, right, ahead)
+                    here, of_here, turn, right, ahead, elapsed = middle, half, at.turn, at.right, moved, h
+                tangent, moved = moved, tangent
+                if _lost(state):
+                    sums.diverged[n] = step
+                    if sums.writes:
+                        _copy(work.before, state)
+            if sums.writes:
+                _write_errors(motion, sample + 1, state, at.moved, error)
+            elif sums.diverged[n] >= 0:
+                # A run that leaves every flight behind: as bad as the largest error, and of no direction.
+                for signal in range(4):
+                    total += loss.weight[step, signal] * loss.delta[step, signal] * FASTEST
+            else:
+                _write_errors(motion, sample + 1, state, at.moved, error)
+                total += _loss_of(loss, step, error)
+                if count:
+                    filled = _add_rows(loss, step, error, tangent, sums.gradient[sums.group[n]], work.rows, filled)
+        if count:
+            _clear(work.rows, filled)
+            _add_squares(work.rows, filled, sums.hessian[sums.group[n]])
+    return total
+
+
+def _new_work(used: Terms, count: int, horizon: int) -> _Work:
+    columns = _Columns(np.zeros((3, count)), np.zeros((6, count)), np.zeros((6, 6)), np.zeros(3), np.zeros(3))
+    tangent, half, moved = np.zeros((3, 12, count))
+    return _Work(
+        state=_new_state(),
+        middle=_new_state(),
+        before=_new_state(),
+        at=_new_space(used, count > 0),
+        tangent=tangent,
+        half=half,
+        moved=moved,
+        columns=columns,
+        change=np.zeros((6, count)),
+        rows=np.zeros((12 * horizon + _ROWS, count)),
+    )
+
+
+def errors_of_runs(
+    motion: MeasuredMotion, body: Body, used: Terms, weights: Array, starts: IntArray, translates: bool, out: Array
+) -> IntArray:
+    """Simulate free runs and write their errors.
+
+    Parameters
+    ----------
+    weights : array, shape (time, 6, active)
+        Torque (3) and force (3) by term, for the step that begins at each sample.
+    starts : array of int, shape (run,)
+    translates : bool
+        Whether velocity and position are simulated; otherwise they stay.
+    out : array, shape (run, horizon, 4, 3)
+        Written to: predicted less measured position, velocity, rotation vector, rate. A run that diverges stays as it
+        was before the step in which it did.
+
+    Returns
+    -------
+    array of int, shape (run,)
+        Step at which a run diverged; -1 for those that did not.
+    """
+    horizon, diverged, none = out.shape[1], np.full(len(starts), -1), np.zeros((1, 0))
+    loss, work = Loss(*np.zeros((2, horizon, 4))), _new_work(used, 0, horizon)
+    sums = _Sums(np.zeros(len(starts), np.int64), none, none[:, None], True, out, diverged)
+    _run_all(motion, body, used, weights, NO_PARAMETERS, loss, starts, translates, sums, work)
+    return diverged
+
+
 def sensitivities(
     motion: MeasuredMotion,
     body: Body,
@@ -735,51 +842,7 @@ def sensitivities(
     hessian : array, shape (group, parameter, parameter)
         Added to, the lower triangle.
     """
-    h, count, horizon = motion.period, len(parameters.moves), len(loss.weight)
-    state, middle, at = _new_state(), _new_state(), _new_space(used, count > 0)
-    tangent, half, moved = np.zeros((12, count)), np.zeros((12, count)), np.zeros((12, count))
-    work = _Columns(np.zeros((3, count)), np.zeros((6, count)), np.zeros((6, 6)))
-    change, error, rows = np.zeros((6, count)), np.zeros((4, 3)), np.zeros((12 * horizon + _ROWS, count))
-    total = 0.0
-    for n in range(len(starts)):
-        _start(motion, starts[n], state)
-        _clear(tangent, 0)
-        filled = 0
-        for step in range(horizon):
-            sample = starts[n] + step
-            here, of_here, turn, right, ahead, elapsed = state, tangent, at.half, at.half_right, half, 0.5 * h
-            for in_middle in (False, True):
-                _evaluate(body, used, weights[sample], here, at)
-                if count:
-                    _linearise(body, used, weights[sample], parameters, sample, here, of_here, at, work, change)
-                if in_middle:
-                    _to_end(state, middle, h, translates, at)
-                else:
-                    _to_middle(state, middle, h, translates, at)
-                if count:
-                    _tangent_moved(tangent, of_here, change, elapsed, translates, turn, right, ahead)
-                here, of_here, turn, right, ahead, elapsed = middle, half, at.turn, at.right, moved, h
-            tangent, moved = moved, tangent
-            if _lost(state):
-                # A run that leaves every flight behind: as bad as the largest error, and of no direction.
-                for later in range(step, horizon):
-                    for signal in range(4):
-                        total += loss.weight[later, signal] * loss.delta[later, signal] * FASTEST
-                break
-            _write_errors(motion, sample + 1, state, error)
-            for signal in range(4):
-                weight, delta = loss.weight[step, signal], loss.delta[step, signal]
-                if weight > 0.0:
-                    size = error[signal, 0] ** 2 + error[signal, 1] ** 2 + error[signal, 2] ** 2
-                    root = np.sqrt(1.0 + size / (delta * delta))
-                    total += weight * delta * delta * (root - 1.0)
-                    share = np.sqrt(weight / root)
-                    for i in range(3):
-                        for c in range(count):
-                            row = share * tangent[3 * signal + i, c]
-                            rows[filled, c] = row
-                            gradient[group[n], c] += share * error[signal, i] * row
-                        filled += 1
-        _clear(rows, filled)
-        _add_squares(rows, filled, hessian[group[n]])
-    return total
+    diverged, errors = np.full(len(starts), -1), np.zeros((1, 1, 4, 3))
+    work = _new_work(used, len(parameters.moves), len(loss.weight))
+    sums = _Sums(group, gradient, hessian, False, errors, diverged)
+    return float(_run_all(motion, body, used, weights, parameters, loss, starts, translates, sums, work))

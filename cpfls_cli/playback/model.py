@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
 from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
@@ -32,21 +33,24 @@ from cpfls_cli.playback.table import (
     with_slow,
     wrench_of_numbers,
 )
+from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 class ModelEffect(NamedTuple):
-    """An effect of the catalogue in a model.
+    """An effect of the catalogue in a model."""
 
-    Attributes
-    ----------
-    coefficients : array, shape (coefficient,)
-        Linear ones, SI. An offset of the centre of mass with three has a lever for all forces, with two for the thrust.
-    """
-
-    name: str
-    shape: Mapping[str, float]
-    coefficients: Array
+    name: Annotated[str, About("identifier, see `cpfls effects`")]
+    shape: Annotated[Mapping[str, float], About("what it depends on nonlinearly", unit="SI")]
+    coefficients: Annotated[
+        Array,
+        About(
+            "linear ones; an offset of the centre of mass with three has a lever for all forces, with two for thrust",
+            ("coefficient",),
+            "SI",
+            ragged=True,
+        ),
+    ]
 
     @property
     def is_lever(self) -> bool:
@@ -100,45 +104,40 @@ class ModelEffect(NamedTuple):
         return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class VehicleModel:
-    """A vehicle that gives torque, force and motion from its state and its rotor speeds.
+    """A vehicle that gives torque, force and motion from its state and its rotor speeds."""
 
-    Attributes
-    ----------
-    vehicle : VehicleSettings
-        Mass, inertia and rotors of the model, which need not be those of a config.
-    thrust_linear : float
-        Law of the rotors: thrust and drag follow ``w^2 + thrust_linear w_h w``, with the speed w_h that hovers under
-        the square alone.
-    effects : tuple of ModelEffect
-        Polynomials of motion and rotor speeds stand in `weights`; others are evaluated along a measured motion
-        (`along`), or act on what drives the rotors (`filters`).
-    fuzzy : InertiaModel or None
-        Inertia that depends on the attitude; it then stands in the place of the vehicle's.
-    wind : tuple of float, m/s, world frame
-        Of its flights, steady; no part of the vehicle.
-    commanded : bool
-        Whether lag and delay of the response lie behind commands: measured speeds have them already.
-    hold : {"linear", "previous"} or None
-        What a command is between samples, where the response was found so; None: as a flight is usually taken.
-    repairs : Audit or None
-        Faults of the sensors, which are taken out of signals first.
-    gusts : Gusts or None
-        In its flights, as far as they are known; no part of what the model forecasts.
-    """
-
-    vehicle: VehicleSettings
-    response: RotorResponse = field(default_factory=RotorResponse)
-    thrust_linear: float = 0.0
-    effects: tuple[ModelEffect, ...] = ()
-    remainder: Remainder | None = None
-    fuzzy: InertiaModel | None = None
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    commanded: bool = False
-    hold: Hold | None = None
-    repairs: Audit | None = None
-    gusts: Gusts | None = None
+    vehicle: VehicleSettings = part()
+    """Mass, inertia and rotors of the model, which need not be those of a config."""
+    response: RotorResponse = part(default=RotorResponse())
+    thrust_linear: float = about(
+        "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone", default=0.0
+    )
+    effects: tuple[ModelEffect, ...] = part(default=())
+    """Polynomials of motion and rotor speeds stand in `weights`; others are evaluated along a measured motion
+    (`along`), or act on what drives the rotors (`filters`)."""
+    remainder: Remainder | None = part(default=None)
+    fuzzy: InertiaModel | None = part(default=None, kind=InertiaFunctions)
+    """Inertia that depends on the attitude, in the place of the vehicle's."""
+    wind: tuple[float, float, float] = about(
+        "steady wind of its flights; no part of the vehicle",
+        "3",
+        unit="m/s",
+        frame="world (z up)",
+        default=(0.0, 0.0, 0.0),
+    )
+    commanded: bool = about(
+        "1 where delay and lag lie behind commands, which measured speeds have already; 0 behind any speed",
+        default=False,
+    )
+    hold: Hold | None = about(
+        "what a command is between samples, where the response was found so: linear or previous", default=None
+    )
+    repairs: Audit | None = part(default=None)
+    """Faults of the sensors, which are taken out of signals first."""
+    gusts: Gusts | None = part(default=None)
+    """In its flights, as far as they are known; no part of what the model forecasts."""
 
     @property
     def rotors(self) -> int:

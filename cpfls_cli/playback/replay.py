@@ -9,28 +9,25 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
+from cpfls_cli.playback.errors import (
+    MODEL,
+    NOTHING_MOVES,
+    PREDICTIONS,
+    RATE_FADES,
+    STATED,
+    WITH_PAST,
+    WITHOUT_MODEL,
+    AlongFlights,
+    Errors,
+    Prediction,
+    Region,
+)
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
 from cpfls_cli.playback.rotors import Hold
 
 SIGNALS = ("position", "velocity", "attitude", "body_rate")
 """What errors are of, in the order of the compiled runs."""
-
-MODEL, NOTHING_MOVES, RATE_STAYS, STATED = "model", "nothing-moves", "rate-stays", "stated"
-PREDICTIONS = (MODEL, NOTHING_MOVES, RATE_STAYS, STATED)
-"""The model; the whole state stays; rates and velocity stay; the rigid body and the rotors that the config states."""
-
-RATE_FADES = "rate-fades"
-"""Where flights train: rates fade with one time constant of theirs, velocity stays. A body that forgets its turning."""
-
-WITHOUT_MODEL = (NOTHING_MOVES, RATE_STAYS, RATE_FADES)
-"""What knows no model, and is what a model has to beat."""
-
-WITH_PAST = "with-past"
-"""Behind these: a model that is told of the flight before each start too, beside one that is not."""
-
-BEFORE, AFTER = "before", "after"
-"""A model as given and with the effects that were found, where these are what is compared."""
 
 _BATCH = 100_000
 """Steps of free runs at a time, which bounds the memory."""
@@ -39,7 +36,7 @@ _FADING = (1e2, 1e-1, 2000)
 """Time constants that are tried: the longest in horizons, the shortest in samples, and how many."""
 
 _BLOCKS, _HORIZONS = 20, 2
-"""Blocks of windows that chance is told from, at most, and how many horizons each is long at least."""
+"""Blocks of windows that chance is estimated from, at most, and how many horizons each is long at least."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class Played:
     Attributes
     ----------
     with_past : Player or None
-        A model that uses the past, beside one that does not.
+        A model that uses the past, next to one that does not.
     fading_s : float or None, s
         See `RATE_FADES`; None where no flights train.
     """
@@ -143,18 +140,6 @@ def fading(flights: Sequence[PlaybackFlight], horizon: int) -> float:
 
 
 @dataclass(frozen=True)
-class SignalErrors:
-    """Errors of one signal over all windows of the flights that know it.
-
-    Its fields are described at `SignalErrorGroup`.
-    """
-
-    mae: Array
-    rms: Array
-    chance: Array | None
-
-
-@dataclass(frozen=True)
 class ReplayWindows:
     """Where runs started, and how far off they were.
 
@@ -223,38 +208,46 @@ class ReplayWindows:
 
 @dataclass(frozen=True)
 class Replay:
-    """Predictions of flights, their errors by horizon and window.
+    """Errors of predictions of flights by horizon and window.
 
     Attributes
     ----------
-    errors : mapping of str to SignalErrors or None
-        By signal; None where no flight knows it.
-    predictions : tuple of str
-        `PREDICTIONS`, and `WITH_PAST` and `RATE_FADES` where all flights have them.
+    models : dict of str to Prediction
+        Of `PREDICTIONS`, and `WITH_PAST` and `RATE_FADES` where all flights have them.
+    horizon_s : array, shape (horizon,), s
     """
 
-    errors: Mapping[str, SignalErrors | None]
+    models: dict[str, Prediction]
+    horizon_s: Array
     windows: ReplayWindows
-    predictions: tuple[str, ...] = PREDICTIONS
+
+    def along(self, flights: Sequence[Played], names: Mapping[str, str] | None = None) -> AlongFlights:
+        """Sum up without the windows.
+
+        Parameters
+        ----------
+        names : mapping of str to str, or None
+            Predictions that are kept, with what they are called; None for all.
+        """
+        kept = names or {name: name for name in self.models}
+        return AlongFlights(
+            horizon_s=self.horizon_s,
+            models={new: self.models[name] for name, new in kept.items()},
+            flights=tuple(played.flight.name for played in flights),
+            windows=len(self.windows.start),
+            fading_s=flights[0].fading_s,
+            better=where_better(flights, self),
+        )
 
 
 _OUTER = 0.05
 """Share of the windows at each end that a region leaves out: one stray sample is no region."""
 
 
-@dataclass(frozen=True)
-class Region:
-    """Where a model predicts body rates better than what knows no model; its fields are described at `RegionGroup`."""
-
-    share: float
-    speed: Array | None
-    rate: Array
-
-
 def where_better(flights: Sequence[Played], replayed: Replay) -> Region | None:
-    """Find the speeds and rates at which a model is better; None where it is nowhere."""
+    """Find the speeds and rates at which a model is better than what knows no model; None where it is nowhere."""
     windows = replayed.windows
-    rivals = [row for row, name in enumerate(replayed.predictions) if name in WITHOUT_MODEL]
+    rivals = [row for row, name in enumerate(replayed.models) if name in WITHOUT_MODEL]
     better = windows.of_model < windows.size[rivals].min(axis=0)
     if not better.any():
         return None
@@ -267,7 +260,7 @@ def where_better(flights: Sequence[Played], replayed: Replay) -> Region | None:
 
     known = all(played.knows["velocity"] for played in flights)
     speed = span([motion.velocity for motion in motions]) if known else None
-    return Region(float(better.mean()), speed, span([motion.rate for motion in motions]))
+    return Region(share=float(better.mean()), speed_m_s=speed, rate_rad_s=span([motion.rate for motion in motions]))
 
 
 @dataclass
@@ -275,14 +268,14 @@ class _Sums:
     """Sums over the windows so far, those of norms by block of windows."""
 
     horizon: int
-    predictions: tuple[str, ...]
+    names: tuple[str, ...]
     block: IntArray
     count: IntArray = field(init=False)
     norm: Array = field(init=False)
     square: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        blocks, shape = int(self.block.max()) + 1, (len(self.predictions), self.horizon)
+        blocks, shape = int(self.block.max()) + 1, (len(self.names), self.horizon)
         self.count = np.zeros((4, blocks), dtype=np.int64)
         self.norm = np.zeros((4, blocks, *shape))
         self.square = np.zeros((4, *shape, 3))
@@ -296,21 +289,29 @@ class _Sums:
         for each in np.unique(block):
             own = norms[block == each]
             self.norm[known, each, prediction] += own.sum(axis=0).T[known]
-            self.count[known, each] += len(own) if prediction == self.predictions.index(MODEL) else 0
+            self.count[known, each] += len(own) if prediction == self.names.index(MODEL) else 0
 
-    def errors(self) -> dict[str, SignalErrors | None]:
-        """Take the means."""
-        return {signal: self._errors(row) if self.count[row].any() else None for row, signal in enumerate(SIGNALS)}
+    def predictions(self, diverged: IntArray) -> dict[str, Prediction]:
+        """Take the means, with the windows in which each prediction ran away, shape (prediction,)."""
+        known = {signal: self._errors(row) for row, signal in enumerate(SIGNALS) if self.count[row].any()}
+        return {
+            name: Prediction(diverged=int(diverged[index]), **{signal: own[index] for signal, own in known.items()})
+            for index, name in enumerate(self.names)
+        }
 
-    def _errors(self, row: int) -> SignalErrors:
+    def _errors(self, row: int) -> list[Errors]:
+        """Take the means of one signal, of each prediction."""
         total, norm = int(self.count[row].sum()), self.norm[row]
-        chance: Array | None = None
-        seen = np.flatnonzero(self.count[row])
+        seen, chance = np.flatnonzero(self.count[row]), None
         if len(seen) >= FEWEST_BLOCKS:
             left_out = (norm.sum(axis=0) - norm[seen]) / (total - self.count[row, seen])[:, None, None]
-            apart = left_out - left_out[:, [self.predictions.index(MODEL)]]
+            apart = left_out - left_out[:, [self.names.index(MODEL)]]
             chance = half_width(jackknife_error(apart), len(seen))
-        return SignalErrors(norm.sum(axis=0) / total, np.sqrt(self.square[row] / total), chance)
+        means = zip(norm.sum(axis=0) / total, np.sqrt(self.square[row] / total), strict=True)
+        return [
+            Errors(mae=mae, rms_by_axis=rms, chance=None if chance is None else chance[index])
+            for index, (mae, rms) in enumerate(means)
+        ]
 
 
 def _blocks(windows: int, horizon: int, every: int) -> IntArray:
@@ -344,9 +345,9 @@ def replay(
     starts = [played.flight.starts(horizon, every) for played in flights]
     past = all(played.with_past is not None for played in flights)
     fades = all(played.fading_s is not None for played in flights)
-    predictions = (*PREDICTIONS, *([WITH_PAST] if past else []), *([RATE_FADES] if fades else []))
+    names = (*PREDICTIONS, *([WITH_PAST] if past else []), *([RATE_FADES] if fades else []))
     parts, done, total = [], 0, sum(map(len, starts))
-    sums = _Sums(horizon, predictions, _blocks(total, horizon, every))
+    sums = _Sums(horizon, names, _blocks(total, horizon, every))
     for index, played in enumerate(flights):
         size = max(1, _BATCH // horizon)
         for first in range(0, len(starts[index]), size):
@@ -354,19 +355,20 @@ def replay(
             parts.append(_added(sums, played, batch, index, done))
             done += len(batch)
             progress(done / total)
-    joined = [np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)]
-    return Replay(sums.errors(), ReplayWindows(*joined), predictions)
+    windows = ReplayWindows(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    horizon_s = flights[0].flight.motion.period * np.arange(1, horizon + 1)
+    return Replay(sums.predictions((windows.diverged >= 0).sum(axis=1)), horizon_s, windows)
 
 
 def _added(
     sums: _Sums, played: Played, starts: IntArray, flight: int, first: int
 ) -> tuple[IntArray, IntArray, Array, IntArray]:
     """Add a batch, from this window on, to the sums; give the columns of `ReplayWindows`."""
-    size = np.empty((len(sums.predictions), len(starts)))
+    size = np.empty((len(sums.names), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
     model: Runs | None = None
-    for row, prediction in enumerate(sums.predictions):
+    for row, prediction in enumerate(sums.names):
         again = model if prediction == STATED and played.stated is played.model else None
         runs = again or played.runs(prediction, starts, sums.horizon)
         model = runs if prediction == MODEL else model
@@ -378,7 +380,7 @@ def _added(
 
 @dataclass(frozen=True)
 class Drawn:
-    """Runs of the model beside the flight, their starts included; its fields are described at `DrawnGroup`."""
+    """Runs of the model and of the flight, their starts included; its fields are described at `DrawnRuns`."""
 
     measured: Array
     model: Array

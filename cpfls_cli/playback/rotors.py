@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.lag import Lagged, delayed, lagged
+from cpfls_cli.result import about
 
 Hold = Literal["linear", "previous"]
 TimeOfResponse = Literal["delay_s", "lag_s", "slow_s"]
@@ -22,25 +23,16 @@ _SHORTEST_S = 1e-5
 
 @dataclass(frozen=True, kw_only=True)
 class RotorResponse:
-    """How rotors follow their logged speed.
+    """How rotors follow their logged speed."""
 
-    Attributes
-    ----------
-    delay_s : float
-        Pure delay.
-    lag_s : float
-        Time constant of the first-order lag; 0 for none.
-    slow_roll_pitch, slow_yaw : float
-        Slow actuation: share by which the torque of the rotors comes back (below 0: fades) after a change.
-    slow_s : float
-        Time constant with which it does.
-    """
-
-    delay_s: float = 0.0
-    lag_s: float = 0.0
-    slow_roll_pitch: float = 0.0
-    slow_yaw: float = 0.0
-    slow_s: float = 0.5
+    delay_s: float = about("pure delay", unit="s", default=0.0)
+    lag_s: float = about("time constant of the first-order lag; 0 for none", unit="s", default=0.0)
+    slow_roll_pitch: float = about(
+        "slow actuation: share by which roll and pitch torque of the rotors come back after a change; below 0: fade",
+        default=0.0,
+    )
+    slow_yaw: float = about("the same of the yaw torque", default=0.0)
+    slow_s: float = about("time constant with which they do", unit="s", default=0.5)
 
     def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""

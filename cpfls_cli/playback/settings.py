@@ -10,6 +10,9 @@ from typing_extensions import Doc
 
 from cpfls_cli.settings import Settings
 
+VEHICLE = "vehicle"
+"""In the place of a model: the vehicle of the config."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GroupSettings(Settings):

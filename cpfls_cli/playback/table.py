@@ -18,23 +18,31 @@ from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.playback.kernels import Airflow, Body, Terms, airflow_terms
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class Remainder:
     """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.
 
     Each column of the system enters with the speed in the rotor plane times the mean rotor speed, and with its square.
-
-    Its fields are described at `RemainderGroup`.
     """
 
-    breakpoints: Array
-    harmonic_order: int
-    rows: IntArray
-    coefficients: Array
+    breakpoints: Array = about(
+        "peaks of the membership functions over the direction, share of a turn", "breakpoint", brief=False
+    )
+    harmonic_order: int = about("of the consequents; 0 for the seesaw")
+    rows: IntArray = about("which of torque (0 to 2) and force (3 to 5) it adds to", "row")
+    coefficients: Array = about(
+        "of each column: by speed in the rotor plane times mean rotor speed, and by that speed squared",
+        "row",
+        "column",
+        "2",
+        unit="SI",
+        brief=False,
+    )
 
 
 @dataclass(frozen=True)

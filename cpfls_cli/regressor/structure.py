@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -15,6 +15,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.fuzzy.basis import Consequents, Products, feature_count
 from cpfls_cli.fuzzy.inputs import InputMap
+from cpfls_cli.result import part
 from cpfls_cli.settings import Settings
 
 ROLL, PITCH = 0, 1
@@ -49,6 +50,9 @@ INERTIA_FUNCTIONS = (
     InertiaFunction("D33", 2, 2, (ROLL, PITCH)),
 )
 """Equations (14) and (15); D12 is zero."""
+
+_PLACES = tuple((function.name, angle) for function in INERTIA_FUNCTIONS for angle in function.inputs)
+"""Partitions: function and input of each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,19 +139,20 @@ class Block:
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """Partitions and blocks of coefficients of the fuzzy part of a model.
+    """Partitions and blocks of coefficients of the fuzzy part of a model; see `model_structure`."""
 
-    Attributes
-    ----------
-    partitions : tuple of Partition
-        In the order of the genes: D13(pitch), D22(roll), D23(roll), D23(pitch), D33(roll), D33(pitch).
-    blocks : tuple of Block
-        In the order of the coefficients: D11, D13, D22, D23, D33.
-    """
+    settings: StructureSettings = part()
 
-    settings: StructureSettings
-    partitions: tuple[Partition, ...]
-    blocks: tuple[Block, ...]
+    @cached_property
+    def partitions(self) -> tuple[Partition, ...]:
+        """In the order of the genes: D13(pitch), D22(roll), D23(roll), D23(pitch), D33(roll), D33(pitch)."""
+        counts = _function_counts(self.settings)
+        return tuple(Partition(*place, number) for place, number in zip(_PLACES, counts, strict=True))
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """In the order of the coefficients: D11, D13, D22, D23, D33."""
+        return tuple(_blocks(self.settings, self.partitions))
 
     @property
     def parameters(self) -> int:
@@ -184,10 +189,11 @@ class ModelStructure:
 
         The first two of shape (inner breakpoints, genes).
         """
-        ends = [(i, part, k) for i, part in enumerate(self.weight_slices()) for k in range(1, part.stop - part.start)]
+        slices = enumerate(self.weight_slices())
+        ends = [(i, own, k) for i, own in slices for k in range(1, own.stop - own.start)]
         own, counted = np.zeros((len(ends), self.genes), dtype=np.bool_), np.zeros((len(ends), self.genes))
-        for row, (_, part, k) in enumerate(ends):
-            own[row, part], counted[row, part.start : part.start + k] = True, 1.0
+        for row, (_, genes, k) in enumerate(ends):
+            own[row, genes], counted[row, genes.start : genes.start + k] = True, 1.0
         return own, counted, np.array([i for i, _, _ in ends], dtype=np.int64)
 
 
@@ -198,11 +204,14 @@ def model_structure(settings: StructureSettings) -> ModelStructure:
     ----------
     Paper section 5; method.md section 5: 113 parameters for five functions, circular, seesaw consequents.
     """
-    places = [(f.name, angle) for f in INERTIA_FUNCTIONS for angle in f.inputs]
+    own = {each.name: getattr(settings, each.name) for each in fields(StructureSettings)}
+    return ModelStructure(StructureSettings(**own | {"membership_functions": _function_counts(settings)}))
+
+
+def _function_counts(settings: StructureSettings) -> tuple[int, ...]:
+    """Count the membership functions of each partition."""
     counts = settings.membership_functions
-    numbers = (counts,) * len(places) if isinstance(counts, int) else counts
-    partitions = tuple(Partition(name, angle, n) for (name, angle), n in zip(places, numbers, strict=True))
-    return ModelStructure(settings, partitions, tuple(_blocks(settings, partitions)))
+    return (counts,) * len(_PLACES) if isinstance(counts, int) else counts
 
 
 def _blocks(settings: StructureSettings, partitions: tuple[Partition, ...]) -> Iterator[Block]:

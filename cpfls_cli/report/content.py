@@ -284,7 +284,7 @@ class Origin:
     @property
     def format(self) -> str:
         """Name of its format."""
-        return str(getattr(self.record.FORMAT, "name", self.record.FORMAT))
+        return store.format_of(self.record)
 
     @property
     def header(self) -> Header | store.Origin:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,8 +20,18 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import rotor_weights
-from cpfls_cli.response.mismatch import ROTATION, ROTOR_SPEED, THRUST, Mismatch, judged_band, mismatch
+from cpfls_cli.response.mismatch import (
+    NOT_JUDGED,
+    ROTATION,
+    ROTOR_SPEED,
+    THRUST,
+    Mismatch,
+    judged_band,
+    mismatch,
+    response_word,
+)
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
+from cpfls_cli.result import about, part, result
 
 InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
 """Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
@@ -31,20 +41,55 @@ not depend on them.
 """
 
 
-class VehicleResponse(NamedTuple):
-    """One response of a vehicle, measured and of a model.
+NO_INSTRUMENTS = "none"
+"""In the place of what the instruments are: nothing in the flights moves the vehicle independently of the gusts."""
 
-    Attributes
-    ----------
-    name : str
-        Roll, pitch and yaw: torque of the rotors to angular acceleration, body frame, in rad/s^2 per N m. Thrust: to
-        specific force along z, in m/s^2 per N. Rotor speed: command to speed, of all rotors together. Roll rate, roll
-        angle and others alike: setpoint to what follows it, of vehicle and autopilot.
+
+@result
+class VehicleResponse(FrequencyResponse, Mismatch):
+    """One response of a vehicle, measured and of a model, and how far the model is off."""
+
+    SHOWN: ClassVar[tuple[str, ...]] = ("word", *FrequencyResponse.SHOWN)
+
+    of_vehicle: bool = about("1 where it is of the vehicle alone; 0 where of vehicle and autopilot together")
+
+    @property
+    def word(self) -> str:
+        """The model judged by it: good, acceptable, not-acceptable; not-judged where nothing shows the vehicle."""
+        return response_word(self.cost) if self.of_vehicle else NOT_JUDGED
+
+
+@result
+class Responses:
+    """Frequency responses of a vehicle as flights show it, and of a model along the same flights.
+
+    Roll, pitch and yaw: torque of the rotors to angular acceleration, body frame, in rad/s^2 per N m. Thrust: to
+    specific force along z, in m/s^2 per N. Rotor speed: command to speed, of all rotors together. Roll rate, roll angle
+    and others alike: setpoint to what follows it, of vehicle and autopilot.
     """
 
-    name: str
-    estimate: FrequencyResponse
-    mismatch: Mismatch
+    FORMAT: ClassVar = "cpfls/response"
+
+    model: str = about("the model: a file, or vehicle for that of /config")
+    flights: tuple[str, ...] = about("names of the flights", "flight")
+    instruments: str = about(
+        "what moves the vehicle independently of gusts: repeats (the same path flown again), setpoints, or none"
+    )
+    responses: dict[str, VehicleResponse] = part()
+    warnings: tuple[str, ...] = about("what to know about flights and model", "warning", default=())
+    contradictions: tuple[str, ...] = about(
+        "contradictions within the flights or with the vehicle", "contradiction", default=()
+    )
+
+    @property
+    def has_instruments(self) -> bool:
+        """Whether there are any; without, all responses are of vehicle and autopilot together."""
+        return self.instruments != NO_INSTRUMENTS
+
+    @property
+    def words(self) -> dict[str, str]:
+        """How good the model is by each response."""
+        return {name: own.word for name, own in self.responses.items()}
 
 
 def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
@@ -54,7 +99,7 @@ def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
 
 def vehicle_responses(
     model: VehicleModel, flights: Sequence[LoggedFlight], instruments: InstrumentSource = no_instruments
-) -> tuple[VehicleResponse, ...]:
+) -> dict[str, VehicleResponse]:
     """Estimate all responses that flights show, with those of a model along the same flights.
 
     The input is what the rotors of the model give at the logged speeds, without lag, delay and effects. The model's
@@ -86,14 +131,20 @@ def vehicle_responses(
         found[name] = [part for parts in own for part in parts]
     period = flights[0].parts[0].period
     estimates = {name: estimated(parts, period) for name, parts in found.items()}
-    known = [VehicleResponse(name, each, mismatch(each)) for name, each in estimates.items() if each is not None]
+    known = {name: _judged(name, each) for name, each in estimates.items() if each is not None}
     if not known:
         longest = max(len(part) for flight in flights for part in flight.parts) * period
         raise InputError(
             f"{', '.join(flight.name for flight in flights)}: the longest stretch without a pause is {longest:.3g} s, "
             "too short for a frequency response; give longer flights"
         )
-    return tuple(known)
+    return known
+
+
+def _judged(name: str, estimate: FrequencyResponse) -> VehicleResponse:
+    # Speeds that follow their command feel no gust.
+    of_vehicle = estimate.instrumented or name == ROTOR_SPEED
+    return VehicleResponse(**vars(estimate), **vars(mismatch(estimate)), of_vehicle=of_vehicle)
 
 
 def estimated(parts: Sequence[Stretch], period: float) -> FrequencyResponse | None:
@@ -127,8 +178,8 @@ def _with_instrument(parts: Sequence[Stretch], instrument: Array | None) -> list
 def _of_flight(model: VehicleModel, flight: LoggedFlight) -> dict[str, list[Stretch]]:
     """List the stretches of a flight by response, in the order of its parts."""
     found: dict[str, list[Stretch]] = {}
-    for part in flight.parts:
-        for name, stretch in _of_part(model, flight, part):
+    for signals in flight.parts:
+        for name, stretch in _of_part(model, flight, signals):
             found.setdefault(name, []).append(stretch)
     return found
 

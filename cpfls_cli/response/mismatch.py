@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, stretches
+from cpfls_cli.arrays import Array, BoolArray, ComplexArray, stretches
+from cpfls_cli.result import about, part, result
+from cpfls_cli.rounding import at_most
 
 if TYPE_CHECKING:
     # Who reads what was found waits for nothing that finds it.
@@ -31,41 +33,45 @@ _FEWEST_POINTS = 8
 _DIP = 2
 """Points in which the coherence may dip without ending a band."""
 _PHASE = 0.01745
-"""Weight of a squared degree beside a squared decibel: 7.6 degrees count as 1 dB."""
+"""Weight of a squared degree against a squared decibel: 7.6 degrees count as 1 dB."""
 _SURE = 2.0
 """Random errors from which on a difference is none of chance."""
 _SHORTEST = 3
-"""Points of a stretch that is told: a single one is scatter."""
+"""Points of a stretch: a single one is scatter."""
 _LEAST = 1e-6
 """Gain over another, to which a model that does nothing is set: decibels of nothing are none."""
 
 
-class Deviation(NamedTuple):
-    """Frequencies over which a model is right, or off in one way; its fields are described at `DeviationGroup`."""
-
-    low: float
-    high: float
-    right: bool
-    gain: float
-    phase: float
+NOT_JUDGED, NOT_ACCEPTABLE = "not-judged", "not-acceptable"
 
 
-class Mismatch(NamedTuple):
-    """How far a model is from a measured response.
+def response_word(cost: float) -> str:
+    """Judge a model by its cost J: good, acceptable, not-acceptable; not-judged where it is not known."""
+    if not np.isfinite(cost):
+        return NOT_JUDGED
+    return "good" if at_most(cost, GOOD) else "acceptable" if at_most(cost, ACCEPTABLE) else NOT_ACCEPTABLE
 
-    Attributes
-    ----------
-    cost : float
-        J; NaN where there is no model or no band.
-    band : tuple of (float, float), Hz, or None
-        Over which the coherence that counts is above 0.6; None where nowhere.
-    deviations : tuple of Deviation
-        Of the band, from low to high; empty without a model.
-    """
 
-    cost: float
-    band: tuple[float, float] | None
-    deviations: tuple[Deviation, ...]
+@result
+class Deviation:
+    """Frequencies over which a model is right, or off in one way."""
+
+    low: float = about("from this frequency", unit="Hz")
+    high: float = about("to this one", unit="Hz")
+    right: bool = about("1 where the model is right")
+    gain: float = about("gain of the model over the measured one, geometric mean")
+    phase: float = about("phase of the model less the measured one, mean", unit="deg")
+
+
+@result
+class Mismatch:
+    """How far a model is from a measured response."""
+
+    cost: float = about("J of the model; not finite where there is no model or no band", gaps=True)
+    band: tuple[float, float] | None = about(
+        "frequencies over which the coherence that counts is above 0.6: first and last", "2", unit="Hz", default=None
+    )
+    deviations: tuple[Deviation, ...] = part(default=())
 
 
 def clearness(coherence: Array, random_error: Array, averages: Array, instrumented: bool) -> Array:
@@ -112,59 +118,59 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     """
     part = judged_band(response)
     if part is None:
-        return Mismatch(np.nan, None, ())
+        return Mismatch(cost=np.nan)
     frequency = response.frequency[part]
     band = float(frequency[0]), float(frequency[-1])
     if response.model is None:
-        return Mismatch(np.nan, band, ())
+        return Mismatch(cost=np.nan, band=band)
     ratio = response.model[part] / response.gain[part]
     apart = _apart(ratio)
     chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
     weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
     cost = 20.0 * float((weight * apart[chosen]).mean())
     off = (20.0 * apart > ACCEPTABLE) & (np.abs(ratio - 1) > _SURE * response.random_error[part])
-    return Mismatch(cost, band, tuple(_deviations(frequency, ratio, off)))
+    return Mismatch(cost=cost, band=band, deviations=tuple(_deviations(frequency, ratio, off)))
 
 
-def _apart(ratio: Array) -> Array:
+def _apart(ratio: ComplexArray) -> Array:
     """Add squared differences in decibels and degrees."""
     phase = np.degrees(np.angle(ratio))
     return np.asarray(_decibels(ratio) ** 2 + _PHASE * phase**2)
 
 
-def _decibels(ratio: Array) -> Array:
+def _decibels(ratio: ComplexArray) -> Array:
     return np.asarray(20 * np.log10(np.maximum(np.abs(ratio), _LEAST)))
 
 
-def _deviations(frequency: Array, ratio: Array, off: BoolArray) -> list[Deviation]:
+def _deviations(frequency: Array, ratio: ComplexArray, off: BoolArray) -> list[Deviation]:
     """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
     kind = np.where(off, _kinds(ratio), 0)
     kind = _without_scatter(kind)
     return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
 
 
-def _kinds(ratio: Array) -> Array:
+def _kinds(ratio: ComplexArray) -> Array:
     """Tell what a difference is: 1 too strong, -1 too weak, 2 early, -2 late."""
     gain, phase = _decibels(ratio), np.degrees(np.angle(ratio))
     return np.asarray(np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)), dtype=int)
 
 
 def _without_scatter(kind: Array) -> Array:
-    """Give stretches that are too short to be told to their neighbours, the shortest first."""
+    """Merge stretches that are too short into their longer neighbours, the shortest first."""
     kind = kind.copy()
     while True:
-        told = stretches(kind)
-        sizes = [after - first for first, after in told]
+        found = stretches(kind)
+        sizes = [after - first for first, after in found]
         shortest = int(np.argmin(sizes))
-        if sizes[shortest] >= _SHORTEST or len(told) == 1:
+        if sizes[shortest] >= _SHORTEST or len(found) == 1:
             return kind
-        beside = [index for index in (shortest - 1, shortest + 1) if 0 <= index < len(told)]
-        longer = max(beside, key=lambda index: sizes[index])
-        kind[slice(*told[shortest])] = kind[told[longer][0]]
+        neighbours = [index for index in (shortest - 1, shortest + 1) if 0 <= index < len(found)]
+        longer = max(neighbours, key=lambda index: sizes[index])
+        kind[slice(*found[shortest])] = kind[found[longer][0]]
 
 
-def _deviation(frequency: Array, ratio: Array, right: bool) -> Deviation:
+def _deviation(frequency: Array, ratio: ComplexArray, right: bool) -> Deviation:
     gain = float(10 ** (_decibels(ratio).mean() / 20))
     # Angles are averaged as directions: those at half a turn have either sign.
     phase = float(np.degrees(np.angle(np.exp(1j * np.angle(ratio)).mean())))
-    return Deviation(float(frequency[0]), float(frequency[-1]), right, gain, phase)
+    return Deviation(low=float(frequency[0]), high=float(frequency[-1]), right=right, gain=gain, phase=phase)

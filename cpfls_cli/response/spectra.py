@@ -8,15 +8,15 @@ the disturbance, such as a logged setpoint or the same path flown again: ``S_zy 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import ceil, floor, log10
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, runs
 from cpfls_cli.response.mismatch import clearness
+from cpfls_cli.result import about, result
 
 _LENGTHS = 5
 """Windows of so many lengths, from the shortest to the longest by equal ratios."""
@@ -27,7 +27,7 @@ _FEWEST_SAMPLES = 16
 _FEWEST_WINDOWS = 5
 """Lengths of the longest window that all flights together have: fewer say nothing of the error."""
 _PERIODS, _FEWEST_PERIODS = 8.0, 2.0
-"""Of a frequency in the windows that tell it, and in the longest: within fewer, lower ones leak in by some per cent."""
+"""Of a frequency in windows that identify it, and in the longest: within fewer, lower ones leak in by some per cent."""
 _OVERLAP = 0.75
 _PER_DECADE = 24
 _LOWEST_HZ = 0.1
@@ -84,31 +84,68 @@ class Stretch(NamedTuple):
     start: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class FrequencyResponse:
-    """A frequency response and how far to trust it; other fields are described at `ResponseRecord`.
+    """A frequency response and how far to trust it."""
 
-    Attributes
-    ----------
-    frequency : array, shape (frequency,), Hz
-    gain : array of complex, shape (frequency,), unit of the output per unit of the input
-        NaN where no window tells it.
-    model : array of complex, shape (frequency,), or None
-        Of the model, by the same windows and instruments.
-    direct : array of complex, shape (frequency,)
-        Without instruments.
-    instrumented : bool
-    """
+    SHOWN: ClassVar[tuple[str, ...]] = (
+        *("magnitude_db", "phase_deg", "model_magnitude_db", "model_phase_deg"),
+        *("direct_magnitude_db", "direct_phase_deg"),
+    )
 
-    frequency: Array
-    gain: Array
-    model: Array | None
-    direct: Array
-    coherence_input: Array
-    coherence_output: Array
-    random_error: Array
-    averages: Array
-    instrumented: bool
+    instrumented: bool = about("1 where it was estimated with instruments, in all flights")
+    frequency: Array = about("evenly spread on a logarithmic scale", "frequency", unit="Hz")
+    gain: ComplexArray = about(
+        "output over input; not finite where no window identifies it", "frequency", unit="SI", gaps=True, brief=False
+    )
+    model: ComplexArray | None = about(
+        "the same of the model, by the same windows and instruments", "frequency", unit="SI", gaps=True, brief=False
+    )
+    direct: ComplexArray = about("the measured one without instruments", "frequency", unit="SI", gaps=True, brief=False)
+    coherence_input: Array = about("share of the input that the instruments explain; 1 without", "frequency", gaps=True)
+    coherence_output: Array = about(
+        "share of the output that the instruments explain; without, the input", "frequency", gaps=True
+    )
+    random_error: Array = about(
+        "standard error of the measured gain over the gain; in radians that of the phase", "frequency", gaps=True
+    )
+    averages: Array = about("windows that count as independent", "frequency", gaps=True)
+
+    @property
+    def magnitude_db(self) -> Array:
+        """Magnitude of the measured response, dB, shape (frequency,)."""
+        return decibels(self.gain)
+
+    @property
+    def phase_deg(self) -> Array:
+        """Phase of the measured response, from -180 to 180 degrees, shape (frequency,)."""
+        return degrees(self.gain)
+
+    @property
+    def model_magnitude_db(self) -> Array:
+        """The same of the model; NaN without one."""
+        return decibels(np.full_like(self.gain, np.nan) if self.model is None else self.model)
+
+    @property
+    def model_phase_deg(self) -> Array:
+        """The same of the model; NaN without one."""
+        return degrees(np.full_like(self.gain, np.nan) if self.model is None else self.model)
+
+    @property
+    def direct_magnitude_db(self) -> Array:
+        """The same without instruments."""
+        return decibels(self.direct)
+
+    @property
+    def direct_phase_deg(self) -> Array:
+        """The same without instruments."""
+        return degrees(self.direct)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """All that is known by frequency, shape (frequency,), by names with units."""
+        plain = ("coherence_input", "coherence_output", "random_error", "averages")
+        return {name: getattr(self, name) for name in (*FrequencyResponse.SHOWN, *plain)}
 
     @property
     def coherence(self) -> Array:
@@ -119,6 +156,17 @@ class FrequencyResponse:
     def clearness(self) -> Array:
         """The coherence that counts, shape (frequency,)."""
         return clearness(self.coherence, self.random_error, self.averages, self.instrumented)
+
+
+def decibels(gain: Numbers) -> Array:
+    """Give the magnitude of a gain, dB; NaN where it is 0 or not known."""
+    size = np.abs(gain)
+    return np.asarray(20 * np.log10(size, where=size > 0, out=np.full(size.shape, np.nan)))
+
+
+def degrees(gain: Numbers) -> Array:
+    """Give the phase of a gain, from -180 to 180; NaN where it is 0 or not known."""
+    return np.where(np.abs(gain) > 0, np.degrees(np.angle(gain)), np.nan)
 
 
 def frequency_response(stretches: Sequence[Stretch], period: float) -> FrequencyResponse | None:
@@ -134,7 +182,7 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
     Parameters
     ----------
     stretches : sequence of Stretch
-        All with a model, or none; all with as many instruments, or none. One without them beside others that have
+        All with a model, or none; all with as many instruments, or none. One without them among others that have
         some is left out.
     period : float, s
 
@@ -164,10 +212,10 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
     found = []
     for length in lengths:
         fewest = _FEWEST_PERIODS if length == lengths[-1] else _PERIODS
-        told = frequency >= fewest / ((length - 1) * period) * (1 - _ROUNDING)
-        if told.any():
-            analysis = _Analysis.of(length, period, frequency[told])
-            found.append(_spectra(usable, analysis, told, instrumented))
+        known = frequency >= fewest / ((length - 1) * period) * (1 - _ROUNDING)
+        if known.any():
+            analysis = _Analysis.of(length, period, frequency[known])
+            found.append(_spectra(usable, analysis, known, instrumented))
     return _of_spectra(frequency, _composite(found), instrumented)
 
 
@@ -242,20 +290,20 @@ class _Analysis(NamedTuple):
 
 
 class _Spectra(NamedTuple):
-    """Power and cross spectra over windows of one length or several, shape (frequency,); NaN where none tells it."""
+    """Power and cross spectra over windows of one length or several, shape (frequency,); NaN where not known."""
 
     zz: Array
-    zu: Array
-    zy: Array
+    zu: ComplexArray
+    zy: ComplexArray
     uu: Array
     yy: Array
-    uy: Array
-    zm: Array
+    uy: ComplexArray
+    zm: ComplexArray
     averages: Array
 
 
-def _spectra(stretches: Sequence[Stretch], analysis: _Analysis, told: BoolArray, instrumented: bool) -> _Spectra:
-    """Average over windows of one length, at the frequencies that they tell."""
+def _spectra(stretches: Sequence[Stretch], analysis: _Analysis, known: BoolArray, instrumented: bool) -> _Spectra:
+    """Average over windows of one length, at the frequencies that they identify."""
     length = len(analysis.wave)
     long = [stretch for stretch in stretches if len(stretch.input) >= length]
     u = np.concatenate([analysis.of_values(stretch.input) for stretch in long])
@@ -266,11 +314,11 @@ def _spectra(stretches: Sequence[Stretch], analysis: _Analysis, told: BoolArray,
     count = sum(analysis.independent((len(stretch.input) - length) // analysis.hop + 1) for stretch in long)
     whole = []
     for first, second in ((z, z), (z, u), (z, y), (u, u), (y, y), (u, y), (z, m)):
-        values = np.full(len(told), np.nan, dtype=complex)
-        values[told] = (first.conj() * second).mean(axis=0)
+        values = np.full(len(known), np.nan, dtype=complex)
+        values[known] = (first.conj() * second).mean(axis=0)
         whole.append(values)
     zz, zu, zy, uu, yy, uy, zm = whole
-    averages = np.where(told, count, np.nan)
+    averages = np.where(known, count, np.nan)
     return _Spectra(zz.real, zu, zy, uu.real, yy.real, uy, zm, averages)
 
 
@@ -308,12 +356,12 @@ def _composite(found: Sequence[_Spectra]) -> _Spectra:
     if len(found) == 1:
         return found[0]
     error = np.array([_random_error(each) for each in found])
-    told = np.isfinite([each.averages for each in found])
-    known = np.where(told & np.isfinite(error), np.maximum(error, _TINY), np.inf)
+    seen = np.isfinite([each.averages for each in found])
+    known = np.where(seen & np.isfinite(error), np.maximum(error, _TINY), np.inf)
     least = known.min(axis=0)
     # Where no length has a finite error all count alike.
     some = np.isfinite(least)
-    weight = np.where(some, np.where(some, least, 1.0) / known, told) ** 8
+    weight = np.where(some, np.where(some, least, 1.0) / known, seen) ** 8
     weight = weight / np.maximum(weight.sum(axis=0), _TINY)
     joined = (np.where(weight > 0, weight * np.array(values), 0.0).sum(axis=0) for values in zip(*found, strict=True))
     return _Spectra(*joined)

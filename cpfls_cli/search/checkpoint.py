@@ -26,7 +26,7 @@ from cpfls_cli.identification.search import Unfinished
 from cpfls_cli.store import Origin, read
 
 if TYPE_CHECKING:
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.identification.replicates import Sweep
 
 R = TypeVar("R", bound=Record)
@@ -81,7 +81,7 @@ class KeptFile:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedRecord | Sweep | VehicleRecord]]
+    OUTPUT: ClassVar[type[IdentifiedRecord | Sweep | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:

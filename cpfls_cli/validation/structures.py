@@ -190,7 +190,7 @@ class StructureFolds:
 
     def _products(self, settings: StructureSettings) -> tuple[Products, Products] | None:
         structure = model_structure(settings)
-        ranges = data_ranges(structure, np.concatenate([c.attitude for c in self.judged.ready]))
+        ranges = data_ranges(structure, np.concatenate([attitude for attitude, _ in self.judged.ready]))
         partitions = uniform_breakpoints(structure)
         learned, judged = (
             replace(samples, structure=structure, ranges=ranges).products(partitions)

@@ -134,7 +134,7 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
     record = IdentifiedRecord(
         header=Header("0.1.0", 1, yaml.safe_dump(given["config"]), inputs),
         vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=VEHICLE, fuzzy=model)),
-        model=ChosenGroup(base="rigid-body" if model.rigid_body.any() else "none", weights=None, ridge_weight=None),
+        chosen=ChosenGroup(base="rigid-body" if model.rigid_body.any() else "none", weights=None, ridge_weight=None),
         judged=_judged(),
         search=SearchGroup(stop_reason=given["stop_reason"], complete=given["complete"]),
         findings=given["findings"],

@@ -125,25 +125,35 @@ class InC:
         return out[:, :-1]
 
 
-class InPython:
-    """A vehicle as a module of Python."""
+def on_numpy(text):
+    """Run functions for JAX on NumPy, which has all that they call but what batches and differentiates."""
+    names = {"__name__": "vehicle"}
+    with_jax = "import jax\nimport jax.numpy as jnp\n"
+    assert with_jax in text
+    exec(text.replace(with_jax, "import numpy as jnp\n"), names)
+    return names
+
+
+class InJax:
+    """A vehicle as functions for JAX, run on NumPy, one sample after the other."""
 
     def __init__(self, _folder, model):
-        self.names = {"__name__": "vehicle"}
-        with short_runs():
-            exec(python_source(sheet_of_vehicle(model), "vehicle.py"), self.names)
+        self.names = on_numpy(python_source(sheet_of_vehicle(model), "vehicle.py", "jax"))
 
     def wrench(self, air, rate, rotor):
-        return np.hstack(self.names["wrench"](air, rate, rotor))
+        return np.array([self.names["wrench"](*row) for row in zip(air, rate, rotor, strict=True)])
 
     def motion(self, state, rotor, period):
-        accelerations = self.names["accelerations"](state.velocity, state.rotation, state.rate, rotor)
-        return np.hstack(accelerations), flat(self.names["step"](*state, rotor, period))
+        rows = list(zip(flat(state), rotor, strict=True))
+        accelerations = [self.names["accelerations"](*row) for row in rows]
+        return np.array(accelerations), np.array([self.names["step"](*row, period) for row in rows])
 
     def rotor_terms(self, speed, period, hold):
-        rotors = self.names["Rotors"](speed[0], period)
-        following = [None] * len(speed) if hold == "previous" else [*speed[1:], speed[-1]]
-        return np.array([rotors.step(*pair) for pair in zip(speed, following, strict=True)])
+        memory, rows = self.names["rotors_begin"](speed[0], period), []
+        for now, following in zip(speed, [*speed[1:], speed[-1]], strict=True):
+            memory, terms = self.names["rotors_step"](memory, now, following, period, hold == "previous")
+            rows.append(terms)
+        return np.array(rows)
 
 
 class InJson:
@@ -231,4 +241,4 @@ def turn(vector):
     return total
 
 
-FORMS = {"c": InC, "python": InPython, "json": InJson}
+FORMS = {"c": InC, "jax": InJax, "json": InJson}

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.twin import GainsGroup
 from cpfls_cli.commands.twin import record_of
@@ -12,6 +11,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects

@@ -206,20 +206,6 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert summary.count(HEADLINE) == 1
 
 
-def test_a_verified_export_is_held_against_nothing_moves(cpfls, vehicle, flight):
-    result = cpfls("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--json")
-    told = json.loads(result.stdout)
-    assert told["nothing_moves_error"]["body_rate"] > 0
-    # A body ten times as heavy to turn stays where it is.
-    assert told["beats_nothing_moves"] is all(
-        told["target_error"][name] < still for name, still in told["nothing_moves_error"].items()
-    )
-    said = cpfls("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2")
-    good = told["beats_nothing_moves"]
-    assert said.stdout.startswith("BETTER THAN NOTHING MOVES: " if good else "NO BETTER THAN NOTHING MOVES: ")
-    assert HEADLINE in said.stderr
-
-
 def test_two_vehicles_stand_side_by_side(cpfls, config, vehicle, tmp_path):
     record, other = read_any(vehicle), tmp_path / "other.h5"
     numbers = replace(

@@ -85,7 +85,6 @@ LINES = (
     "trend study.yaml flight.h5 flight2.h5 flight3.h5 -o trend --reference 2 --order name --workers 1 --anyway",
     "export vehicle.h5 -o 17.c --format c --name quad --anyway",
     "spread vehicle.h5 -o 18.json --count 3 --seed 2 --anyway",
-    "verify-export vehicle.h5 flight.h5 --format px4 --horizon 0.1 --windows 3 --hold linear",
     "info flight.h5",
     "info --format flight",
     "check flight.h5",

@@ -25,7 +25,6 @@ COMMANDS = (
     "tune",
     "export",
     "spread",
-    "verify-export",
     "report",
     "compare",
     "diagnose",
@@ -53,7 +52,7 @@ def test_help_of_every_command_lists_the_common_options(cpfls, command):
     overriding = {"--set", "--seed"} if "CONFIG" not in result.stdout else set()
     overriding -= {"--seed"} if command == "spread" else set()
     assert all((option in result.stdout) == (option not in overriding) for option in COMMON)
-    assert ("--output" in result.stdout) == (command not in {"verify-export", "info", "check", "config", "effects"})
+    assert ("--output" in result.stdout) == (command not in {"info", "check", "config", "effects"})
 
 
 def test_version_loads_nothing_heavy():

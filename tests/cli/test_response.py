@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.artifacts.response import ResponseRecord
-from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli import store
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.response.flown import Responses
 from tests.builders import vehicle_models
 from tests.builders.studies import VEHICLE
 
@@ -113,22 +114,23 @@ def test_json_tells_curves_and_costs(cpfls, told, folder):
     assert answer["flights"] == ["light.csv"]
     names = ["roll", "pitch", "yaw", "thrust", "rotor speed", "roll rate", "pitch rate", "yaw rate"]
     assert list(answer["responses"]) == names
-    frequency = np.array(answer["frequency_hz"])
     for name, gain in (("roll", 1 / 0.6), ("yaw", 1 / 1.2), ("thrust", 1 / MASS)):
         own = answer["responses"][name]
-        low, high = own["band_hz"]
+        low, high = own["band"]
         assert low < 0.6
         assert high > 8.0
+        frequency = np.array(own["frequency"])
         inside = (frequency > low) & (frequency < 8.0)
         measured = np.array(own["magnitude_db"], dtype=float)[inside]
         assert measured == pytest.approx(20 * np.log10(gain) * np.ones(inside.sum()), abs=0.4)
         assert own["cost"] < 5.0
-    lag = np.array(answer["responses"]["rotor speed"]["phase_deg"], dtype=float)
+    speed = answer["responses"]["rotor speed"]
+    frequency, lag = np.array(speed["frequency"]), np.array(speed["phase_deg"], dtype=float)
     expected = -np.degrees(np.arctan(2 * np.pi * frequency * LAG_S))
     assert np.abs(lag - expected)[(frequency > 0.6) & (frequency < 6.0)].max() < 4.0
     assert cpfls("check", output).exit_code == 0
     assert json.loads(json.dumps(answer)) == answer
-    assert list(read_record(output, ResponseRecord).name) == names
+    assert list(store.read(output, Responses)[0].responses) == names
 
 
 def test_a_body_that_is_heavier_than_stated(told, folder):

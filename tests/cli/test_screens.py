@@ -237,5 +237,5 @@ def _without_caption(table):
 def test_every_command_is_shown(screens):
     commands = set(typer.main.get_command(app).commands)
     # The lines of `look` are counted in test_look.py.
-    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export", "look"}
+    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "look"}
     assert set(screens) == {*NAMES, *OF_MODELS, *OF_OPEN_NUMBERS}

@@ -12,7 +12,6 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import ObserverGroup
-from cpfls_cli.commands import verify_export
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.gusts import Gusts
@@ -346,30 +345,6 @@ def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_con
     words = {"predict": (log, log), "replay": ("vehicle", log)}.get(command, (log,))
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
     assert f"not known in this config, but `cpfls {command}` needs what is null there" in line
-
-
-def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy, monkeypatch):
-    """By Gazebo's equations, which any machine has: what it holds it flies, and what differs is said."""
-    result = cpfls("verify-export", vehicle, noisy, "--format", "sdf", "--windows", "3", "--horizon", "0.1", "--json")
-    assert result.exit_code == 0, result.stderr
-    found = json.loads(result.stdout)
-    assert (found["format"], found["agrees"], found["windows"]) == ("sdf", True, 3)
-    assert max(found["largest"]["equations"].values()) < 1e-6
-    assert found["largest"]["not_held"]["body_rate"] > 0.01
-    assert 0.001 < found["playback_error"]["body_rate"] < found["target_error"]["body_rate"]
-    words = ("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--horizon", "0.05")
-    said = cpfls(*words).stdout
-    assert "Gazebo's motor model flies what was exported, and " in said
-    assert ": 2 runs of 0.05 s along flight.h5" in said
-    monkeypatch.setattr(verify_export, "verified", None)
-    checked = cpfls(*words, "--dry-run")
-    assert (checked.exit_code, checked.stdout.count("would be flown along")) == (0, 1)
-    for more in ([], ["--dry-run"]):
-        (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf", *more)
-        assert line == f"{flight.with_name('none.h5')}: no such file"
-    (export := flight.with_name("exported.sdf")).write_text("<sdf/>")
-    (line,) = refuse("verify-export", export, flight, "--format", "sdf")
-    assert line.startswith(f"{export}: is an export; name the model that it was made from")
 
 
 @pytest.fixture(scope="module")

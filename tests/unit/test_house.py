@@ -194,7 +194,6 @@ SMALL_ALL_THE_SAME = {
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "pages/flight_numbers.py": "the page of an artifact",
-    "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
     "search/vehicle_search.py": "a search for a model does not load what plays a vehicle back",

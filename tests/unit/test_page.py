@@ -144,7 +144,7 @@ def test_a_terminal_shows_the_answer_and_names_what_is_folded():
     assert isinstance(said[5], Table)
     assert (said[5].rows[0][1].tone, said[5].words, said[5].sentences) == ("good", {0, 2}, {2})
     assert said[6] == Folded("More of it", [Text("Inside."), Text("a note inside", "warning")])
-    assert said[7] == Folded("Opened", [Text("Shown.")])
+    assert said[7] == Folded("Opened", [Text("Shown.")], shown=True)
     assert said[-1] == Text("a note", "warning")
     assert not any(isinstance(each, Heading) and each.text in {"Health", "Empty"} for each in said)
 

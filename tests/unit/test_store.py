@@ -9,10 +9,16 @@ import pytest
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.files import seal_of
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.result import about, part, plain, result
+from tests.builders import exported_models
 from tests.builders.results import Craft, craft, estimate
+from tests.builders.vehicle_models import whole
 
 ORIGIN = store.Origin(
     stage="look",
@@ -300,3 +306,32 @@ def test_rows_that_break_their_description_are_found_without_reading_all(tmp_pat
 )
 def test_findings_of_time_and_of_size(own, finding):
     assert finding in store.findings(own)
+
+
+@result
+class Flown:
+    """A model of a vehicle with all its parts: named tuples, settings, values by name, arrays of several lengths."""
+
+    FORMAT: ClassVar = "cpfls/look"
+
+    model: VehicleModel = part()
+
+
+@pytest.mark.parametrize("name", ["cpfls", "zero width, classic"])
+def test_a_model_of_a_vehicle_is_written_with_all_its_parts(tmp_path, name):
+    fault = AuditFinding("gyro_bias", (FaultNumber("b_x", 0.1, "rad/s", 0.0, 0.2, True),), 0.01, True, "biased")
+    audit = Audit((fault, AuditFinding("gyro_scale", (), 1.0, False, "")), {"a": "no attitude"}, (), ("late",))
+    fuzzy = exported_models.model_of(exported_models.CASES.get(name, next(iter(exported_models.CASES.values()))))
+    sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
+    model = whole(fuzzy=fuzzy, repairs=audit, gusts=Gusts(np.ones(6), np.full(6, 0.5)), hold="linear", commanded=True)
+    model = dataclasses.replace(model, effects=(*model.effects, sag))
+    store.write(tmp_path / "m.h5", Flown(model=model), ORIGIN)
+    given = store.read(tmp_path / "m.h5", Flown)[0].model
+    assert (given.vehicle, given.response, given.wind) == (model.vehicle, model.response, model.wind)
+    assert np.array_equal(given.table.weights, model.table.weights)
+    assert [(each.name, each.shape) for each in given.effects] == [(each.name, each.shape) for each in model.effects]
+    assert given.fuzzy.structure == fuzzy.structure
+    assert given.fuzzy.ranges == fuzzy.ranges
+    assert all(map(np.array_equal, given.fuzzy.partitions, fuzzy.partitions))
+    assert repr(given.repairs) == repr(audit)
+    assert plain(given)["effects"][-1] == {"name": "battery_sag", "shape": {"exponent": 1.5}, "coefficients": []}

@@ -14,7 +14,6 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.filters import parabolas
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -228,7 +227,10 @@ def _felt(signals: Signals) -> tuple[Array, Array]:
 
 def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> Array:
     """Fit parabolas to stretches around each sample: a step of the swing is several samples, and noise averages out."""
-    return parabolas(values, max(2, round(_SMOOTHING_S / signals.period)), derivative) / signals.period**derivative
+    from scipy.signal import savgol_filter
+
+    length = 1 + 2 * max(2, round(_SMOOTHING_S / signals.period))
+    return np.asarray(savgol_filter(values, length, 2, derivative, signals.period, axis=0))
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:

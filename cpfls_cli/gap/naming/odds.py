@@ -32,7 +32,7 @@ def more_left(one: Array, other: Array) -> Array:
 def chance_of_ranks(margin: Array) -> float:
     """Compute how likely chance makes such margins over blocks, by the exact signed-rank test of Wilcoxon.
 
-    Equal sizes share their ranks, and what is 0 has none.
+    Equal sizes share their ranks, for which `scipy.stats.wilcoxon` has no exact test, and what is 0 has none.
     """
     differing = margin[margin != 0]
     sizes = np.sort(np.abs(differing))

@@ -1,6 +1,5 @@
 """Models in Python: what the commands write, and steps as the exports take them."""
 
-import importlib.util
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,6 +12,7 @@ from cpfls_cli.artifacts.store import file_sha256, read_record, write_record
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders import vehicle_models
+from tests.builders.exported_vehicles import flat, on_numpy
 from tests.builders.playback_flights import STATED
 
 PERIOD = 0.01
@@ -59,21 +59,18 @@ def test_what_a_command_notes_is_a_warning_of_the_caller(cpfls, pipeline, study,
 
 @pytest.mark.parametrize("hold", ["linear", "previous"])
 def test_a_vehicle_flies_as_its_export_does(whole, speeds, tmp_path, hold):
-    (file,) = whole.to_python(tmp_path / "uav.py")
-    spec = importlib.util.spec_from_file_location("uav", file)
-    uav = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(uav)
+    (file,) = whole.to_jax(tmp_path / "uav.py")
+    uav = on_numpy(file.read_text())
     begin = whole.state((0, 0, 1), (1, -2, 0.5), (0.2, -0.3, 1.0), (0.5, 0.1, -0.4))
     flown = whole.fly(begin, speeds, PERIOD, hold)
-    rotors, state = uav.Rotors(speeds[0], PERIOD), [part[0] for part in begin]
+    memory, state = uav["rotors_begin"](speeds[0], PERIOD), flat(begin)[0]
     for now, following in pairwise(speeds):
-        state = uav.step(*state, rotors.step(now, following if hold == "linear" else None), PERIOD)
-    for ours, theirs in zip(flown, state, strict=True):
-        assert len(ours) == len(speeds)
-        np.testing.assert_allclose(ours[-1], theirs, rtol=1e-10, atol=1e-10)
-    after = whole.step(begin, speeds[0], PERIOD)
-    for ours, theirs in zip(after, uav.step(*begin, uav.steady(speeds[0]), PERIOD), strict=True):
-        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+        memory, terms = uav["rotors_step"](memory, now, following, PERIOD, hold == "previous")
+        state = uav["step"](state, terms, PERIOD)
+    assert len(flown.rate) == len(speeds)
+    np.testing.assert_allclose(flat(flown)[-1], state, rtol=1e-10, atol=1e-10)
+    after = uav["step"](flat(begin)[0], uav["steady"](speeds[0]), PERIOD)
+    np.testing.assert_allclose(flat(whole.step(begin, speeds[0], PERIOD))[0], after, rtol=1e-12, atol=1e-12)
 
 
 def test_many_vehicles_step_side_by_side(whole, speeds):

@@ -10,7 +10,9 @@ from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 
 HOVER = ("--hover", "8", "--excite", "roll,pitch", "--band", "0.7,3", "--size", "2", "--repeat", "4")
@@ -49,9 +51,9 @@ def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_p
     flight = tmp_path / "flight.h5"
     result = cpfls("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
     assert result.exit_code == 0, result.output
-    planned, flown = read_record(mission[0], TrajectoryRecord), read_record(flight, FlightRecord)
-    firsts = np.rint(planned.run.begin / planned.time[1]).astype(int)
-    length = round(planned.run.end[0] / planned.time[1]) + 1
+    planned, flown = read(mission[0], PlannedPath)[0], read_record(flight, FlightRecord)
+    firsts = [round(run.begin / planned.time[1]) for run in planned.runs]
+    length = round(planned.runs[0].end / planned.time[1]) + 1
     for name in ("attitude", "body_rate", "rotor_speed", "velocity"):
         runs = np.array([getattr(flown, name)[first : first + length] for first in firsts])
         spread = np.abs(runs - runs.mean(axis=0)).max()
@@ -102,8 +104,8 @@ def test_a_next_flight_is_repeated_too(cpfls, config, tmp_path):
     words = ("--to-tell", "com_offset,torque_bias", "--duration", "10", "--box", "5,4,3", "--height", "3", *few)
     result = cpfls("trajectory", config, *words, "--repeat", "2", "-o", tmp_path / "n.h5")
     assert result.exit_code == 0, result.output
-    record = read_record(tmp_path / "n.h5", TrajectoryRecord)
-    np.testing.assert_allclose(record.run.begin, [0.0, 14.0])
+    record = read(tmp_path / "n.h5", PlannedPath)[0]
+    np.testing.assert_allclose([run.begin for run in record.runs], [0.0, 14.0])
     length = round(10.0 / 0.02) + 1
     np.testing.assert_allclose(record.position[700 : 700 + length], record.position[:length], atol=1e-9)
 
@@ -118,7 +120,7 @@ def test_what_flights_that_show_the_loop_advise_is_planned_for_numbers_that_nobo
     result = cpfls(*words)
     assert program == "cpfls"
     assert result.exit_code == 0, result.output
-    assert len(read_record(tmp_path / "mission.h5", TrajectoryRecord).run.begin) == 4
+    assert len(read(tmp_path / "mission.h5", PlannedPath)[0].runs) == 4
     assert "inertia: null in the config; what the path asks of the rotors was checked with guesses" in result.stderr
 
 

@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 
 SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")
@@ -38,7 +38,7 @@ def planned(cpfls, config, tmp_path_factory):
 
 
 def test_the_flight_keeps_to_the_box_and_starts_and_ends_at_rest(planned):
-    record = read_record(planned[0], TrajectoryRecord)
+    record = read(planned[0], PlannedPath)[0]
     assert record.time[-1] == pytest.approx(10.0)
     assert (np.abs(record.position - [0, 0, 3]) <= np.array([2.5, 2.0, 1.5]) + 1e-6).all()
     for values in (record.velocity, record.acceleration, record.body_rate):
@@ -58,8 +58,8 @@ def test_each_question_is_answered_both_ways_and_beside_other_flights(planned):
 
 
 def test_waypoints_are_the_path(planned):
-    record = read_record(planned[0], TrajectoryRecord)
-    with open(planned[1]["waypoints"], newline="") as file:
+    record = read(planned[0], PlannedPath)[0]
+    with open(planned[1]["files"][0], newline="") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     assert len(rows) == 101
     for row in rows[::20]:
@@ -83,7 +83,7 @@ def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, config, 
     page = cpfls("report", config, planned[0], "-o", tmp_path / "page.md")
     assert page.exit_code == 0, page.output
     text = (tmp_path / "page.md").read_text().replace("\\_", "_")
-    assert "This flight tells offset of the centre of mass from constant torque" in text
+    assert "This flight separates offset of the centre of mass from constant torque" in text
     assert "If the diagnosis then names com_offset alone, it is com_offset and not torque_bias" in text
 
 

@@ -53,7 +53,7 @@ def hostile(*texts):
 
 
 plain = c_source(hostile(*["x"] * 6), "vehicle")
-plain_python = ast.parse(python_source(hostile(*["x"] * 6), "x")).body
+plain_python = ast.parse(python_source(hostile(*["x"] * 6), "x", "jax")).body
 texts = st.tuples(*[nasty] * 6)
 few = settings(max_examples=25, deadline=None)
 
@@ -69,7 +69,7 @@ def test_the_code_of_c_is_the_same_whatever_the_text(given_texts):
 @few
 @given(texts)
 def test_python_still_parses_to_the_same_statements(given_texts):
-    code = python_source(hostile(*given_texts), given_texts[3])
+    code = python_source(hostile(*given_texts), given_texts[3], "jax")
     assert code.isascii()
     body = ast.parse(code).body
     verdicts = [node for node in body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "VERDICT"]

@@ -4,9 +4,9 @@ from dataclasses import astuple
 
 import numpy as np
 
-from benchmarks.shared.exact_move import integrated
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
 from cpfls_cli.trajectory.moves import plan_moves
+from tests.builders.exact_move import integrated
 
 
 def test_samples_are_the_integral_of_the_pop():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.shared.brute_force import shortest_duration
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
 from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
+from tests.builders.brute_force import shortest_duration
 
 
 @pytest.mark.parametrize("chosen", [True, False], ids=["chosen-period", "given-period"])

@@ -6,7 +6,6 @@ their value about pitch. Derivatives by the breakpoints are compared in `tests/u
 """
 
 import re
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,7 +26,7 @@ from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structu
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.compiled_c import evaluate, require_gcc, written
 from tests.builders.exported_models import Case, model_of, sheet_of
-from tests.builders.exported_vehicles import FORMS
+from tests.builders.exported_vehicles import FORMS, on_numpy
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"
 FUNCTIONS = 6
@@ -91,8 +90,10 @@ def test_the_compiled_loops(case):
     breakpoints = padded_breakpoints(case.model.partitions)
     table = structure_table(structure, case.model.ranges)
     inputs = mapped_inputs(table, case.motion.attitude)
-    chunk = kernels.Chunk(*vars(case.motion).values(), np.tile(np.eye(3), (samples, 1, 1)), inputs)
-    kernels.add_gram(table, breakpoints, chunk, np.ones(3), np.arange(samples), gram, rows)
+    axes = np.tile(np.eye(3), (samples, 1, 1))
+    chunk = kernels.Chunk(kernels.motion_lines(case.motion.rate, case.motion.acceleration, axes), inputs)
+    runs = kernels.runs_of(table, breakpoints, inputs)
+    kernels.add_gram(table, breakpoints, chunk, runs, np.ones(3), np.arange(samples), gram, rows)
     assert_same(rows.swapaxes(1, 2) @ case.model.coefficients, case)
     dense = Regressor(structure, case.motion, case.model.ranges).matrix(case.model.partitions)
     np.testing.assert_allclose(rows.swapaxes(1, 2), dense, rtol=0, atol=1e-12 * np.max(np.abs(dense)))
@@ -105,12 +106,9 @@ def test_the_exported_c(case, tmp_path):
 
 
 def test_the_exported_python(case):
-    names = {"__name__": "vehicle"}
-    exec(python_source(sheet_of(case.model), "vehicle.py"), names)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torque, _ = names["torque"](*vars(case.motion).values())
-    assert_same(torque, case)
+    torque = on_numpy(python_source(sheet_of(case.model), "vehicle.py", "jax"))["torque"]
+    found = [torque(*motion)[0] for motion in zip(*vars(case.motion).values(), strict=True)]
+    assert_same(np.array(found), case)
 
 
 @pytest.fixture

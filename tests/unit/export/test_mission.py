@@ -1,15 +1,17 @@
 """A path for autopilots: CSV as it is flown, a plan as QGroundControl reads it, parameters as ground stations do."""
 
 import json
+from dataclasses import replace
 from math import cos, degrees, pi, radians, tan
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mission import Home, qgc_plan, system_id_lines, waypoint_lines
+from cpfls_cli.flights.path import Excited, PlannedPath
 from cpfls_cli.gap.next_flight.room import harmonic_trajectory, random_path
+from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.simulation.room_left import room_left
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan
@@ -29,16 +31,20 @@ SQUARE = TrajectorySettings(
 )
 
 
+def path_of(planned, settings, **more):
+    return PlannedPath.of(planned, flyability(vars(planned), VEHICLE, settings.tilt_max_rad), settings, **more)
+
+
 def excited(settings):
     path = plan(settings, GRAVITY)
     room = room_left(path, added_motion(settings.excite, path, GRAVITY), settings, VEHICLE)
     flown, without = (repeated(each, settings, GRAVITY) for each in (room.added.onto(path, GRAVITY), path))
-    return TrajectoryRecord.of(flown, excited=ExcitedGroup.of(settings.excite, flown, without, room))
+    return path_of(flown, settings, excited=Excited.of(settings.excite, flown, without, room))
 
 
 @pytest.fixture(scope="module")
 def square():
-    return TrajectoryRecord.of(repeated(plan(SQUARE, GRAVITY), SQUARE, GRAVITY))
+    return path_of(repeated(plan(SQUARE, GRAVITY), SQUARE, GRAVITY), SQUARE)
 
 
 @pytest.fixture(scope="module")
@@ -124,12 +130,12 @@ def test_the_plan_flies_the_runs_from_point_to_point(square):
 def test_a_plan_that_no_mission_flies_is_refused(square, shaken):
     with pytest.raises(InputError, match="holds no excitation"):
         qgc_plan(shaken, HOME)
-    below = TrajectoryRecord(**{**vars(square), "position": square.position - [0, 0, 4.0]})
+    below = replace(square, position=square.position - [0, 0, 4.0])
     with pytest.raises(InputError, match=r"0\.5 m above take-off is too low: the path descends to -3\.5 m"):
         qgc_plan(below, Home(0.0, 0.0, 0.5))
     curve = harmonic_trajectory(random_path(10.0, 1.0, 5, np.random.default_rng(1)).scaled(0.1), 0.02, GRAVITY)
     with pytest.raises(InputError, match="this path is a curve"):
-        qgc_plan(TrajectoryRecord.of(curve), HOME)
+        qgc_plan(path_of(curve, SQUARE), HOME)
 
 
 def parameters(text):
@@ -175,7 +181,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
     time = np.arange(0, 20.0, 0.0025)
     rate = chirp_of(given, time)
     angle = np.cumsum(rate) * 0.0025
-    assert np.abs(angle - angle.mean()).max() == pytest.approx(degrees(shaken.excited.size[0]), rel=0.15)
+    assert np.abs(angle - angle.mean()).max() == pytest.approx(degrees(shaken.excited.size_rad[0]), rel=0.15)
     power = np.abs(np.fft.rfft(rate)) ** 2
     frequency = np.fft.rfftfreq(len(time), 0.0025)
     inside = (frequency > 0.3) & (frequency < 2.2)
@@ -185,7 +191,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
 def test_thrust_is_a_share_of_the_largest(shaken):
     given = parameters(system_id_lines(shaken.excited, "vertical", 20.0, 0.3))
     assert given["SID_AXIS"] == 13
-    assert given["SID_MAGNITUDE"] == pytest.approx(0.3 * tan(shaken.excited.size[1]), rel=1e-5)
+    assert given["SID_MAGNITUDE"] == pytest.approx(0.3 * tan(shaken.excited.size_rad[1]), rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_flight, sized
-from cpfls_cli.export.registry import TARGETS, exported, require_package
-from cpfls_cli.export.verify import AGREES, verified
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.export.registry import TARGETS, exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
@@ -18,6 +16,7 @@ from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import HEXA, QUAD, whole
+from tests.builders.verified_exports import AGREES, verified
 
 LIBRARIES = ("casadi", "jax")
 SIMULATORS = [form for form in TARGETS if form not in LIBRARIES]
@@ -157,23 +156,6 @@ def test_six_rotors_are_too_many_for_rotorpy_alone():
         exported(sheet_of_vehicle(model), "rotorpy", "v.py")
     _, found = fly("mjcf", replace(model, remainder=None, response=RotorResponse()), 4, 2)
     assert found.agrees
-
-
-def test_a_flight_that_an_export_cannot_be_flown_along_is_refused():
-    model = truth()
-    made = exported(sheet_of_vehicle(model), "mjcf", "v.xml")
-    flight: PlaybackFlight = probe_flight(model)
-    pair = flight, player_of(model, flight)
-    with pytest.raises(InputError, match="has no rotor speeds, which drive an exported vehicle"):
-        verified("mjcf", made, replace(flight, wrench=np.zeros((len(flight), 6))), pair, 4, 2)
-    with pytest.raises(InputError, match="lacks attitude or velocity, but the vehicle depends on its velocity"):
-        verified("mjcf", made, replace(flight, has_velocity=False), pair, 4, 2)
-
-
-def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
-    monkeypatch.setitem(TARGETS, "mjcf", replace(TARGETS["mjcf"], package="no_such_simulator"))
-    with pytest.raises(InputError, match=r'needs the package no_such_simulator; pip install "cpfls\[simulators\]"'):
-        require_package("mjcf")
 
 
 def test_jax_differentiates_and_batches():

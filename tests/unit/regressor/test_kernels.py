@@ -55,6 +55,7 @@ def case(request):
     assert zero_width == any(np.any(np.diff(part) == 0) for part in partitions)
     table = structure_table(structure, regressor.ranges)
     dense = rng.standard_normal((SAMPLES, 3, DENSE))
+    breakpoints, inputs = padded_breakpoints(partitions), mapped_inputs(table, attitude)
     return SimpleNamespace(
         regressor=regressor,
         partitions=partitions,
@@ -62,8 +63,9 @@ def case(request):
         Q=regressor.matrix(partitions) * SCALE[:, None],
         arguments=(
             table,
-            padded_breakpoints(partitions),
-            kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, dense, mapped_inputs(table, attitude)),
+            breakpoints,
+            kernels.Chunk(kernels.motion_lines(motion.rate, motion.acceleration, dense), inputs),
+            kernels.runs_of(table, breakpoints, inputs),
             SCALE,
         ),
         label=np.sort(rng.integers(0, LABELS, SAMPLES)),
@@ -130,11 +132,12 @@ def test_neighbours_that_fire_other_rules_are_told_apart():
     partitions = uniform_breakpoints(structure)
     gram, moment = np.zeros((1, structure.parameters, structure.parameters)), np.zeros((1, structure.parameters, 1))
     table = structure_table(structure, regressor.ranges)
-    inputs = mapped_inputs(table, motion.attitude)
+    breakpoints, inputs = padded_breakpoints(partitions), mapped_inputs(table, motion.attitude)
     kernels.add_gram(
         table,
-        padded_breakpoints(partitions),
-        kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, np.zeros((26, 3, 1)), inputs),
+        breakpoints,
+        kernels.Chunk(kernels.motion_lines(motion.rate, motion.acceleration, np.zeros((26, 3, 1))), inputs),
+        kernels.runs_of(table, breakpoints, inputs),
         np.ones(3),
         np.zeros(26, dtype=np.int64),
         gram,

@@ -9,7 +9,6 @@ from math import ceil
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import InputError
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import TARGETS, Exported
@@ -72,7 +71,6 @@ def verified(
 
     At most so many windows are spread over the flight; the export flies in the wind that the playback says.
     """
-    _require(flight, exported.held)
     flight = in_the_air(flight, model[1].wind)
     found = flight.starts(horizon, 1)
     starts = found[np.unique(np.linspace(0, len(found) - 1, windows).round().astype(int))]
@@ -111,18 +109,6 @@ def _still(course: Course) -> Array:
     """Compare states that stay as they were with what was measured, shape (run, horizon, 4, 3)."""
     begin = (values[course.starts] for values in course.flight.motion[:4])
     return course.errors(State(*(np.repeat(values[:, None], course.horizon, axis=1) for values in begin)))
-
-
-def _require(flight: PlaybackFlight, held: Held) -> None:
-    if flight.wrench is not None:
-        raise InputError(
-            f"{flight.name}: has no rotor speeds, which drive an exported vehicle; verify along a flight that has them"
-        )
-    if not flight.translates and held.table.feels_air:
-        raise InputError(
-            f"{flight.name}: lacks attitude or velocity, but the vehicle depends on its velocity through the air; "
-            "verify along a flight that has both"
-        )
 
 
 def _largest(errors: Array) -> Array:

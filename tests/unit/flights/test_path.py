@@ -4,18 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
+from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def trajectory(**settings):
-    return TrajectoryRecord.of(plan(TrajectorySettings(**settings), 9.81))
+    asked = TrajectorySettings(**settings)
+    planned = plan(asked, 9.81)
+    return PlannedPath.of(planned, flyability(vars(planned), VehicleSettings(), asked.tilt_max_rad), asked)
 
 
 def test_the_paper_s_move_shows_its_printed_maxima():
-    peaks = trajectory().peaks()
+    peaks = {peak.name: peak.largest for peak in trajectory().peaks}
     printed = {"pop": 2 * np.pi, "crackle": 2, "snap": 1, "jerk": 1, "acceleration": 2, "velocity": 8}
     assert peaks == pytest.approx({**printed, "displacement": 64}, rel=1e-3)
 
@@ -37,6 +41,6 @@ def test_the_first_leg_of_a_path_through_waypoints_ends_at_the_second_point():
 
 
 def test_a_file_that_does_not_know_its_legs_shows_the_whole_path():
-    leg = replace(trajectory(), leg=None).first_leg()
+    leg = replace(trajectory(), legs=()).first_leg()
     assert len(leg.time) == 5487
     assert leg.curves["displacement"].max() == pytest.approx(64.0)

@@ -1,0 +1,158 @@
+"""What pages of playback ask Python for: figures of errors by horizon, and words for pages that are no templates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli import page
+from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.playback.errors import (
+    AFTER,
+    BEFORE,
+    MODEL,
+    NOTHING_MOVES,
+    RATE_FADES,
+    RATE_STAYS,
+    STATED,
+    WITH_PAST,
+    ByHorizon,
+    Region,
+)
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, line, plot, stacked, style_of
+from cpfls_cli.report.content import Plot, Table, Text
+from cpfls_cli.rounding import less
+from cpfls_cli.words import joined
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WHO = {
+    MODEL: "the model",
+    AFTER: "with the effects",
+    NOTHING_MOVES: "nothing moves",
+    RATE_STAYS: "rate stays",
+    RATE_FADES: "rate fades",
+    STATED: "stated vehicle",
+    BEFORE: "as given",
+    WITH_PAST: "with the past",
+}
+"""What is said of predictions, in the order in which they are shown."""
+
+SIGNALS = {
+    "body_rate": ("body rate", "rad/s", 1.0),
+    "attitude": ("attitude", "°", 180.0 / np.pi),
+    "velocity": ("velocity", "m/s", 1.0),
+    "position": ("position", "m", 1.0),
+}
+"""Of each signal its name, the unit that people read, and by what errors in SI are multiplied for it."""
+
+_JUDGED: dict[str, Any] = {**style_of(0), "linewidth": 2.0, "zorder": 3}
+_AS_STATED: dict[str, Any] = {"color": GREY, "linestyle": "-", "linewidth": 0.9}
+_STYLES = {
+    MODEL: _JUDGED,
+    AFTER: _JUDGED,
+    NOTHING_MOVES: HELD,
+    RATE_STAYS: BASELINE,
+    RATE_FADES: {"color": GREY, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.2},
+    STATED: _AS_STATED,
+    BEFORE: _AS_STATED,
+    WITH_PAST: {**style_of(2), "linewidth": 2.0, "zorder": 4},
+}
+_STRETCHES = 2
+
+
+def spans(horizon: Array, better: BoolArray) -> str:
+    """Say at which horizons something holds: at the longest stretches of them, where they are many."""
+    if better.all():
+        return f"every horizon to {horizon[-1]:.3g} s"
+    longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_STRETCHES])
+    ends = [(horizon[first], horizon[after - 1]) for first, after in longest]
+    return joined([" to ".join(f"{end:.3g} s" for end in dict.fromkeys(each)) for each in ends])
+
+
+WORDS: Mapping[str, Any] = {
+    "contradicted": contradicted,
+    "less": less,
+    "moves": lambda signal, r: r.moves(signal),
+    "signal_words": lambda signal: SIGNALS[signal][0],
+    "signals": SIGNALS,
+    "spans": spans,
+    "who": WHO,
+    "wins": lambda signal, r: r.wins(signal),
+}
+"""What templates of playback know (`by_horizon.md.j2`, `trust.md.j2`)."""
+
+
+def draw_errors(r: ByHorizon, figure: Figure, left_out: Sequence[str] = ()) -> None:
+    """Draw the mean error over the horizon, of a model and of what it has to beat."""
+    panels = stacked(figure, len(r.signals))
+    for axes, signal in zip(panels, r.signals, strict=True):
+        words, unit, scale = SIGNALS[signal]
+        shown = [name for name in WHO if name in r.models and name not in left_out]
+        for name in reversed(shown):
+            line(axes, r.horizon_s, scale * r.of(name, signal).mae, label=WHO[name], **_STYLES[name])
+        tops = {name: scale * float(r.of(name, signal).mae.max()) for name in r.models}
+        top = 1.6 * max(tops[name] for name in (r.judged, *r.rivals))
+        axes.set_ylim(0.0, min(top, 1.06 * max(tops.values())) or 1.0)
+        axes.set_title(f"{words}, {unit}")
+    panels[-1].set_xlabel("horizon, s")
+    legend_over(figure, panels[0])
+
+
+def errors_height(r: ByHorizon) -> float:
+    """Give the height of the figure of errors, inch."""
+    return 0.9 + 1.7 * len(r.signals)
+
+
+ERRORS = "Mean error by horizon, of the model and of what it has to beat"
+"""What the figure of errors shows."""
+
+
+def playback_figure(name: str, r: ByHorizon, played: str) -> Plot | None:
+    """Draw the mean error over the horizon; None of a single one, or of flights that show no motion."""
+    if not any(map(r.moves, r.signals)) or len(r.horizon_s) < 2:
+        return None
+    caption = (
+        f"Mean error of {played} after so many seconds without correction. Grey: what it has to "
+        "beat. A curve that leaves the top of a panel is farther off than the panel is high."
+    )
+    return plot(name, caption, ERRORS, errors_height(r), partial(draw_errors, r))
+
+
+def _said(part: str, r: ByHorizon | None, **more: Any) -> list[str]:
+    blocks = page.blocks(page.words("playback_words", r, added=WORDS, part=part, **more))
+    return [block.text for block in blocks if isinstance(block, Text)]
+
+
+def against_rivals(r: ByHorizon | None) -> list[str]:
+    """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
+    return [] if r is None else _said("rivals", r)
+
+
+def trust_sentences(
+    word: str, r: ByHorizon | None, better: Region | None, contradictions: Sequence[str] | None
+) -> list[str]:
+    """Say what a model is good for, to which horizon, and where; by playback along flights held out alone."""
+    return _said("trust", r, word=word, better=better, contradictions=contradictions)
+
+
+def lost_words(r: ByHorizon) -> list[str]:
+    """Say where a model loses to what knows no model: where control lives, or in motion over all horizons."""
+    text = page.words("playback_words", r, added=WORDS, part="lost")
+    return text.strip().split("\n") if text.strip() else []
+
+
+def with_past_words(r: ByHorizon, past_s: float) -> list[str]:
+    """Say how much smaller errors are where the flight before each start is known as well, in one sentence, if any."""
+    return _said("past", r, past_s=past_s)
+
+
+def errors_table(name: str, r: ByHorizon, played: str, windows: int, flights: Sequence[str]) -> list[Text | Table]:
+    """Show the errors of all predictions after the first horizon, a fifth of the longest, the longest; and sums."""
+    text = page.words("playback_words", r, added=WORDS, part="table", played=played, windows=windows, flights=flights)
+    return [block for block in page.blocks(text, prefix=f"{name}-") if isinstance(block, Text | Table)]

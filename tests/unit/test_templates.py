@@ -1,0 +1,137 @@
+"""Templates have no types: each variable, filter and attribute of a result that one names has to exist."""
+
+import dataclasses
+from functools import cached_property
+from types import NoneType
+from typing import get_args, get_origin, get_type_hints
+
+import pytest
+from jinja2 import nodes
+
+from cpfls_cli.cli.stages import STAGES, stage_commands
+from cpfls_cli.page import TEMPLATES, environment
+from cpfls_cli.report.source import Source
+from cpfls_cli.result import described_fields
+from cpfls_cli.stage import loaded
+
+NAMES = sorted(file.stem for file in STAGES.glob("[a-z]*.py"))
+GIVEN = {"r", "source", "loop", "caller"}
+SAME_ROWS = {"first", "last", "list", "sort", "selectattr", "rejectattr"}
+CONTEXTS = ("load", "store", "param")
+
+
+def inner(hint):
+    """Class of what a field holds: a result, or the rows of a table of results; None for others, mappings too."""
+    parts = get_args(hint) if NoneType in get_args(hint) else (hint,)
+    for kind in parts:
+        if dataclasses.is_dataclass(kind):
+            return kind
+        if get_origin(kind) is tuple and dataclasses.is_dataclass(get_args(kind)[0]):
+            return get_args(kind)[0]
+    return None
+
+
+def attribute(kind, name):
+    """Type of an attribute of a class, None where it is nothing of ours; what does not exist is an error."""
+    hints = get_type_hints(kind)
+    if name in hints:
+        return inner(hints[name])
+    own = getattr(kind, name, None)
+    assert own is not None, f"{kind.__name__} has no {name}"
+    made = own.fget if isinstance(own, property) else own.func if isinstance(own, cached_property) else None
+    return inner(get_type_hints(made).get("return")) if made else None
+
+
+class Walk:
+    """Follow results through a template: from ``r`` along attributes, loops and assignments."""
+
+    def __init__(self, kind):
+        self.known, self.seen = {"r": kind, "source": Source}, 0
+
+    def kind(self, node):
+        """Class of what an expression gives, or None."""
+        if isinstance(node, nodes.Name):
+            return self.known.get(node.name)
+        if isinstance(node, nodes.Getattr):
+            kind = self.kind(node.node)
+            if kind is None:
+                return None
+            self.seen += 1
+            return attribute(kind, node.attr)
+        if isinstance(node, nodes.Getitem):
+            return self.kind(node.node)
+        if isinstance(node, nodes.Filter) and node.name in {
+            "first",
+            "last",
+            "list",
+            "sort",
+            "selectattr",
+            "rejectattr",
+        }:
+            return self.kind(node.node) if node.node is not None else None
+        return None
+
+    def __call__(self, node):
+        """Look at a node and all in it, names of a loop or an assignment first."""
+        if isinstance(node, nodes.For) and isinstance(node.target, nodes.Name):
+            self.known[node.target.name] = self.kind(node.iter)
+        if isinstance(node, nodes.Assign) and isinstance(node.target, nodes.Name):
+            self.known[node.target.name] = self.kind(node.node)
+        if isinstance(node, nodes.Macro):
+            # Its arguments may be anything.
+            self.known |= {argument.name: None for argument in node.args}
+        if isinstance(node, nodes.Call) and isinstance(node.node, nodes.Name) and node.node.name == "column":
+            rows, name = node.args[:2]
+            kind = self.kind(rows)
+            if kind is not None and isinstance(name, nodes.Const):
+                attribute(kind, name.value)
+        self.kind(node)
+        for child in node.iter_child_nodes():
+            self(child)
+
+
+def imported(tree):
+    """Names that a template imports from others."""
+    named = [each for own in tree.find_all(nodes.FromImport) for each in own.names]
+    return {each if isinstance(each, str) else each[1] for each in named} | {
+        own.target for own in tree.find_all(nodes.Import)
+    }
+
+
+def templates(name):
+    """Templates of a stage, by the names of their files."""
+    return sorted(path.name for path in TEMPLATES.glob(f"{name}*.md.j2"))
+
+
+def test_each_stage_has_a_template_and_each_template_a_stage():
+    assert sorted(name.replace("-", "_") for name in stage_commands()) == NAMES
+    assert [name for name in NAMES if f"{name}.md.j2" not in templates(name)] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_templates_name_exists(name):
+    stage = loaded(name)
+    own = environment(TEMPLATES, stage.words)
+    for template in templates(name):
+        text, _, _ = own.loader.get_source(own, template)
+        # Filters and tests that do not exist are refused here.
+        own.compile(text)
+        tree = own.parse(text)
+        names = {context: {n.name for n in tree.find_all(nodes.Name) if n.ctx == context} for context in CONTEXTS}
+        made = names["store"] | names["param"] | {macro.name for macro in tree.find_all(nodes.Macro)} | imported(tree)
+        assert names["load"] - made - GIVEN - own.globals.keys() == set(), template
+        if template == f"{name}.md.j2":
+            walk = Walk(stage.kind)
+            walk(tree)
+            assert walk.seen, "it shows nothing of its result"
+
+
+def test_a_name_that_does_not_exist_is_found():
+    kind = loaded("reduce").kind
+    own = environment(TEMPLATES)
+    with pytest.raises(AssertionError, match="has no selektion"):
+        Walk(kind)(own.parse("{{ r.selektion }}"))
+    look = loaded("look").kind
+    field = next(each for each in described_fields(look) if each.table)
+    with pytest.raises(AssertionError, match="has no nothing"):
+        Walk(look)(own.parse(f"{{% for row in r.{field.name} %}}{{{{ row.nothing }}}}{{% endfor %}}"))
