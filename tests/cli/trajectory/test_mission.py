@@ -5,7 +5,6 @@ import shlex
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.store import read_record
