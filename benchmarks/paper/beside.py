@@ -19,8 +19,8 @@ from benchmarks.paper.printed import (
     TABLE_5,
     PrintedColumn,
 )
-from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.identification.replicates import Setting
+from cpfls_cli.identification.scores import MODEL, TRAINING, Judged
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
 from cpfls_cli.stages.sweep import joined_sweeps
@@ -135,7 +135,7 @@ def _scale_sentence(sources: PaperSources) -> str:
     )
 
 
-def _largest_torque(judged: JudgedGroup) -> float:
+def _largest_torque(judged: Judged) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = judged.of_axes("max_error", MODEL, TRAINING) / judged.of_axes("relative_error", MODEL, TRAINING)
     return float(np.max(torque[np.isfinite(torque)], initial=0.0))

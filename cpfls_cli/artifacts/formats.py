@@ -12,7 +12,6 @@ from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
     ("cpfls/flight", ""): "flight.FlightRecord",
-    ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/twin", ""): "twin.TwinRecord",

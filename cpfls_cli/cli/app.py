@@ -13,7 +13,6 @@ import typer
 from cpfls_cli.arguments import (
     ArtifactsArgument,
     AutopilotChoice,
-    ChooseOnOption,
     DiagnosisArgument,
     DisagreementArgument,
     ExportAnywayOption,
@@ -29,13 +28,8 @@ from cpfls_cli.arguments import (
     LogsArgument,
     ModelArgument,
     ModelOption,
-    ResumeOption,
     SchedulerOption,
-    TimeLimitOption,
     TimeOrder,
-    TrainingArgument,
-    ValidateOption,
-    WorkersOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -211,35 +205,6 @@ def init(
 def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, common: Common) -> None:
     """Turn a flight log into a flight."""
     _run("import", config, output, common, lambda command, job: command.run(job, log))
-
-
-@_command()
-def identify(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    selection: Annotated[
-        Path | None,
-        typer.Option(
-            "--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."
-        ),
-    ] = None,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeOption = False,
-    time_limit: TimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify a model from one or more flights and judge it beside its baselines."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, selection, validate or [], options, choose_on or [])
-
-    _run("identify", config, output, common, call)
 
 
 @_command()

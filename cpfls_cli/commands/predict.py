@@ -10,9 +10,8 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.evidence import UncertaintyGroup
 from cpfls_cli.artifacts.flight import CLOCK, ClockGroup, FlightRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
@@ -34,7 +33,7 @@ from cpfls_cli.flights.flight_source import (
     torque_source_of,
 )
 from cpfls_cli.flights.inputs import hashes_of
-from cpfls_cli.flights.models import any_model, is_found, modelled, read_model
+from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -58,7 +57,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     inputs = begin(job, {"model": model, "flight": flight})
     job = with_numbers(job, "predict", model, whole=is_found(model))
     record = any_model(model)
-    identified = record if isinstance(record, IdentifiedRecord) else None
+    identified = record if isinstance(record, IdentifiedModel) else None
     findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
     seen = seen_words(record, hashes_of(flight, inputs["flight"]))
     said = [Text(contradicted(each), "warning") for each in wrong]
@@ -72,25 +71,16 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         finish_parts(job, _on_clock(parts, stretches.begins), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(findings)))
-    functions = modelled(model, identified).fuzzy
-    assert isinstance(functions, InertiaFunctions), "what is identified"
+    functions = identified.functions
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    draws = _draws(identified.uncertainty)
-    parts = _along(functions, draws, flown, torque, findings, job.progress)
+    parts = _along(functions, identified.uncertainty, flown, torque, findings, job.progress)
     finish_parts(job, _on_clock(parts, read_number(flight, CLOCK)), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*unjudged(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
-
-
-def _draws(drawn: UncertaintyGroup | None) -> Draws | None:
-    """Give the bootstrap draws behind the bands of a model; None for a model without."""
-    if drawn is None:
-        return None
-    return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
 
 
 def _on_clock(parts: Iterator[PredictionRecord], begins: float) -> Iterator[PredictionRecord]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.identification.scores import AXES
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import legend_above, line, plot, stacked, style_of

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.parameters import FOUND_AS, name_of
 from cpfls_cli.artifacts.vehicle_model import Vehicle
@@ -41,8 +41,6 @@ class _Kind(NamedTuple):
     cautions: Callable[[Any], Iterator[str]]
 
 
-_PAGES = {"identified": "identification", "extended": "extended"}
-"""Modules of `pages` by the kind of a model; one is loaded when a model of its kind is met."""
 _REASONS = 3
 
 
@@ -66,7 +64,7 @@ WORDS: Mapping[str, Any] = {
 
 
 def _kind_of(record: Any) -> _Kind:
-    own = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
+    own = import_module(f"cpfls_cli.pages.{'identification' if isinstance(record, IdentifiedModel) else 'extended'}")
     return _Kind(own.title, own.grounds, own.details, own.worth, own.cautions)
 
 
@@ -74,7 +72,7 @@ def answer(model: Source[Any]) -> Iterator[Block]:
     """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
     box = trust_box(model)
     # The reasons of a verdict are many.
-    judged = isinstance(model.record, IdentifiedRecord) and model.record.validated
+    judged = isinstance(model.record, IdentifiedModel) and model.record.validated
     yield from in_short(box, _REASONS, "every reason of the verdict") if judged else [box]
     yield from _kind_of(model.record).details(model)
 

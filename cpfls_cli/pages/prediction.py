@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
-from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
+from cpfls_cli.identification.scores import AXES
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
@@ -88,8 +88,8 @@ def trust_along(outside: int, not_positive_definite: int, samples: int, model: R
 
 
 def _outside_words(model: Record | None) -> str:
-    if isinstance(model, IdentifiedRecord) and model.known_everywhere:
-        condition = number(model.solve.condition_number, 3)
+    if isinstance(model, IdentifiedModel) and model.known_everywhere:
+        condition = number(model.condition_number, 3)
         return (
             "the same coefficients hold there, if the structure does: one rule holds everywhere and all its "
             f"coefficients are known (condition number {condition})"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
     from cpfls_cli.artifacts.gains import GainsRecord
-    from cpfls_cli.artifacts.identified import IdentifiedRecord
+    from cpfls_cli.artifacts.identified import IdentifiedModel
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.twin import TwinRecord
@@ -64,7 +64,7 @@ class Sources:
     trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
     flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
-    models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
+    models: ClassVar[_OfFormat[IdentifiedModel]] = _OfFormat("cpfls/identified")
     sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged, Winner
 from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.gains import gains_box
@@ -32,7 +32,12 @@ def summary_section(sources: Sources) -> Section:
     blocks += [gains_box(gains.record) for gains in sources.gains]
     blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
-    blocks += [box for source in sources.all if source.stage for box in loaded(source.stage).verdict(source)]
+    blocks += [
+        box
+        for source in sources.all
+        if source.stage not in ("", "identify")
+        for box in loaded(source.stage).verdict(source)
+    ]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
@@ -65,7 +70,7 @@ def _missing(sources: Sources) -> list[Text]:
     return [Text(sentence, "note") for sentence in missing(sources).values()]
 
 
-def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Iterator[Block]:
+def _model(model: Source[IdentifiedModel], sources: Sources, index: int) -> Iterator[Block]:
     record = model.record
     yield Heading(f"Model {model.label}")
     yield Facts(_facts(model))
@@ -83,7 +88,7 @@ def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Ite
         )
 
 
-def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
+def _facts(model: Source[IdentifiedModel]) -> list[tuple[str, str]]:
     record = model.record
     learned, training = len(record.training_indices), record.judged.samples_of(TRAINING)
     chosen = f", chosen in {model.input_name('selection')}" if model.made_from("selection") else ""
@@ -92,11 +97,11 @@ def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
         ("Structure", _structure(model)),
         ("Parameters", _parameters(record)),
         ("Search", _search(model)),
-        ("Made by", f"cpfls {record.origin.version}, seed {record.origin.seed}"),
+        ("Made by", f"cpfls {model.header.version}, seed {model.header.seed}"),
     ]
 
 
-def _structure(model: Source[IdentifiedRecord]) -> str:
+def _structure(model: Source[IdentifiedModel]) -> str:
     settings = model.config["identification"]
     kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
     functions = settings["membership_functions"]
@@ -110,16 +115,16 @@ def _structure(model: Source[IdentifiedRecord]) -> str:
     )
 
 
-def _parameters(record: IdentifiedRecord) -> str:
+def _parameters(record: IdentifiedModel) -> str:
     fuzzy = f"{len(record.functions.coefficients)} of the fuzzy part"
     if not record.on_rigid_body:
         return fuzzy
     if record.fuzzy_part_off:
         return f"6 of inertia and {fuzzy}, all zero because the fuzzy part is off"
-    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.chosen.ridge_weight)}"
+    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.ridge_weight)}"
 
 
-def _search(model: Source[IdentifiedRecord]) -> str:
+def _search(model: Source[IdentifiedModel]) -> str:
     if not model.record.searched:
         return "no search: one chromosome"
     settings = model.config["identification"]
@@ -127,7 +132,7 @@ def _search(model: Source[IdentifiedRecord]) -> str:
     return f"population {settings['population']}, {number} generation{'' if number == 1 else 's'}"
 
 
-def _beside_rigid_body(model: Source[IdentifiedRecord], sources: Sources) -> Iterator[Text]:
+def _beside_rigid_body(model: Source[IdentifiedModel], sources: Sources) -> Iterator[Text]:
     """Compare a model with the rigid body with six inertia parameters, part by part."""
     judged = model.record.judged
     if model.record.fuzzy_part_off:
@@ -161,7 +166,7 @@ def _noise_free(flight: Source[FlightRecord]) -> bool:
     return flight.made_from("trajectory") is not None and not any(added)
 
 
-def _comparison(judged: JudgedGroup, part: str, winners: Sequence[Winner]) -> str:
+def _comparison(judged: Judged, part: str, winners: Sequence[Winner]) -> str:
     ours, axis = judged.worst(MODEL, part)
     rigid, rigid_axis = judged.worst(RIGID_BODY, part)
     where = {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.checkpoint import ArchiveGroup, CheckpointRecord, UnfinishedGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
 from cpfls_cli.config.load import flat_keys, parse_config
@@ -81,7 +81,7 @@ class KeptFile:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedRecord | Sweep | Vehicle]]
+    OUTPUT: ClassVar[type[IdentifiedModel | Sweep | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:
@@ -184,7 +184,7 @@ class Checkpoint(KeptFile):
 
     WORK: ClassVar = "search"
     SUFFIX: ClassVar = ".checkpoint"
-    OUTPUT: ClassVar = IdentifiedRecord
+    OUTPUT: ClassVar = IdentifiedModel
 
     def write(self, state: EvolutionState) -> None:
         """Replace what was there by this state, or leave it as it was."""

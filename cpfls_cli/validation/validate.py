@@ -45,7 +45,7 @@ class Validation:
         Other structures by cross-validation; None where not asked for.
     residuals : ResidualAnalysis
         What the model leaves of the torque on held-out data, or in training where nothing was held out.
-    draws : Draws
+    uncertainty : Draws
         Of the block bootstrap.
     curves : Curves
         D_ij(q) with their bands.
@@ -59,7 +59,7 @@ class Validation:
 
     structures: StructureComparison | None
     residuals: ResidualAnalysis
-    draws: Draws
+    uncertainty: Draws
     curves: Curves
     round_trip: RoundTrip
     steps: StepErrors

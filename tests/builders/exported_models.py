@@ -11,7 +11,7 @@ import yaml
 
 from cpfls_cli.artifacts.evidence import VerdictGroup
 from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, IdentifiedVehicleGroup, SearchGroup
-from cpfls_cli.artifacts.scores import JudgedGroup
+from cpfls_cli.identification.scores import Judged
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
@@ -151,11 +151,11 @@ def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGro
     return VerdictGroup(label=label, region=region, reason=texts, speaks=np.array(speaks, dtype=float))
 
 
-def _judged() -> JudgedGroup:
+def _judged() -> Judged:
     scores = {"relative_error": [0.1, np.nan, 0.2], "r2": [0.9, -np.inf, 0.5]}
     measures = {name: np.array([[scores.get(name, [1.0, 2.0, 3.0])]]) for name in MEASURES}
     samples, outside = np.array([100]), np.array([0])
-    return JudgedGroup(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
+    return Judged(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
 
 
 def wanted_of(model: InertiaFunctions, motion: Motion, step: int = 1000) -> SimpleNamespace:
