@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -342,12 +343,19 @@ def _first_objective(record: IdentifiedModel) -> tuple[str, str]:
     return "mean squared error", "(N m)²"
 
 
+def _scores(judged: Judged, parts: Iterable[str], models: Iterable[str], columns: Sequence[int]) -> str:
+    """Tabulate some columns of the errors of some models on some parts, for a template."""
+    rows = [_row(judged, part, name) for part in parts for name in models if name in judged.models]
+    cells = [[row[at] for at in columns] for row in rows]
+    shown = [[page.toned(each.text, each.tone) if isinstance(each, Cell) else each for each in row] for row in cells]
+    return page.table([_SCORES[at] for at in columns], shown, (0, 1))
+
+
 WORDS: Mapping[str, Any] = {
     "MODEL": MODEL,
     "RIGID_BODY": RIGID_BODY,
-    "SCORES": _SCORES,
     "grounds": grounds,
-    "scores_row": _row,
+    "scores": _scores,
     "stopped_words": stopped_words,
     "title": title,
     "words_of": model_words,

@@ -265,10 +265,9 @@ def test_ranking_by_quantity_beside_a_classical_one():
 
 
 @pytest.mark.parametrize(("torque", "passes"), [(np.cos, True), (np.sin, True), (np.asarray, False)])
-def test_torque_goes_on_across_a_full_turn(torque, passes, monkeypatch):
+def test_torque_goes_on_across_a_full_turn(torque, passes):
     functions = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
-    monkeypatch.setattr("benchmarks.paper.claims.inertia_functions", lambda _: functions)
-    record = SimpleNamespace(functions=None)
+    record = SimpleNamespace(functions=functions)
     model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
     measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
     assert (measured.verdict == ClaimVerdict.PASS) == passes

@@ -6,8 +6,8 @@ import math
 import h5py
 import numpy as np
 import pytest
-
 from cpfls_cli.artifacts.replay import ReplayRecord
+
 from cpfls_cli.artifacts.store import read_record
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE

@@ -46,7 +46,7 @@ def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
     assert result.exit_code == 0, result.stderr
     run, found = own.replicates[seed - 5], json.loads(result.stdout)
     with h5py.File(model) as file:
-        assert list(run.chromosome) == file["model/weights"][()].tolist()
+        assert list(run.chromosome) == file["weights"][()].tolist()
     for name in ("mse", "max_error", "relative_error"):
         assert getattr(run, name)[0] == found[name]
     assert (run.condition_number, run.evaluations) == (found["condition_number"], found["evaluations"])

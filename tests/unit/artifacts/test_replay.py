@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from cpfls_cli.artifacts.replay import (
     HeldOutGroup,
     SignalErrorGroup,
@@ -16,6 +15,7 @@ from cpfls_cli.artifacts.replay import (
     rival_row,
     trust_by_playback,
 )
+
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of, still_runs
 from cpfls_cli.playback.replay import MODEL, Played, fading, replay

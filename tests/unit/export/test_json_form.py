@@ -138,7 +138,7 @@ def test_what_is_not_finite_is_null_and_what_is_not_known_is_too():
 
 def test_the_verdict_and_its_reasons_are_there():
     verdict = verdict_of("do-not-use", "nowhere", ("D is not positive definite", -1), ("few samples", 0))
-    document = document_of(model_of(CASES["paper"]), verdict=verdict, complete=False)
+    document = document_of(model_of(CASES["paper"]), verdict=verdict, stop_reason="interrupted")
     assert document["complete"] is False
     assert document["verdict"]["label"] == "do-not-use"
     assert document["verdict"]["reasons"][0] == {"reason": "D is not positive definite", "speaks": -1.0}

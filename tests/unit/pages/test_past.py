@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.pages.replay import beside_past, errors_table, horizon_figure
+
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of

@@ -4,9 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cpfls_cli.artifacts.replay import HeldOutGroup, SignalErrorGroup
+from cpfls_cli.pages.vehicle_model import (
+    cautions,
+    found_vehicle_blocks,
+    grounds,
+    loop_words,
+    remainder_curves,
+    slow_words,
+    title,
+    warnings,
+)
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
-from cpfls_cli.artifacts.replay import HeldOutGroup, SignalErrorGroup
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
@@ -18,16 +28,6 @@ from cpfls_cli.artifacts.vehicle_model import (
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
-from cpfls_cli.pages.vehicle_model import (
-    cautions,
-    found_vehicle_blocks,
-    grounds,
-    loop_words,
-    remainder_curves,
-    slow_words,
-    title,
-    warnings,
-)
 from cpfls_cli.report.content import Plot, Table, Text, unfolded
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record

@@ -7,7 +7,7 @@ from cpfls_cli.identification.scores import Judged
 def scores(model, rigid, zero=(1.0, 1.0, 1.0)):
     mse = np.array([[model], [rigid], [zero]])
     names, parts, samples = ("model", "rigid-body", "torque-zero"), ("training",), np.array([10])
-    measures = dict.fromkeys(("mse", "max_error", "relative_error", "r2", "r2_body"), mse)
+    measures = dict.fromkeys(("mse", "max_error", "relative_error", "r2", "vaf", "r2_body"), mse)
     return Judged(models=names, parts=parts, samples=samples, outside=0 * samples, **measures)
 
 
