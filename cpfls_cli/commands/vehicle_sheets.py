@@ -70,12 +70,12 @@ def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin | Header) -
 
 def _require_usable(functions: InertiaFunctions, path: Path) -> None:
     """Refuse what no other program could evaluate."""
-    where = f"{path}: vehicle/inertia_functions"
+    where = f"{path}: model/fuzzy"
     if functions.visited.shape != (CELLS, CELLS):
         raise InputError(f"{where}/visited: is {functions.visited.shape}, not {(CELLS, CELLS)}; identify it again")
     for partition, peaks in zip(functions.structure.partitions, functions.partitions, strict=True):
         if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
-            raise InputError(f"{where}/breakpoints: those of {partition.name} make no partition; identify it again")
+            raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
 
 
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:

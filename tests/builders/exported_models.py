@@ -1,7 +1,7 @@
 """Models of every structure with random coefficients, states that hurt, and sheets to export."""
 
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from types import SimpleNamespace
 
