@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, MEASURED, beyond_any_body, more_than_others, six_parameters, symmetric
+from cpfls_cli.result import About
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle
@@ -90,7 +91,7 @@ class Parameter(NamedTuple):
         Why, or why not.
     """
 
-    key: str
+    key: Annotated[str, About("below the section `vehicle` of a config", brief=False)]
     value: float | None
     unit: str
     low: float | None

@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.model import AnyModel, ModelRecord
 from cpfls_cli.artifacts.store import format_name, read_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError, about
 from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
 from cpfls_cli.playback.history import Observer
@@ -140,6 +141,8 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
 def modelled(path: Path, record: AnyModel) -> VehicleModel:
     """Take the model out of what a file holds; the path is for messages."""
     with about(path, InputError):
+        for each in record.model.effects:
+            effect(each.name)
         return record.model
 
 

@@ -230,7 +230,7 @@ def vehicle_section(sources: Sources) -> Section:
     other = [source.label for source in sources.all if source.vehicle != sources.vehicle]
     if other:
         blocks.append(Text(f"Made with another vehicle than this one: {', '.join(other)}.", "warning"))
-    return Section("vehicle", "Vehicle", blocks)
+    return Section("stated-vehicle", "Vehicle", blocks)
 
 
 def _vehicle_rows(sources: Sources) -> Iterator[tuple[str, str]]:

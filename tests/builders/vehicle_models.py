@@ -130,9 +130,9 @@ def vehicle_of(model, **changed):
     return Vehicle(**given | changed)
 
 
-def write_vehicle(path, vehicle, config=ORIGIN.config):
+def write_vehicle(path, vehicle, config=ORIGIN.config, **more):
     """Write a vehicle, as its command would."""
-    store.write(path, vehicle, replace(ORIGIN, config=config))
+    store.write(path, vehicle, replace(ORIGIN, config=config, **more))
 
 
 def source_of_vehicle(vehicle, label="vehicle.h5"):

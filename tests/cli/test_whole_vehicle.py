@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
@@ -19,7 +19,7 @@ from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.artifacts import edited
 from tests.builders.playback_flights import STATED, truth
-from tests.builders.vehicle_models import record_of, remainder
+from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
 
 CONFIG = f"""\
 seed: 1
@@ -64,8 +64,7 @@ def written(config, folder):
     """Write the file of a vehicle model, as if it had been found in flights of the config's vehicle."""
 
     def call(name, model=WHOLE, **changed):
-        record = record_of(model, resolved_yaml(load_study(config)))
-        write_record(folder / name, replace(record, **changed))
+        write_vehicle(folder / name, vehicle_of(model, **changed), resolved_yaml(load_study(config)))
         return folder / name
 
     return call
@@ -329,7 +328,7 @@ def open_config(tmp_path, written_log):
 def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
     left_open, log = open_config
     vehicle = tmp_path / "vehicle.h5"
-    write_record(vehicle, record_of(WHOLE, config=resolved_yaml(load_study(left_open))))
+    write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
     assert cpfls("import", left_open, log, "-o", tmp_path / "f.h5").exit_code == 0
     told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
     assert min(told["r2_body"]) > 0.999

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.store import file_sha256, write_record
+from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders import vehicle_models
@@ -22,7 +22,7 @@ HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 fo
 def whole(tmp_path_factory):
     """A vehicle with every part that a model can have."""
     path = tmp_path_factory.mktemp("library") / "vehicle.h5"
-    write_record(path, vehicle_models.record_of(vehicle_models.whole()))
+    vehicle_models.write_vehicle(path, vehicle_models.vehicle_of(vehicle_models.whole()))
     return cpfls_cli.load_model(path)
 
 
@@ -140,8 +140,8 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
     with pytest.raises(InputError, match="at least one flight"):
         whole.replay()
     partial = tmp_path / "partial.h5"
-    write_record(
-        partial, vehicle_models.record_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
+    vehicle_models.write_vehicle(
+        partial, vehicle_models.vehicle_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
     )
     with pytest.raises(InputError, match="holds wind, which depends on more than the state"):
         cpfls_cli.load_model(partial).step(whole.state(), [HOVER] * 4, PERIOD)

@@ -10,13 +10,12 @@ import pytest
 from cpfls_cli import store
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.pages.comparison import differences
 from cpfls_cli.pages.source import unique_labels
 from cpfls_cli.store import read
 from tests.builders.evidence_artifacts import curves, steps, verdict
 from tests.builders.identified_models import EVIDENCE_PARTS, with_parts
-from tests.builders.vehicle_models import record_of, whole
+from tests.builders.vehicle_models import vehicle_of, whole, write_vehicle
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -239,12 +238,15 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
 
 
 def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, tmp_path):
-    record = record_of(whole())
+    vehicle = vehicle_of(whole())
     paths = [tmp_path / folder / "vehicle.h5" for folder in ("still", "gusty")]
     for path, factor in zip(paths, (1.0, 2.0), strict=True):
         path.parent.mkdir()
-        numbers = {name: factor * getattr(record.found, name) for name in ("value", "low", "high")}
-        write_record(path, replace(record, found=replace(record.found, **numbers)))
+        numbers = (
+            each._replace(**{name: factor * getattr(each, name) for name in ("value", "low", "high")})
+            for each in vehicle.numbers
+        )
+        write_vehicle(path, replace(vehicle, numbers=tuple(numbers)))
     output = tmp_path / "report.html"
     result = cpfls("report", study, *paths, "-o", output)
     assert result.exit_code == 0, result.stderr

@@ -10,11 +10,13 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
+from cpfls_cli.page import blocks as blocks_of
 from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, gains, model, trend, twin
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
+from cpfls_cli.stages.vehicle import vehicle
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.autopilots import gains_record
 from tests.builders.changed_flights import write_flights
@@ -89,8 +91,8 @@ def answered(told, of_flights, tuned):
         if name in told:
             return told[name].source, told[name].outcome.blocks
         if name == "vehicle":
-            source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
-            return source, tuple(model.answer(source))
+            source = vehicle_models.source_of_vehicle(vehicle_models.vehicle_of(vehicle_models.whole()), f"{name}.h5")
+            return source, tuple(blocks_of(vehicle.text(source.record, about=source)))
         if name == "twin":
             source = source_of(twin_record(), f"{name}.h5")
             return source, tuple(twin.answer(source))

@@ -36,7 +36,7 @@ report: {title: "<script>alert(1)</script> & a study"}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "comparison", "models", "model", "vehicle", "path", "flights", "reduction", "identification",
+    "summary", "comparison", "models", "model", "stated-vehicle", "path", "flights", "reduction", "identification",
     "validation", "sweep", "search", "partitions", "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -142,7 +142,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 @pytest.mark.usefixtures("undrawn")
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
-    assert summary["sections"] == ["summary", "vehicle", "flights", "provenance"]
+    assert summary["sections"] == ["summary", "stated-vehicle", "flights", "provenance"]
     assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html
