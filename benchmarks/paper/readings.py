@@ -125,7 +125,7 @@ def _beside(setting: Setting, column: PrintedColumn) -> Iterator[tuple[str, floa
     """Pair medians over the runs with what is printed of ten."""
     yield "MSE", _median(setting.errors[:, 0]), float(column.mse_of_runs[0])
     yield "largest error", _median(setting.errors[:, 1]), float(column.max_error_of_runs[0])
-    yield "condition number", _median(setting.condition_number), float(column.condition_number_of_runs[0])
+    yield "condition number", _median(setting.of("condition_number")), float(column.condition_number_of_runs[0])
 
 
 def _median(runs: Array) -> float:

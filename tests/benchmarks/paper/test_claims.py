@@ -288,7 +288,8 @@ def reading_sources(*flights):
         SimpleNamespace(
             label="s.h5",
             config={"trajectory": path, "simulation": {"relative_noise": {"torque": noise} if noise else {}}},
-            record=SimpleNamespace(settings=settings, joins=lambda _: False),
+            record=SimpleNamespace(settings=settings, joined=lambda _: None),
+            header=SimpleNamespace(inputs={}),
             made_from=lambda _: "flown",
         )
         for noise, settings in flights
