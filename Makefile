@@ -297,7 +297,7 @@ CHANGED := data/changed-example
 docs/changed.svg: tests/builders/changed_flights.py | $(INSTALLED)
 	$(BIN)/python -m tests.builders.changed_flights $(CHANGED)
 	$(CPFLS) changed $(CHANGED)/study.yaml $(CHANGED)/weak*.csv --since $(CHANGED)/before*.csv -o $(CHANGED)/changed --force
-	sed -n '/<figure id="changed-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $(CHANGED)/changed/report.html > $@
+	sed -n '/<figure id="changed-1-numbers">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $(CHANGED)/changed/report.html > $@
 
 # Flights of a vehicle that is not what its config states; the last is held out. Each has a path of its own.
 REPLAY := data/replay-example

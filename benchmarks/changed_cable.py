@@ -36,11 +36,11 @@ def flown(own, folder):
 def said(today, before, vehicle):
     """Say what is judged, as cells of a table: names with belief, mass of the load beside the vehicle's, its cable."""
     change = changed(today, before, vehicle, np.random.default_rng(0))
-    names = ", ".join(f"{each.cause.name} {100 * each.belief:.0f} %" for each in change.found) or "no change"
-    loads = [each.sizes[0] for each in change.found if each.cause.name == "load on a cable"]
+    names = ", ".join(f"{each.name} {100 * each.belief:.0f} %" for each in change.causes) or "no change"
+    loads = [each.sizes[0] for each in change.causes if each.name == "load on a cable"]
     mass = f"{loads[0].value:.3f} [{loads[0].low:.3f}, {loads[0].high:.3f}]" if loads else ""
     cable = f"{np.median([flight.cable_m for flight in today]):.2f}" if loads else ""
-    return f"{names} | {mass} | {cable}", bool(change.found)
+    return f"{names} | {mass} | {cable}", bool(change.causes)
 
 
 def main():

@@ -26,8 +26,9 @@ import numpy as np
 from scipy.stats import spearmanr, t
 
 from benchmarks.changed_unchanged import numbers_of
-from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, Change, changed
+from cpfls_cli.changes.judge import FALSE_ALARM, changed
 from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.results import Changed
 from cpfls_cli.config.load import load_study
 
 
@@ -39,23 +40,23 @@ class Told(NamedTuple):
     """Cut from both blades together."""
 
     right: str
-    run: Change
+    run: Changed
     deviations: np.ndarray
     threshold: float
 
     @property
     def named(self) -> str:
-        return "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in self.run.found) or "—"
+        return "+".join(found.name + "?" * (not found.named) for found in self.run.causes) or "—"
 
     @property
     def sure(self) -> set[str]:
-        return {found.cause.name for found in self.run.found if found.belief >= NAMED}
+        return {found.name for found in self.run.causes if found.named}
 
     @property
     def listed(self) -> set[str]:
         """What is found or looks alike."""
-        alike = {name for found in self.run.found for name, _ in found.alike}
-        return alike | {found.cause.name for found in self.run.found}
+        alike = {own.name for found in self.run.causes for own in found.alike}
+        return alike | {found.name for found in self.run.causes}
 
     @property
     def share(self) -> str:
@@ -65,7 +66,7 @@ class Told(NamedTuple):
     @property
     def size(self) -> float:
         """Of the rotor M3; 0 where it is not named."""
-        sizes = [found.sizes[0].value for found in self.run.found if found.cause.name == "rotor M3"]
+        sizes = [found.sizes[0].value for found in self.run.causes if found.name == "rotor M3"]
         return sizes[0] if sizes else 0.0
 
 
@@ -119,7 +120,7 @@ def main() -> None:
             deviations, threshold = _deviations(today, usual[vehicle])
             name = f"{group} {vehicle}".replace("мм", "mm")
             told.append(Told(name, _cut(group), _right(group), run, deviations, threshold))
-    rows = [[each.group, each.right, each.named, each.run.p_value, each.size, each.share] for each in told]
+    rows = [[each.group, each.right, each.named, each.run.p, each.size, each.share] for each in told]
     header = ["group", "what was done", "said", "p", "size of M3", "by the share of commands"]
     table("changed_crazypad", header, rows)
     print()
@@ -173,7 +174,7 @@ def main() -> None:
             others = own[:index] + own[index + 1 :]
             deviations, threshold = _deviations([flight], others)
             alarms.append(
-                (bool(changed([flight], others, study.vehicle, rng).found), np.abs(deviations).max() > threshold)
+                (bool(changed([flight], others, study.vehicle, rng).causes), np.abs(deviations).max() > threshold)
             )
     ours, shares = np.sum(alarms, axis=0)
     print(f"\nnormal flights left out in turn: {len(alarms)}; false alarms {ours}, by the share {shares}")

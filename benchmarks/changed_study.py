@@ -27,12 +27,10 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
-from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.changes import judge
-from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
+from cpfls_cli.changes.judge import _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
-from cpfls_cli.changes.reference import FALSE_ALARM, FEWEST
-from cpfls_cli.commands.changed import units_of
+from cpfls_cli.changes.results import Changed
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.effects.signals import Signals
@@ -214,7 +212,7 @@ def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], series: i
     return cases
 
 
-def _judged(fleet: Fleet, vehicle: int, instrument: str, today: Sequence[Told], count: int, draw: int) -> Change:
+def _judged(fleet: Fleet, vehicle: int, instrument: str, today: Sequence[Told], count: int, draw: int) -> Changed:
     """Hold flights against those of so many other days, one each."""
     rng = np.random.default_rng([vehicle, count, draw])
     others = [day[0] for day in fleet.days[vehicle] if day[0] is not today[0]]
@@ -222,7 +220,7 @@ def _judged(fleet: Fleet, vehicle: int, instrument: str, today: Sequence[Told], 
     flights = [each[instrument] for each in today]
     with _ROUGHLY:
         roughly = changed(flights, before, fleet.vehicles[vehicle][0], np.random.default_rng(0))
-    return roughly if roughly.p_value > _FAR else changed(flights, before, fleet.vehicles[vehicle][0], rng)
+    return roughly if roughly.p > _FAR else changed(flights, before, fleet.vehicles[vehicle][0], rng)
 
 
 _ROUGHLY, _FAR = patch.object(judge, "drawn_by_chance", partial(judge.drawn_by_chance, draws=250)), 0.12
@@ -253,10 +251,10 @@ _WITHOUT_SHOWS = patch.object(_Space, "shows", lambda *_: np.nan)
 _NO_CAUSE = "cause not named"
 
 
-def _alarms(runs: Sequence[Change]) -> list[object]:
+def _alarms(runs: Sequence[Changed]) -> list[object]:
     alarms = [run for run in runs if run.changed]
-    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) or _NO_CAUSE for run in alarms))
-    return [len(runs), len(alarms), sum(run.p_value <= 0.05 for run in runs), said or "—"]
+    said = ", ".join(sorted("+".join(found.name for found in run.causes) or _NO_CAUSE for run in alarms))
+    return [len(runs), len(alarms), sum(run.p <= 0.05 for run in runs), said or "—"]
 
 
 def _otherwise(fleet: Fleet, faster: list[list[Told]]) -> Iterator[list[object]]:
@@ -295,15 +293,15 @@ class Verdict(NamedTuple):
     named: str
 
 
-def _verdict(case: Case, run: Change) -> Verdict:
-    sure = {found.cause.name for found in run.found if found.belief >= NAMED}
-    listed = {found.cause.name for found in run.found} | {name for found in run.found for name, _ in found.alike}
+def _verdict(case: Case, run: Changed) -> Verdict:
+    sure = {found.name for found in run.causes if found.named}
+    listed = {found.name for found in run.causes} | {own.name for found in run.causes for own in found.alike}
     held = tuple(
         size.low <= true <= size.high
-        for found in run.found
-        for size, true in zip(found.sizes, case.right.get(found.cause.name, ()), strict=False)
+        for found in run.causes
+        for size, true in zip(found.sizes, case.right.get(found.name, ()), strict=False)
     )
-    names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found) or _NO_CAUSE * run.changed
+    names = "+".join(found.name + "?" * (not found.named) for found in run.causes) or _NO_CAUSE * run.changed
     rights = set(case.right)
     right, wrong = bool(rights & sure), bool(sure - rights - _part_of(rights))
     return Verdict(run.changed, right, not right and bool(rights & listed), wrong, held, names)
@@ -338,7 +336,7 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
     return rows, smallest
 
 
-def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Change:
+def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Changed:
     """Ask what would show in the first draws alone, for it takes long."""
     given = fleet, case.vehicle, instrument, [case.told], USUAL, case.draw
     if case.draw < _SHOWN:
@@ -347,9 +345,10 @@ def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Change:
         return _judged(*given)
 
 
-def _shows(case: Case, run: Change) -> float:
+def _shows(case: Case, run: Changed) -> float:
     """Give the smallest size that is said to show, as sizes are listed; NaN where no cause is right."""
-    told = [(run.shows[name], truth) for name, truth in case.right.items() if name in run.shows and truth]
+    shows = {each.cause: each.smallest for each in run.shows}
+    told = [(shows[name], truth) for name, truth in case.right.items() if name in shows and truth]
     if case.name in LOGARITHMS:
         return float(np.expm1(told[0][0])) if told else np.nan
     return min((case.size * shows / np.abs(truth).max() for shows, truth in told), default=np.nan)
@@ -386,16 +385,8 @@ def _wrong(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> Iterator[list[o
                 today = flight_numbers(recording, kind.volts)
                 before = [day[0][instrument] for day in fleet.days[index][:USUAL]]
                 change = changed([today], before, vehicle, np.random.default_rng(index))
-                units, accused = (
-                    units_of(change.names, vehicle),
-                    contradictions(check([recording.signals], GapSettings())),
-                )
-                record = ChangedRecord.of(
-                    *(change, [today], before, units, [], accused),
-                    false_alarm=FALSE_ALARM,
-                    named_from=NAMED,
-                    fewest=FEWEST,
-                )
+                accused = tuple(contradictions(check([recording.signals], GapSettings())))
+                record = replace(change, contradictions=accused)
                 said.setdefault((name, instrument), []).append(record.verdict)
     verdicts = ("CHANGED", "CANNOT TELL", "NO CHANGE SEEN", "NO CHANGE")
     for (name, instrument), each in said.items():

@@ -21,8 +21,9 @@ pin_threads()
 
 import numpy as np
 
-from cpfls_cli.changes.judge import Change, changed
+from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
+from cpfls_cli.changes.results import Changed
 from cpfls_cli.config.load import load_study
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flights.recordings import read_alone
@@ -60,7 +61,7 @@ def main() -> None:
     told = list(numbers_of(study, flights, given.keep).values())
     rows = []
 
-    def judge(today: list[int], before: list[int], rng: np.random.Generator) -> Change:
+    def judge(today: list[int], before: list[int], rng: np.random.Generator) -> Changed:
         return changed([told[each] for each in today], [told[each] for each in before], study.vehicle, rng)
 
     alone = range(len(told))
@@ -79,9 +80,9 @@ def main() -> None:
     table("changed_unchanged_flights", ["references", "flights today", "sets", "alarms", "p <= 5 %", "said"], rows)
 
 
-def _counted(runs: list[Change]) -> list[object]:
-    said = sorted("+".join(found.cause.name for found in run.found) or "?" for run in runs if run.changed)
-    small = sum(run.p_value <= 0.05 for run in runs)
+def _counted(runs: list[Changed]) -> list[object]:
+    said = sorted("+".join(found.name for found in run.causes) or "?" for run in runs if run.changed)
+    small = sum(run.p <= 0.05 for run in runs)
     return [len(runs), len(said), small, ", ".join(said) or "—"]
 
 

@@ -27,13 +27,14 @@ import numpy as np
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.registry import TARGETS, exported
+from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.source import c_source
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import MIDDLING, ROTORPY, ROTORPY_HIDDEN, flown, rotorpy_flight, truth
 from tests.builders.recorded_flights import FLIGHTS
 from tests.builders.verified_exports import verified
@@ -71,12 +72,12 @@ def flights():
 def playback() -> None:
     rows = []
     for name, model, flight in flights():
-        for form in TARGETS:
+        for form in FLYING:
             made = exported(sheet_of_vehicle(model), form, "vehicle.py")
             horizon = round(0.5 / flight.motion.period)
             found = verified(form, made, flight, (flight, player_of(model, flight)), horizon, WINDOWS)
             off = [f"{value:.2g}" for value in (*found.errors[:, 3], found.missing[3], found.step[3])]
-            rows.append((name, TARGETS[form].title, *off, f"{found.equations.max():.1g}"))
+            rows.append((name, FORMS[form].title, *off, f"{found.equations.max():.1g}"))
     columns = ("flight", "target", "playback - measured", "target - measured", "target - playback", "not held", "step")
     print("Body rate after 0.5 s, rad/s, mean; what is not held and the step: largest; equations: largest, SI.\n")
     table("simulators_playback", (*columns, "equations"), rows)
@@ -93,18 +94,18 @@ def steps() -> None:
     with tempfile.TemporaryDirectory() as folder:
         call = in_c(model, Path(folder))
         count = 100_000
-        for form in TARGETS:
+        for form in FLYING:
             text = exported(sheet_of_vehicle(model), form, "v.py").text
             # The second flight less the first: what does not grow with the steps is left out.
             short = Course(flight, course.starts, 100)
-            TARGETS[form].fly(text, short)
+            FLYING[form].fly(text, short)
             times = []
             for _ in range(3):
                 fast = seconds(lambda: call(state, rotor, count)) / count
-                long, brief = (seconds(partial(TARGETS[form].fly, text, one)) for one in (course, short))
+                long, brief = (seconds(partial(FLYING[form].fly, text, one)) for one in (course, short))
                 times.append(((long - brief) / 300, fast))
             own, c = np.median(times, axis=0)
-            rows.append((TARGETS[form].title, f"{1e6 * own:.3g}", f"{1e6 * c:.3g}", f"{own / c:.3g}"))
+            rows.append((FORMS[form].title, f"{1e6 * own:.3g}", f"{1e6 * c:.3g}", f"{own / c:.3g}"))
     table("simulators_step", ("target, through Python", "us a step", "C, us a step", "ratio"), rows)
 
 

@@ -55,7 +55,7 @@ except ImportError:
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.registry import exported
-from cpfls_cli.export.source import executed, jax_parameters, jax_parts
+from cpfls_cli.export.source import jax_parameters, jax_parts
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -70,6 +70,7 @@ from cpfls_cli.playback.vehicle import bodily, estimate_correlation, found_numbe
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import executed
 from tests.builders.gusty_flights import (
     EVERY,
     GRAVITY,

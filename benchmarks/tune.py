@@ -58,13 +58,14 @@ def flown(name: str, label: str) -> Iterator[list[str]]:
     found = with_filters(autopilot, autopilot.defaults(), hover, AskedMargins()).proposals
     own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
     for gains, values in (("default", autopilot.defaults()), ("tuned", own)):
-        told = evaluate(autopilot.law(values), hover)
-        command, step = told.command[0], told.steps[0]
+        evaluation = evaluate(autopilot.law(values), hover)
+        roll = evaluation.roll
+        command = roll.command
         predicted = (
-            upward_gain_db(told.loops[0].frequency, told.loops[0].command),
+            upward_gain_db(evaluation.frequency, roll.loop),
             command.phase_deg,
-            100 * step.overshoot[0],
-            1e3 * step.rise_s[0],
+            100 * roll.overshoot,
+            1e3 * roll.rise_s,
         )
         if not command.stable:
             predicted = (np.nan, np.nan, np.nan, np.nan)

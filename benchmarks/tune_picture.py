@@ -16,7 +16,6 @@ from benchmarks.shared.measure import pin_threads
 
 pin_threads()
 
-import numpy as np
 
 from benchmarks.tune import NOISE, SPREAD, VEHICLES, gusts_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -40,7 +39,7 @@ def main() -> None:
         "default gains": autopilot.defaults(),
         "gains of cpfls tune": autopilot.defaults() | {each.parameter.name: each.value for each in found},
     }
-    told = {name: evaluate(autopilot.law(values), hover) for name, values in sets.items()}
+    evaluated = {name: evaluate(autopilot.law(values), hover) for name, values in sets.items()}
     seen = {
         name: flown_step("px4", values, vehicle, lag, 0, gusts=gusts_of(vehicle), noise=NOISE)
         for name, values in sets.items()
@@ -49,21 +48,13 @@ def main() -> None:
 
     def draw(figure: Figure) -> None:
         for axes, name in zip(in_columns(figure, 2, 2, share_y=True).ravel(), sets, strict=True):
-            steps = [each.angle[:, 0] for each in told[name].steps]
-            time = 1e3 * told[name].steps[0].time
-            band(
-                axes,
-                time,
-                np.min(steps, axis=0),
-                np.max(steps, axis=0),
-                color="#c9c9c9",
-                label="vehicles that are possible",
-            )
-            line(axes, time, steps[0], label="predicted", **style_of(0))
+            own, time = evaluated[name].roll, 1e3 * evaluated[name].time
+            band(axes, time, own.step_low, own.step_high, color="#c9c9c9", label="vehicles that are possible")
+            line(axes, time, own.step, label="predicted", **style_of(0))
             flown = seen[name]
             axes.plot(1e3 * flown.time[::12], flown.angle[::12, 0], ".", color="black", markersize=4, label="flown")
             axes.axhline(1.0, **BASELINE)
-            margin = told[name].command_worst[0]
+            margin = own.command_worst
             axes.set_title(f"{name}: {margin.phase_deg:.0f}°, {margin.gain_db:.0f} dB", color=GREY, fontsize="medium")
             axes.set_xlabel("ms")
             axes.set_ylim(-0.1, 1.5)

@@ -5,7 +5,7 @@ Beside what Markdown has, a template knows
 - folds, ``::: Title`` to ``:::``, which a terminal opens with -v and a page by a click; with ``{open}`` behind it the
   page shows them open;
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
-- notes, ``> text``, which a terminal prints on standard error;
+- notes, ``> text``, which a terminal prints on standard error; those with a tone however many others there are;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
 - ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page; an answer
   that begins with a verdict, ``# NO CHANGE: nothing moved {good}``, is a box with the paragraphs behind it.
@@ -342,7 +342,7 @@ def _blocks_of(node: SyntaxTreeNode) -> Iterator[Block]:
     if node.type == "paragraph":
         yield Text(_plain(node))
     elif node.type == "blockquote":
-        yield from (Text(_plain(each), "warning") for each in node.children)
+        yield from (Text(_plain(each), "warning", always="class" in each.attrs) for each in node.children)
     elif node.type in {"bullet_list", "ordered_list"}:
         yield from _items(node)
     elif node.type == "table":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -76,6 +76,28 @@ class Filled:
     texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     kept: str = ""
     grows: bool = False
+
+
+@dataclass
+class Parts:
+    """A result in parts along its axis ``STREAMED``, of which no more than one is in memory.
+
+    What does not lie along it is that of the last part, which stands for the whole in what is said.
+
+    Attributes
+    ----------
+    rows : int
+        In all parts together.
+    """
+
+    parts: Iterator[Any]
+    rows: int
+    last: Any = None
+
+    def __iter__(self) -> Iterator[Any]:
+        for part in self.parts:
+            self.last = part
+            yield part
 
 
 @dataclass
@@ -170,8 +192,8 @@ class Run(Job):
         if self.writes:
             refuse_own(path, self.output)
         check_output(path, self.force, self.inputs)
-        self.texts[path] = text
-        self.also["file"], self.last_words = str(path), f"{path}: {what}"
+        self.texts[path], self.also["file"] = text, str(path)
+        self.say(f"{path}: {what}")
 
     def _of(self, name: str) -> Run | _Taken:
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
@@ -184,8 +206,8 @@ class Stage:
     Attributes
     ----------
     function : callable
-        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder, results by
-        name, with a page each; or None in a dry run.
+        Takes a `Run` and what its command line says. It gives a result, or its `Parts`; or, of a stage that fills a
+        folder, results by name, with a page each; or None in a dry run.
     kind : type
         Class of the result.
     title : str
@@ -198,8 +220,10 @@ class Stage:
         Whether its output is a folder with a page for each result; left out, the answer is only printed.
     fills : Filled or None
         Whether its output is a folder with one answer.
-    study : bool
-        Whether it takes a config.
+    study : bool or callable
+        Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
+    output : object
+        Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
     resumes : bool
@@ -217,7 +241,8 @@ class Stage:
     words: Mapping[str, Any]
     folder: bool
     fills: Filled | None
-    study: bool
+    study: bool | Callable[[Mapping[str, Any]], bool]
+    output: Any
     several: bool
     resumes: bool
     overrides: Callable[..., list[str]] | None
@@ -230,7 +255,7 @@ class Stage:
     @property
     def name(self) -> str:
         """Of the command: that of its module."""
-        return self.function.__module__.rpartition(".")[2].replace("_", "-")
+        return Path(str(sys.modules[self.function.__module__].__file__)).stem.strip("_").replace("_", "-")
 
     def text(self, given: Any, ending: str = "", about: Source | None = None) -> str:
         """Word a result, or all results by name where the ending says so.
@@ -282,13 +307,18 @@ class Stage:
             found = self.function(run, **given)
             if found is None:
                 return self._would(run)
+            streamed = isinstance(found, Parts)
+            if isinstance(found, Parts):
+                # What there is to say is known behind the last part.
+                store.write_parts(run.output, found, found.rows, run.origin(self.name))
+                found = found.last
             results = dict(found) if self.folder else {"": found}
             if self.fills and run.writes:
                 run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-            if run.writes:
+            if run.writes and not streamed:
                 self._write(run, run.output, results)
             else:
                 write_files(run.texts)
@@ -314,7 +344,7 @@ class Stage:
         where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
         where = where if run.writes else ""
         named = {"output": str(run.output)} if run.writes else {}
-        config = "the config and " if self.study else ""
+        config = "the config and " if run.with_config else ""
         return Outcome({"dry_run": True, **named}, (Text(f"{where}{config}all inputs are good"),))
 
     def info(self, path: Path) -> Outcome:
@@ -435,7 +465,8 @@ def stage(
     words: Mapping[str, Any] | None = None,
     folder: bool = False,
     fills: Filled | None = None,
-    study: bool = False,
+    study: bool | Callable[[Mapping[str, Any]], bool] = False,
+    output: Any = None,
     several: bool = False,
     resumes: bool = False,
     overrides: Callable[..., list[str]] | None = None,
@@ -443,7 +474,19 @@ def stage(
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
-        function, kind, title, figures or {}, words or {}, folder, fills, study, several, resumes, overrides, together
+        function,
+        kind,
+        title,
+        figures or {},
+        words or {},
+        folder,
+        fills,
+        study,
+        output,
+        several,
+        resumes,
+        overrides,
+        together,
     )
 
 

@@ -56,7 +56,7 @@ def write(path: Path, given: Any, origin: Origin) -> None:
 
 
 def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> None:
-    """Write a result of which no more than a part is in memory: what is not along ``STREAMED`` is that of the first.
+    """Write a result of which no more than a part is in memory: what is not along ``STREAMED`` is that of the last.
 
     Parameters
     ----------
@@ -69,14 +69,20 @@ def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> 
             if not done:
                 require_sound(path, part)
                 _write_origin(file, type(part), origin)
-                _write(file, part, rows)
+                _write(file, part, rows, streamed=True)
             for name in _streamed(part):
                 values = getattr(part, name)
                 file[name][done : done + len(values)] = values
             done += len(getattr(part, type(part).STREAMED)) if rows else 1
             output.require_written()
-        if wrong := list(_wrong_rows(file, type(part), _streamed(part))) if rows else []:
+        streamed = _streamed(part) if rows else []
+        # What lies along the axis is checked in the file, all of it.
+        wrong = list(_wrong_rows(file, type(part), streamed)) if rows else []
+        wrong = wrong or [each for each in findings(part) if each.partition(":")[0] not in streamed]
+        if wrong:
             raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
+        _write(file, part, rows, streamed=False)
+        output.require_written()
 
 
 def _streamed(given: Any) -> list[str]:
@@ -106,16 +112,17 @@ def require_sound(path: Path, given: Any) -> None:
         raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
 
 
-def _write(group: h5py.Group, given: Any, rows: int = 0) -> None:
-    streamed = _streamed(given) if rows else ()
+def _write(group: h5py.Group, given: Any, rows: int = 0, *, streamed: bool = False) -> None:
+    """Write a part of a result: what is streamed, or all else."""
+    along = _streamed(given) if rows else ()
     for own in described_fields(type(given)):
         value = getattr(given, own.name)
-        if value is None:
+        if value is None or (own.name in along) != streamed:
             continue
         if own.rows or own.table:
             _write_table(group.create_group(own.name), own.rows or own.inner, _rows(own, value))
         elif own.about:
-            _write_values(group, own.name, value, own, own.about, rows if own.name in streamed else 0)
+            _write_values(group, own.name, value, own, own.about, rows if streamed else 0)
         else:
             inner = group.create_group(own.name, track_order=own.named)
             for name, each in value.items() if own.named else [("", value)]:
@@ -217,10 +224,10 @@ def flat(path: Path) -> dict[str, tuple[DatasetSpec, Any]]:
     def take(name: str, held: h5py.Group | h5py.Dataset) -> None:
         if isinstance(held, h5py.Dataset) and name != CONFIG.strip("/"):
             labels = tuple(each.label for each in held.dims)
-            words = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
+            unit, frame, text = (str(held.attrs.get(key, "")) for key in ("units", "frame", "description"))
             values = np.asarray(held[()])
             values = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
-            found[name] = DatasetSpec(name, labels, *words), values
+            found[name] = DatasetSpec(name, labels, unit, frame, text), values
 
     with opened_file(path) as file, patient(path):
         file.visititems(take)

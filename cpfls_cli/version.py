@@ -4,7 +4,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-__version__ = "1.0.0"
+__version__ = "2.0.0"
 
 
 @cache

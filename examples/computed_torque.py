@@ -10,10 +10,10 @@ import sys
 from itertools import pairwise
 from pathlib import Path
 
+import h5py
 import numpy as np
 from scipy.integrate import solve_ivp
 
-import cpfls_cli as cpfls
 from cpfls_cli import rotations, store
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.config.load import load_study
@@ -58,8 +58,10 @@ def follow(plan, law, inertia):
 
 
 def main(config, trajectory, model):
-    plan, record = cpfls.read(trajectory), store.read(Path(model), IdentifiedModel)[0]
-    identified = record.functions
+    with h5py.File(trajectory) as file:
+        names = ("time", "attitude", "attitude_rate", "attitude_acceleration")
+        plan = {name: file[name][:] for name in names}
+    identified = store.read(Path(model), IdentifiedModel)[0].functions
     level = np.diagonal(identified.inertia(np.zeros((1, 3))).value[0])
     laws = {"model": computed_torque(identified), "feedback": lambda _, __, wanted: level * wanted[0]}
     inertia = six_parameters(load_study(Path(config)).vehicle.inertia_kg_m2)

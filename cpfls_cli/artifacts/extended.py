@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.playback import by_horizon
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record
 from cpfls_cli.inertia import more_than_others, six_parameters
 from cpfls_cli.validation.trust import capped, trust_by_playback
@@ -102,7 +103,7 @@ class ExtendedRecord(ModelRecord):
     @property
     def trust(self) -> str:
         """What playback on flights held out says of it, as far as they do not contradict themselves."""
-        return capped(trust_by_playback(self.playback and self.playback.by_horizon), self.audit.contradiction or ())
+        return capped(trust_by_playback(by_horizon(self.playback)), self.audit.contradiction or ())
 
     @property
     def impossible(self) -> tuple[str, ...]:

@@ -13,15 +13,9 @@ from cpfls_cli.artifacts.spec import Record
 _RECORDS = {
     ("cpfls/flight", ""): "flight.FlightRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
-    ("cpfls/prediction", ""): "prediction.PredictionRecord",
-    ("cpfls/twin", ""): "twin.TwinRecord",
-    ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
-    ("cpfls/flight-numbers", ""): "flight_numbers.FlightNumbersRecord",
-    ("cpfls/changed", ""): "changed.ChangedRecord",
-    ("cpfls/trend", ""): "trend.TrendRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
 }
 """Every artifact format by its name and kind, and where its record is: it is loaded when a file of it is met."""
@@ -38,10 +32,14 @@ def record_of_format(name: str, kind: str = "") -> type[Record] | None:
 
 
 def stage_module(attributes: Mapping[str, Any]) -> str:
-    """Name the module of the stage that made a file, by its root attributes; empty where it holds no result."""
+    """Name the module of the stage that made a file, by its root attributes; empty where it holds no result.
+
+    One with a line before its name is no command: other stages keep what it makes.
+    """
     module = str(attributes.get("stage", "")).replace("-", "_")
-    found = re.fullmatch(r"[a-z]\w*", module) and (Path(__file__).parents[1] / "stages" / f"{module}.py").is_file()
-    return module if found else ""
+    names = (module, f"_{module}") if re.fullmatch(r"[a-z]\w*", module) else ()
+    folder = Path(__file__).parents[1] / "stages"
+    return next((name for name in names if (folder / f"{name}.py").is_file()), "")
 
 
 def records() -> list[type[Record]]:

@@ -117,6 +117,11 @@ class PlaybackGroup:
         }
 
 
+def by_horizon(held: PlaybackGroup | None) -> ByHorizon | None:
+    """Give the errors of a playback as a result; None where there is none."""
+    return None if held is None else held.by_horizon
+
+
 @record
 class HeldOutGroup(PlaybackGroup):
     """A model played back along flights that it was not found in, and what it has to beat."""

@@ -10,10 +10,8 @@ from dataclasses import fields
 import numpy as np
 
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
@@ -95,21 +93,3 @@ def _repairs(group: AuditRepairGroup) -> tuple[ChannelRepair, ...]:
     for row in rows:
         row |= {name: bool(row[name]) for name in ("dropped", "in_body")} | {"matrix": np.array(row["matrix"])}
     return tuple(ChannelRepair(**row) for row in rows)
-
-
-def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
-    """Rebuild the numbers that a flight tells."""
-    return FlightNumbers(
-        name=record.flight,
-        values=dict(zip(record.number, record.value.tolist(), strict=True)),
-        errors=dict(zip(record.number, record.error.tolist(), strict=True)),
-        voltage=record.voltage,
-        duration_s=record.duration,
-        commanded=record.commanded,
-        cable_m=record.cable,
-        agility=record.agility,
-        reversed=record.reversed,
-        unsure={}
-        if record.unsure_ratio is None
-        else dict(zip(record.unsure, record.unsure_ratio.tolist(), strict=True)),
-    )

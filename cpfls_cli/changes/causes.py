@@ -59,11 +59,6 @@ class Cause:
         first, *rest = self.name.split()
         return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
-    @property
-    def of_air(self) -> bool:
-        """Whether it is the air that changed, and nothing of the vehicle."""
-        return self.name.partition(" ")[0] in _OF_AIR
-
     def holds(self, other: Cause) -> bool:
         """Tell whether another change is this one, or this one with something more: a second rotor, a place.
 
@@ -118,9 +113,6 @@ _ALONE = {
     "battery": (0.05, "1"),
 }
 """Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
-
-_OF_AIR = ("gusts", "lean")
-"""Kinds that go with the weather."""
 
 _ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
 from typing import NamedTuple
@@ -13,10 +12,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.changes.causes import Cause, causes
-from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.numbers import FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
     FALSE_ALARM,
+    FEWEST,
     Reference,
     common_numbers,
     either,
@@ -24,7 +24,9 @@ from cpfls_cli.changes.reference import (
     kinds_of,
     number_limits,
 )
+from cpfls_cli.changes.results import CABLE, Alike, Changed, Found, NumberToday, Shows
 from cpfls_cli.errors import InputError
+from cpfls_cli.result import Estimate
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 NAMED = 0.95
@@ -68,84 +70,26 @@ _NONE = np.arange(0)
 _HALF_WIDTH = 1.96
 
 
-class Size(NamedTuple):
-    """A size with its 95 % interval, in the unit of its cause."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Found:
-    """A change that was found.
-
-    Attributes
-    ----------
-    sizes : tuple of Size
-        Of each direction that has the unit of the cause: one, but for two rotors or axes.
-    belief : float
-        Share beside all others in its place; of one rotor with that of pairs it is one of.
-    alike : tuple of (str, float)
-        Others in its place, and their share.
-    """
-
-    cause: Cause
-    sizes: tuple[Size, ...]
-    belief: float
-    alike: tuple[tuple[str, float], ...]
-
-
-@dataclass(frozen=True)
-class Change:
-    """What today's flights say beside the reference.
+class Judged(NamedTuple):
+    """What flights say against a reference, as `Changed`, with their numbers as arrays.
 
     Attributes
     ----------
     apart : array, shape (flight, number)
         Numbers of each of today's flights less those of the reference, loads at its voltage.
     deviation : array, shape (number,)
-        What flights of one day differ by where nothing changed.
     limit : array, shape (number,)
-        Deviations beyond which the mean of today's flights is in no number where nothing changed, but for the rate of
-        false alarms: flights beyond one have changed.
-    p_value : float
-        Probability that an unchanged vehicle looks as much like any change, or is as far off in any number: twice the
-        smaller of both. Of draws none smaller than one over their number is known.
-    by_flight : array, shape (flight,)
-        The same of each flight alone.
-    since : int
-        Flight of today from which on it is changed, or looks most like it.
-    found : tuple of Found
-        Empty where nothing changed, and where what changed is none of the known changes.
-    shows : mapping of str to float
-        Smallest size of each change that shows with 90 %, in its unit; infinite where none does.
-    reversed : tuple of str
-        Numbers that every flight of the reference has, and that a flight of today has turned round, or as nothing.
-    missing : tuple of str
-        Other numbers that every flight of the reference has, and not every one of today.
-    undetermined : tuple of str
-        Those of them whose ratio is likelier nothing today than what it is in the reference.
+        In deviations.
     """
 
-    names: tuple[str, ...]
-    reference: Reference
     apart: Array
     deviation: Array
     limit: Array
-    p_value: float
+    p: float
     by_flight: Array
     since: int
     found: tuple[Found, ...]
-    shows: dict[str, float]
-    reversed: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    undetermined: tuple[str, ...] = ()
-
-    @property
-    def changed(self) -> bool:
-        """Whether the vehicle is said to have changed."""
-        return self.p_value <= FALSE_ALARM or bool(self.reversed)
+    shows: tuple[Shows, ...]
 
 
 def changed(
@@ -153,7 +97,7 @@ def changed(
     before: Sequence[FlightNumbers],
     vehicle: VehicleSettings,
     rng: np.random.Generator,
-) -> Change:
+) -> Changed:
     """Hold flights of today against reference flights.
 
     Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
@@ -176,12 +120,47 @@ def changed(
         raise InputError("flights of today and of the reference tell no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
         names = tuple(name for name in names if not name.startswith("load "))
-    change = judged(today, Reference.of(before, names, vehicle), vehicle, rng, range(len(today)))
+    reference = Reference.of(before, names, vehicle)
+    own = judged(today, reference, vehicle, rng, range(len(today)))
     lost = [name for name in common_numbers(before) if not all(name in flight.values for flight in today)]
     turned = tuple(name for name in lost if any(name in flight.reversed for flight in today))
     missing = tuple(name for name in lost if name not in turned)
     nothing = tuple(name for name in missing if any(_likelier_nothing(name, flight, before) for flight in today))
-    return replace(change, reversed=turned, missing=missing, undetermined=nothing)
+    hover, hover_deviation = _in_common(reference, today)
+    mean, scatter = reference.mean, reference.apart(before)[0]
+    columns = (mean, own.deviation, own.limit * own.deviation, (mean + own.apart).T, (mean + scatter).T)
+    keys = ("reference", "deviation", "limit", "today", "before")
+    return Changed(
+        p=own.p,
+        false_alarm=FALSE_ALARM,
+        reversed=turned,
+        numbers=tuple(
+            NumberToday(name=name, unit=unit_of(name), **dict(zip(keys, row, strict=True)))
+            for name, *row in zip(names, *columns, strict=True)
+        ),
+        shows=own.shows,
+        today=tuple(flight.name for flight in today),
+        reference_flights=tuple(flight.name for flight in before),
+        commanded=today[0].commanded,
+        by_flight=own.by_flight,
+        since_flight=own.since,
+        hover=hover,
+        hover_deviation=hover_deviation,
+        fewest=FEWEST,
+        missing=missing,
+        undetermined=nothing,
+        causes=own.found,
+    )
+
+
+def _in_common(reference: Reference, today: Sequence[FlightNumbers]) -> tuple[float, float]:
+    """Compute what the loads of all rotors have in common today, less the reference, and its standard deviation."""
+    loads = np.array([name.startswith("load ") for name in reference.names])
+    if not loads.any():
+        return np.nan, np.nan
+    apart, covariance = reference.apart(today)
+    mean = loads / loads.sum()
+    return float((apart @ mean).mean()), float(np.sqrt(mean @ covariance @ mean))
 
 
 def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightNumbers]) -> bool:
@@ -192,7 +171,7 @@ def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightN
     usual = float(np.mean([own.values[name] for own in before]))
     # The scale of a gyroscope is the inverse of the ratio that is fitted.
     ratio = np.exp(-usual if name.startswith("scale ") else usual)
-    return bool(flight.unsure.get(name, np.inf) < _NEARER * ratio)
+    return any(own.name == name and own.ratio < _NEARER * ratio for own in flight.unsure)
 
 
 def judged(
@@ -201,7 +180,7 @@ def judged(
     vehicle: VehicleSettings,
     rng: np.random.Generator,
     starts: Sequence[int] = (0,),
-) -> Change:
+) -> Judged:
     """Hold flights of today against a reference, as `changed`.
 
     Parameters
@@ -231,26 +210,27 @@ def judged(
     most = np.array([own.space.strongest(rows) for own, rows in zip(of_starts, drawn, strict=True)])
     chance, alone = np.sort(most.max(axis=0)), np.sort(most[-1])
     best = max(range(len(starts)), key=lambda at: (-of_starts[at].p_value(chance), of_starts[at].evidence))
-    p_value, since, found = of_starts[best].p_value(chance), starts[best], tuple[Found, ...]()
+    p_value, since, found = of_starts[best].p_value(chance), starts[best], list[tuple[Cause, Found]]()
+    known = [flight.cable_m for flight in today if np.isfinite(flight.cable_m)]
+    cable = float(np.median(known)) if known else np.nan
     if p_value <= FALSE_ALARM:
-        found = _found(of_starts[best], chance)
+        found = _found(of_starts[best], chance, cable)
     if found:
-        since = _since(of_starts[best].space, apart, found, starts)
-        found = _found(of_starts[list(starts).index(since)], chance) or found
+        since = _since(of_starts[best].space, apart, [cause for cause, _ in found], starts)
+        found = _found(of_starts[list(starts).index(since)], chance, cable) or found
     space, threshold, first = of_starts[0].space, float(np.quantile(chance, 1 - EACH_TEST)), dict[str, int]()
     for index in space.searched:
         first.setdefault(listed[index].name, index)
-    return Change(
-        names,
-        reference,
+    sizes = {index: space.shows(index, threshold, limit, drawn[0][:, :_SHOWN]) for index in first.values()}
+    return Judged(
         apart,
         np.sqrt(np.diag(covariance)),
         limit,
         p_value,
         np.array([held([flight], 1).p_value(alone) for flight in today]),
         since,
-        found,
-        {name: space.shows(index, threshold, limit, drawn[0][:, :_SHOWN]) for name, index in first.items()},
+        tuple(each for _, each in found),
+        tuple(Shows(cause=listed[at].name, unit=listed[at].unit, smallest=size) for at, size in sizes.items()),
     )
 
 
@@ -401,7 +381,7 @@ class _Space:
             logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
         return logarithm, mean, covariance
 
-    def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
+    def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Estimate, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
 
         What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
@@ -419,7 +399,8 @@ class _Space:
         error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
         shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
-        return tuple(Size(*map(cause.size, each)) for each in shown.T)
+        ends = (map(cause.size, each) for each in shown.T)
+        return tuple(Estimate(value=value, low=low, high=high) for value, low, high in ends)
 
     def shows(self, index: int, threshold: float, limit: Array, drawn: Array) -> float:
         """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does.
@@ -502,7 +483,7 @@ def _losing(mean: Array, variance: Array) -> Array:
     return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
 
 
-def _found(held: _Held, chance: Array) -> tuple[Found, ...]:
+def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]]:
     """Name one change after another while each explains more than chance beside the others.
 
     Where something is off and no change by itself explains it, the first counts on credit: two at once hide each
@@ -524,19 +505,28 @@ def _found(held: _Held, chance: Array) -> tuple[Found, ...]:
             most = max(of_name, key=lambda name: of_name[name])
             chosen = [*others, max(space.ways(most), key=lambda at: beliefs[at])]
     if len(chosen) == 1 and beyond_chance(chance, held.evidence) > EACH_TEST:
-        return ()
+        return []
     found = []
     for index in chosen:
         beliefs = _beliefs(space, row, [other for other in chosen if other != index])
         cause, of_name = space.listed[index], _by_name(space, beliefs)
         order = sorted(of_name, key=lambda name: -of_name[name])
-        alike = tuple((name, of_name[name]) for name in order if name != cause.name and of_name[name] >= LISTED)
-        sure = sum(belief for other, belief in zip(space.listed, beliefs, strict=True) if cause.holds(other))
+        listed = (name for name in order if name != cause.name and of_name[name] >= LISTED)
+        sure = float(sum(belief for other, belief in zip(space.listed, beliefs, strict=True) if cause.holds(other)))
         # The way that leaves most open.
         widest = max(space.ways(cause.name), key=lambda at: space.white[at].shape[1])
         sizes = space.sizes(row, [widest if other == index else other for other in chosen], widest)
-        found.append(Found(cause, sizes, float(sure), alike))
-    return tuple(found)
+        made = Found(
+            name=cause.name,
+            named=sure >= NAMED,
+            belief=sure,
+            unit=cause.unit,
+            cable_m=cable if cause.name == CABLE else None,
+            sizes=sizes,
+            alike=tuple(Alike(name=name, belief=of_name[name]) for name in listed),
+        )
+        found.append((cause, made))
+    return found
 
 
 def _by_name(space: _Space, beliefs: Array) -> dict[str, float]:
@@ -554,12 +544,12 @@ def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
     return np.asarray(share / share.sum())
 
 
-def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence[int]) -> int:
+def _since(space: _Space, apart: Array, found: Sequence[Cause], starts: Sequence[int]) -> int:
     """Find the flight before which flights are nearest to the reference, and from which on to each other.
 
     Along what was found: what else flights of a day have in common tells nothing of it.
     """
-    along = np.hstack([space.whitened(each.cause.directions[:, : each.cause.told]) for each in found])
+    along = np.hstack([space.whitened(cause.directions[:, : cause.told]) for cause in found])
     shown = space.whitened(apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
 
     def apart_from(start: int) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.lag import delayed
+from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
 
 _LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.name for shape in effect.shapes})
@@ -117,45 +119,96 @@ _COLLINEAR = 1e-9
 """Squared share of a signal of its own below which it goes with the others."""
 
 
-@dataclass(frozen=True)
+@result
+class NumberOfFlight:
+    """A number of one flight."""
+
+    name: str = about("its kind, and the rotor, axis or sensor that it is of: load M3")
+    unit: str = about("its unit; 1 of the logarithm of a ratio")
+    value: float = about("in its unit")
+    error: float = about("its standard error, over blocks of the flight, in its unit", least=0)
+
+
+@result
+class UnsureRatio:
+    """A ratio that may be zero, so that it has no logarithm."""
+
+    name: str = about("of the number that it would be")
+    ratio: float = about("as estimated")
+
+
+@result
+class StatedFact:
+    """What a log states of its vehicle, by which flights of two vehicles are kept apart."""
+
+    name: str = about("parameter of the frame and the rotors, or `written by`")
+    value: str = about("as the log has it")
+
+
+@result
 class FlightNumbers:
-    """What one flight tells.
+    """What one flight says of its vehicle in numbers that other flights of it have alike."""
 
-    Attributes
-    ----------
-    values, errors : mapping of str to float
-        By name, a kind of `KINDS` and what it is of; standard errors over blocks of the flight.
-    voltage : float
-        Mean, in V, or a share of a full battery where the log has that; NaN where it has none.
-    duration_s : float
-        Of what flies.
-    commanded : bool
-        Whether loads are of commands, and not of speeds that were measured.
-    cable_m : float
-        Length of the cable that fits best what swings, if anything does; NaN where the log does not hold it.
-    agility : float
-        Acceleration that it is flown with beside the mean, root mean square, m/s^2; NaN where the log does not hold it.
-    reversed : tuple of str
-        Numbers that are the logarithm of a ratio which is zero here, or clearly below: a sensor or a rotor that is
-        still, or turned round.
-    unsure : mapping of str to float
-        Ratios that may be zero here, so that they have no logarithm, by the names of their numbers.
-    """
+    FORMAT: ClassVar = "cpfls/flight-numbers"
 
-    name: str
-    values: Mapping[str, float]
-    errors: Mapping[str, float]
-    voltage: float
-    duration_s: float
-    commanded: bool
-    cable_m: float = float("nan")
-    agility: float = float("nan")
-    reversed: tuple[str, ...] = ()
-    unsure: Mapping[str, float] = field(default_factory=dict)
+    name: str = about("of the flight")
+    duration_s: float = about("time that it flies, away from take-off and landing", unit="s")
+    voltage: float = about("mean of the battery in flight, V, or share of a full one where the log has that", gaps=True)
+    commanded: bool = about("whether loads are of commands, and not of speeds that were measured")
+    cable_m: float = about(
+        "length of the cable that fits best what swings, if anything does", unit="m", gaps=True, default=np.nan
+    )
+    agility: float = about(
+        "acceleration that it is flown with, less its mean, root mean square", unit="m/s^2", gaps=True, default=np.nan
+    )
+    period_s: float = about("time from sample to sample", unit="s", gaps=True, default=np.nan)
+    flown_at_s: float = about(
+        "when it was flown, since 1970 began (UTC), where the log has that", unit="s", gaps=True, default=np.nan
+    )
+    code: str = about("hash of the code that computed it: other code computes it anew", default="")
+    reversed: tuple[str, ...] = about(
+        "numbers that are the logarithm of a ratio which is zero here, or clearly below: a sensor or a rotor that is "
+        "still, or turned round",
+        "reversed",
+        default=(),
+    )
+    contradictions: tuple[str, ...] = about(
+        "what of the flight contradicts itself or its vehicle", "contradiction", default=()
+    )
+    warnings: tuple[str, ...] = about("what to know about the flight", "warning", default=())
+    numbers: tuple[NumberOfFlight, ...] = part()
+    unsure: tuple[UnsureRatio, ...] = part(default=())
+    stated: tuple[StatedFact, ...] = part(default=())
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Numbers by name."""
+        return {each.name: each.value for each in self.numbers}
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """Their standard errors by name."""
+        return {each.name: each.error for each in self.numbers}
+
+    @cached_property
+    def facts(self) -> dict[str, str]:
+        """What its log states of the vehicle, by name."""
+        return {each.name: each.value for each in self.stated}
+
+
+def numbers_of(values: Mapping[str, float], errors: Mapping[str, float]) -> tuple[NumberOfFlight, ...]:
+    """Arrange numbers and their standard errors by name."""
+    rows = ((name, float(value), float(errors[name])) for name, value in values.items())
+    return tuple(NumberOfFlight(name=name, unit=unit_of(name), value=value, error=error) for name, value, error in rows)
+
+
+def unit_of(name: str) -> str:
+    """Look up the unit of a number by its name."""
+    return KINDS[name.split()[0]].unit
 
 
 def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
-    """Tell the numbers of a flight.
+    """Compute the numbers of a flight.
 
     Parameters
     ----------
@@ -199,7 +252,16 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyros
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
     agility = _agility(signals, flies)
     return FlightNumbers(
-        name, values, errors, voltage, duration, signals.commanded, cable, agility, tuple(below), unsure
+        name=name,
+        duration_s=duration,
+        voltage=voltage,
+        commanded=signals.commanded,
+        cable_m=cable,
+        agility=agility,
+        period_s=signals.period,
+        reversed=tuple(below),
+        numbers=numbers_of(values, errors),
+        unsure=tuple(UnsureRatio(name=name, ratio=ratio) for name, ratio in unsure.items()),
     )
 
 

@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.changes.judge import Change, beyond_chance, judged
-from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.judge import beyond_chance, judged
+from cpfls_cli.changes.numbers import FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
+    FALSE_ALARM,
     FEWEST,
     Reference,
     either,
     expected_covariance,
+    furthest,
     kinds_of,
     learned_covariance,
+    number_limits,
 )
+from cpfls_cli.changes.results import FlightInTime, NumberInTime, Shift, Trend
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
@@ -34,75 +38,13 @@ _AT_ONCE = 3
 """Change points whose gain is shared when a row is held against chance."""
 
 
-@dataclass(frozen=True)
-class Shift:
-    """A change point.
-
-    Attributes
-    ----------
-    start, end : int
-        Flights from which on and before which the vehicle is changed: up to the next change point.
-    change : Change
-        What these flights say beside those from the change point before.
-    """
-
-    start: int
-    end: int
-    change: Change
-
-
-@dataclass(frozen=True)
-class Trend:
-    """Numbers of flights in time.
-
-    Attributes
-    ----------
-    flights : tuple of FlightNumbers
-        In time order; those that tell all numbers.
-    left_out : tuple of str
-        Flights that lack some of the numbers.
-    reversed : tuple of str
-        Those of them that have some turned round, or as nothing, and which.
-    reference : int
-        How many of the first flights are the reference.
-    mean : array, shape (number,)
-        Of the reference.
-    apart : array, shape (flight, number)
-        Less that mean, loads at its voltage.
-    deviation : array, shape (flight, number)
-        By which a flight of an unchanged vehicle differs from the reference.
-    limit : float
-        Deviations beyond which no number of an unchanged vehicle is in any flight after the reference, but for the rate
-        of false alarms.
-    p_value : float
-        Probability that a row of flights of an unchanged vehicle looks as much as if it had changed, or is as far off
-        in any number of any flight: twice the smaller of both.
-    shifts : tuple of Shift
-    shows : mapping of str to float
-        Smallest size of each change that shows in one flight after the reference, as of `Change`.
-    """
-
-    names: tuple[str, ...]
-    flights: tuple[FlightNumbers, ...]
-    left_out: tuple[str, ...]
-    reversed: tuple[str, ...]
-    reference: int
-    mean: Array
-    apart: Array
-    deviation: Array
-    limit: float
-    p_value: float
-    shifts: tuple[Shift, ...]
-    shows: dict[str, float]
-
-
 def trend(
     flights: Sequence[FlightNumbers],
     vehicle: VehicleSettings,
     rng: np.random.Generator,
     reference: int | None = None,
 ) -> Trend:
-    """Find the flights from which on a vehicle is another one.
+    """Find the flights from which on a vehicle is another one; numbers and limits of each flight with it.
 
     Numbers are whitened by the covariance of flights that follow each other, which a change between two of them hardly
     touches. Change points are those of least squares with a penalty for each (PELT), the one that rows of an unchanged
@@ -143,35 +85,37 @@ def trend(
         first = max(FEWEST, min(first, starts[0]))
     held = Reference.of(kept[:first], names, vehicle)
     apart, deviation = _apart(held, kept)
-    asked = len(apart) - first
+    deviations, asked = apart / deviation, len(kept) - first
+    limit = number_limits(held.freedom, asked)
     return Trend(
-        names,
-        tuple(kept),
-        tuple(flight.name for flight in without),
-        tuple(f"{name}: {joined(which)} reversed, or nothing" for name, which in turned if which),
-        first,
-        held.mean,
-        apart,
-        deviation,
-        limit=_limit(held.freedom, asked),
-        p_value=either(of_points, _as_far(held.freedom, asked, float(np.abs(apart / deviation)[first:].max()))),
-        shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
+        p=either(of_points, furthest(deviations[first:], held.freedom, asked)),
+        false_alarm=FALSE_ALARM,
+        reversed=tuple(f"{name}: {joined(which)} reversed, or nothing" for name, which in turned if which),
+        left_out=tuple(flight.name for flight in without),
+        flights=tuple(
+            FlightInTime(
+                flight=flight.name,
+                flown_at_s=flight.flown_at_s,
+                reference=at < first,
+                part=1 + sum(start <= at for start in starts),
+                beyond=tuple(name for name, is_beyond in zip(names, beyond, strict=True) if is_beyond),
+            )
+            for at, (flight, beyond) in enumerate(zip(kept, np.abs(deviations) > limit, strict=True))
+        ),
+        numbers=tuple(
+            NumberInTime(
+                name=name,
+                unit=unit_of(name),
+                reference=float(held.mean[at]),
+                values=held.mean[at] + apart[:, at],
+                deviation=deviation[:, at],
+                limit=float(limit[at]),
+            )
+            for at, name in enumerate(names)
+        ),
+        shifts=tuple(_shifts(row, kept, starts, vehicle, rng, apart, deviation)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
     )
-
-
-def _as_far(freedom: Array, flights: int, deviations: float) -> float:
-    """Compute at most how probable it is that any number of so many unchanged flights is as far off."""
-    # Slow to load, and who reads a record computes nothing.
-    from scipy.special import stdtr
-
-    return float(2 * flights * stdtr(freedom, -deviations).sum())
-
-
-def _limit(freedom: Array, flights: int) -> float:
-    """Find the deviations that some number of an unchanged flight exceeds at the rate of `EACH_TEST` at most."""
-    limits = np.geomspace(1.0, 1e4, 4000)
-    return float(next((each for each in limits if _as_far(freedom, flights, each) <= EACH_TEST), limits[-1]))
 
 
 def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
@@ -197,8 +141,10 @@ def _shifts(
     starts: Sequence[int],
     vehicle: VehicleSettings,
     rng: np.random.Generator,
+    apart: Array,
+    deviation: Array,
 ) -> Iterator[Shift]:
-    """Judge the flights from each change point on beside those before, with the scatter that is left in all parts."""
+    """Judge the flights from each change point on against those before, with the scatter that is left in all parts."""
     inside = np.vstack([part - part.mean(axis=0) for part in np.split(row.values, starts)])
     scatter, freedom = learned_covariance(inside, float(len(inside) - len(starts) - 1), row.expected, row.names)
     bounds = [0, *starts, len(flights)]
@@ -206,7 +152,16 @@ def _shifts(
         # What flights after it have in common by chance, as those of one day, is no less than what one has.
         covariance = scatter * (1 + 1 / (start - before))
         own = replace(Reference.of(flights[before:start], row.names, vehicle), covariance=covariance, freedom=freedom)
-        yield Shift(start, end, judged(flights[start:end], own, vehicle, rng))
+        change = judged(flights[start:end], own, vehicle, rng)
+        step = apart[start:end].mean(axis=0) - apart[before:start].mean(axis=0)
+        yield Shift(
+            since=flights[start].name,
+            flight=start + 1,
+            flown_at_s=flights[start].flown_at_s,
+            p=change.p,
+            deviations=step / deviation[start:end].mean(axis=0),
+            causes=change.found,
+        )
 
 
 def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:

@@ -12,24 +12,19 @@ import typer
 
 from cpfls_cli.arguments import (
     ArtifactsArgument,
-    AutopilotChoice,
     DiagnosisArgument,
     DisagreementArgument,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightArgument,
     FlightsArgument,
     FlownArgument,
     FolderOption,
     HeldOutOption,
     LogArgument,
     LogsArgument,
-    ModelArgument,
     ModelOption,
-    SchedulerOption,
-    TimeOrder,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -37,15 +32,12 @@ from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
-    SeveralAfterOption,
-    refuse_overrides,
     sheet,
     with_common,
 )
 from cpfls_cli.cli.stages import AllCommands, noted
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
 
@@ -208,90 +200,6 @@ def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, c
 
 
 @_command()
-def predict(
-    config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
-) -> None:
-    """Predict torque, inertia and Coriolis matrices of a model along a flight."""
-    _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
-
-
-@_command()
-def tune(
-    config: Annotated[
-        Path, typer.Argument(metavar="CONFIG|LOG", help="Study config (YAML); or a log, alone.", show_default=False)
-    ],
-    model: Annotated[
-        Path | None,
-        typer.Argument(metavar="VEHICLE", help="With CONFIG: vehicle, made by `cpfls vehicle`.", show_default=False),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="File to write; of a LOG parameters that change.", show_default=False
-        ),
-    ] = None,
-    autopilot: Annotated[
-        AutopilotChoice | None,
-        typer.Option("--autopilot", help="With CONFIG: whose control law and parameters; a LOG says it."),
-    ] = None,
-    flights: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--flight", metavar="LOG", help="Log with today's parameters and the gyroscope's noise; any number."
-        ),
-    ] = None,
-    gain_margin: Annotated[
-        float, typer.Option("--gain-margin", metavar="DB", min=0.5, max=30.0, help="At least.")
-    ] = 6.0,
-    phase_margin: Annotated[
-        float, typer.Option("--phase-margin", metavar="DEG", min=5.0, max=85.0, help="At least.")
-    ] = 45.0,
-    disk_margin: Annotated[
-        float,
-        typer.Option("--disk-margin", metavar="DEG", min=5.0, max=85.0, help="Phase, with gain off too; at least."),
-    ] = 35.0,
-    *,
-    common: Common,
-) -> None:
-    """Find gains for an autopilot that keep their margins with every vehicle that flights, or a log, leave possible."""
-    asked = (gain_margin, phase_margin, disk_margin)
-    if model is None:
-        _tune_log(config, output, autopilot, flights, asked, common)
-        return
-    if output is None or autopilot is None:
-        raise typer.BadParameter("with a config and a vehicle, -o FILE and --autopilot are needed, too")
-    whose = autopilot.value
-    _run(
-        "tune",
-        config,
-        output,
-        common,
-        lambda command, job: command.run(job, model, whose, flights or (), command.AskedMargins(*asked)),
-    )
-
-
-def _tune_log(
-    log: Path,
-    output: Path | None,
-    autopilot: AutopilotChoice | None,
-    flights: list[Path] | None,
-    asked: tuple[float, float, float],
-    common: Common,
-) -> None:
-    """Find gains from a log alone."""
-    with messages_for_errors():
-        refuse_overrides(common)
-        if autopilot is not None or flights:
-            raise InputError(f"{log}: with a log alone leave --autopilot and --flight out; the log says both")
-        from cpfls_cli.cli.misplaced import refuse_misplaced_log
-
-        refuse_misplaced_log(log, "a config needs the vehicle that `cpfls vehicle` found, too")
-        command = _of("tune")
-        margins = command.AskedMargins(*asked)
-        tell(command.run_log(log, output, margins, force=common.force, dry_run=common.dry_run), common)
-
-
-@_command()
 def report(
     config: ConfigArgument,
     artifacts: ArtifactsArgument,
@@ -353,95 +261,6 @@ def gap(
 ) -> None:
     """Compare, diagnose and extend in one go, with a report."""
     _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
-
-
-OtherVehicleOption = Annotated[
-    bool,
-    typer.Option("--anyway", help="Compare flights even where their logs say that they are of different vehicles."),
-]
-
-
-@_command(kind=SeveralAfterOption)
-def changed(
-    config: ConfigArgument,
-    today: Annotated[
-        list[Path],
-        typer.Argument(metavar="TODAY...", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
-    ],
-    output: FolderOption,
-    since: Annotated[
-        list[Path],
-        typer.Option(
-            "--reference",
-            "--since",
-            metavar="FLIGHT...",
-            help="Flights or logs of the same vehicle from before, three or more, one after another.",
-            show_default=False,
-        ),
-    ],
-    fail_on_change: Annotated[
-        bool,
-        typer.Option(
-            "--fail-on-change",
-            help="End with exit code 1 where something has changed, for scripts; with two reference flights 0 "
-            "says only that nothing is beyond what is usual of vehicles. Where that is unknown the exit code is 3, "
-            "with or without this.",
-        ),
-    ] = False,
-    anyway: OtherVehicleOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Say what has changed about a vehicle since reference flights: a rotor, its weight, its battery, or nothing."""
-    _run(
-        "changed",
-        config,
-        output,
-        common,
-        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change, anyway=anyway),
-    )
-
-
-@_command()
-def trend(
-    config: ConfigArgument,
-    flights: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FLIGHT...", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill, or to add to.", show_default=False),
-    ],
-    reference: Annotated[
-        int | None,
-        typer.Option(
-            "--reference",
-            metavar="N",
-            min=1,
-            help="The first N flights are those of the unchanged vehicle; default: half of them, as far as they do not "
-            "change, and three at least.",
-        ),
-    ] = None,
-    order: Annotated[
-        TimeOrder | None,
-        typer.Option("--order", help="What orders flights; default: their dates where all logs have one, or names."),
-    ] = None,
-    anyway: OtherVehicleOption = False,
-    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that read logs.")] = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Say since which of many flights what is changed about a vehicle; a second call reads only new ones."""
-
-    def call(command: Any, job: Job) -> Any:
-        chosen = command.Options(reference, order and order.value, anyway, workers, scheduler)
-        return command.run(job, flights, chosen)
-
-    _run("trend", config, output, common, call)
 
 
 @_command()

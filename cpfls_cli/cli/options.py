@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 from typer.models import ArgumentInfo
 
 if TYPE_CHECKING:
@@ -87,14 +87,6 @@ class Commands(TyperGroup):
         except typer.BadParameter as error:
             error.message = _in_own_words(error)
             raise
-
-
-class SeveralAfterOption(TyperCommand):
-    """A command whose options that may be repeated take all values that follow, as of ``--reference old/*``."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Repeat such an option before each of its values."""
-        return super().parse_args(ctx, repeated(self.params, args))
 
 
 def repeated(params: Sequence[Any], args: Sequence[str]) -> list[str]:

@@ -17,7 +17,15 @@ from typer.core import TyperCommand
 
 from cpfls_cli.arguments import FolderOption
 from cpfls_cli.cli.interrupts import deferred_interrupts
-from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, repeated, with_common
+from cpfls_cli.cli.options import (
+    Commands,
+    Common,
+    ConfigArgument,
+    OutputOption,
+    refuse_overrides,
+    repeated,
+    with_common,
+)
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import ComputationError
 
@@ -31,6 +39,8 @@ ORDER = (
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
 )
 """Of the list of commands; what it does not name stands behind."""
+PARTS = ("twin",)
+"""Stages that are a part of another command: of `simulate`, along a flight."""
 _DOCSTRING = re.compile(r'^"""(.*?)"""', re.DOTALL)
 FilledOption = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill.", show_default=False)
@@ -93,8 +103,9 @@ class AllCommands(Commands):
 
 
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
-    """List the commands of the stages in a folder."""
-    files = {file.stem.replace("_", "-"): file for file in sorted(folder.glob("[a-z]*.py"))}
+    """List the commands of the stages in a folder; some are a part of another command, which calls them."""
+    every = (file for file in sorted(folder.glob("[a-z]*.py")) if file.stem not in PARTS)
+    files = {file.stem.replace("_", "-"): file for file in every}
     return {name: StageCommand(file) for name, file in files.items()}
 
 
@@ -113,7 +124,7 @@ def run_of(
 
     study = common.study(config, sweep=own.name == "sweep") if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
-    run.writes, run.with_config = output is not None, own.study
+    run.writes, run.with_config = output is not None, config is not None
     if config:
         reads(config)
         run.inputs.append(config)
@@ -141,12 +152,17 @@ def command_of(own: Stage) -> Callable[..., None]:
     parameters = [
         each for each in inspect.signature(own.function, eval_str=True).parameters.values() if each.name != "run"
     ]
+    declared = any(each.name == "config" for each in parameters)
 
     def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
         with messages_for_errors():
             from cpfls_cli.artifacts.output import locked
 
             narration = Narration(own.name, common.verbose and not common.quiet)
+            given |= {"config": config} if declared else {}
+            if callable(own.study) and not own.study(given):
+                refuse_overrides(common)
+                config = None
             if own.overrides:
                 common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
             with progress_bar(own.name, common) as progress:
@@ -158,13 +174,13 @@ def command_of(own: Stage) -> Callable[..., None]:
             tell(outcome, common)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    added = {"config": ConfigArgument} if own.study else {}
-    option = FilledOption if own.folder else FolderOption if own.fills else OutputOption
+    added = {"config": ConfigArgument} if own.study and not declared else {}
+    option = own.output or (FilledOption if own.folder else FolderOption if own.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
         *(each.replace(kind=keyword) for each in parameters),
-        output.replace(default=None) if own.folder else output,
+        output.replace(default=None) if own.folder or own.output else output,
         inspect.Parameter("common", keyword, annotation=Common),
     ]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]

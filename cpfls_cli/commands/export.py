@@ -82,8 +82,11 @@ def _form_of(output: Path) -> str:
     for form, ending in ENDINGS.items():
         if output.suffix == ending:
             return form
-    first = {ending: form for form, ending in reversed(ENDINGS.items()) if ending != ".py"}
-    endings = ", ".join(f"{ending} ({form})" for ending, form in reversed(first.items()))
+    first: dict[str, str] = {}
+    for form, ending in ENDINGS.items():
+        if ending != ".py":
+            first.setdefault(ending, form)
+    endings = ", ".join(f"{ending} ({form})" for ending, form in first.items())
     raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
 
 

@@ -24,14 +24,8 @@ _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
-    "cpfls/prediction": "prediction",
-    "cpfls/twin": "twin",
-    "cpfls/gains": "gains",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
-    "cpfls/flight-numbers": "flight_numbers",
-    "cpfls/changed": "changed",
-    "cpfls/trend": "trend",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,7 +44,7 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     if is_log(trajectory) or holds(trajectory, FlightRecord):
         if mode not in (None, "closed-loop"):
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
-        return import_module("cpfls_cli.commands.twin").run(job, trajectory, model)  # type: ignore[no-any-return]
+        return _along_flight(job, trajectory, model)
     if model is not None and mode is None:
         job = replace(job, study=_in_closed_loop(job.study))
     job = _with_numbers(job, model)
@@ -62,6 +62,16 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     if closed:
         return _closed_loop(job, inputs, time, planned, flown)
     return _inverse(job, inputs, time, planned, trajectory)
+
+
+def _along_flight(job: Job, flight: Path, model: Path | None) -> Outcome:
+    """Fly the setpoints of a flight again, as the stage does that has no command of its own."""
+    stage = import_module("cpfls_cli.stage")
+    given = {each.name: getattr(job, each.name) for each in fields(Job)}
+    made: Outcome = stage.loaded("twin").run(stage.Run(**given), path=flight, model=model)
+    # It has said them.
+    job.cautions.clear()
+    return made
 
 
 def _with_numbers(job: Job, model: Path | None) -> Job:

@@ -2,48 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.artifacts.gains import GainsRecord, ParameterRow
 from cpfls_cli.autopilots.parameters import Autopilot
-from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.tuning.vehicle import ParameterRow
+
+Rows = Mapping[str, ParameterRow]
+"""Parameters by name."""
 
 _FLOAT = 9
 """Type of MAVLink, as QGroundControl writes it."""
 
 
-def parameter_file(record: GainsRecord, name: str) -> tuple[str, str]:
-    """Write the proposed parameters for the ground station of their autopilot.
-
-    Parameters
-    ----------
-    name : str
-        Of the artifact, for the first line.
-
-    Returns
-    -------
-    suffix : str
-        Of such files.
-    text : str
-
-    References
-    ----------
-    QGroundControl, Parameters; Mission Planner, parameter files; Betaflight CLI; cflib, param_file_helper.
-    """
-    about = f"gains of cpfls for {record.vehicle_name}, see {name}"
-    return file_of(AUTOPILOTS[record.autopilot], record.firmware or "", about, record.rows)
-
-
-def file_of(autopilot: Autopilot, version: str, about: str, rows: Sequence[ParameterRow]) -> tuple[str, str]:
+def parameter_file(autopilot: Autopilot, version: str, about: str, rows: Rows) -> tuple[str, str]:
     """Write parameters for the ground station of an autopilot: the suffix of such files, and the text.
 
     Parameters
     ----------
     version : str
         Of the firmware; empty for the one whose documented ranges are known.
+    about : str
+        What they are, for the first lines.
+
+    References
+    ----------
+    QGroundControl, Parameters; Mission Planner, parameter files; Betaflight CLI; cflib, param_file_helper.
     """
     form = _FORMS[autopilot.name]
     head = [
@@ -65,13 +51,13 @@ def _version(autopilot: Autopilot, version: str) -> str:
     return own if own == known else f"{own}, as the log says; documented ranges and defaults are those of {known}"
 
 
-def _comments(rows: Sequence[ParameterRow], line: Callable[[ParameterRow], str]) -> Iterator[str]:
-    for row in rows:
-        yield f"# {comment(row)}"
-        yield line(row)
+def _comments(rows: Rows, line: Callable[[str, ParameterRow], str]) -> Iterator[str]:
+    for name, row in rows.items():
+        yield f"# {_comment(row)}"
+        yield line(name, row)
 
 
-def comment(row: ParameterRow) -> str:
+def _comment(row: ParameterRow) -> str:
     """Say what a parameter is, what it was, and what its documentation allows."""
     unit = f" ({row.unit})" if row.unit else ""
     before = f"now {row.today:.6g}" if np.isfinite(row.today) else f"default {row.default:.6g}"
@@ -80,31 +66,31 @@ def comment(row: ParameterRow) -> str:
     return f"{row.meaning}{unit}: {before}; documented range {row.low:.6g} to {most}{cut}"
 
 
-def _qgroundcontrol(rows: Sequence[ParameterRow]) -> Iterator[str]:
+def _qgroundcontrol(rows: Rows) -> Iterator[str]:
     yield "# Vehicle-Id Component-Id Name Value Type"
-    yield from _comments(rows, lambda row: f"1\t1\t{row.name}\t{_value(row)}\t{_FLOAT}")
+    yield from _comments(rows, lambda name, row: f"1\t1\t{name}\t{_value(row)}\t{_FLOAT}")
 
 
-def _mission_planner(rows: Sequence[ParameterRow]) -> Iterator[str]:
-    yield from _comments(rows, lambda row: f"{row.name},{_value(row)}")
+def _mission_planner(rows: Rows) -> Iterator[str]:
+    yield from _comments(rows, lambda name, row: f"{name},{_value(row)}")
 
 
 _SLIDERS = ("# own values in place of the sliders", "set simplified_pids_mode = OFF")
 
 
-def _betaflight(rows: Sequence[ParameterRow]) -> Iterator[str]:
+def _betaflight(rows: Rows) -> Iterator[str]:
     yield from _SLIDERS
-    yield from _comments(rows, lambda row: f"set {row.name} = {round(row.proposed)}")
+    yield from _comments(rows, lambda name, row: f"set {name} = {round(row.proposed)}")
     yield "save"
 
 
-def _crazyflie(rows: Sequence[ParameterRow]) -> Iterator[str]:
+def _crazyflie(rows: Rows) -> Iterator[str]:
     yield "type: persistent_param_state"
     yield "version: '1'"
     yield "params:"
-    for row in rows:
-        yield f"  # {comment(row)}"
-        yield f"  {row.name}:"
+    for name, row in rows.items():
+        yield f"  # {_comment(row)}"
+        yield f"  {name}:"
         yield f"    default_value: {row.default:.9g}"
         yield "    is_stored: true"
         yield f"    stored_value: {_value(row)}"
@@ -117,7 +103,7 @@ def _value(row: ParameterRow) -> str:
 class _Form(NamedTuple):
     suffix: str
     how: tuple[str, ...]
-    lines: Callable[[Sequence[ParameterRow]], Iterator[str]]
+    lines: Callable[[Rows], Iterator[str]]
 
 
 _FORMS = {

@@ -15,12 +15,12 @@ from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators import ardupilot
-from cpfls_cli.export.simulators.crazyflow import STEP_S, crazyflow_held, crazyflow_text, fly_crazyflow
-from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text
-from cpfls_cli.export.simulators.mjcf import fly_mjcf, mjcf_held, mjcf_text
+from cpfls_cli.export.simulators.crazyflow import crazyflow_held, crazyflow_text
+from cpfls_cli.export.simulators.functions import casadi_text, jax_text
+from cpfls_cli.export.simulators.mjcf import mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
-from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
-from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
+from cpfls_cli.export.simulators.rotorpy import rotorpy_held, rotorpy_text
+from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.model import VehicleModel
@@ -53,31 +53,23 @@ class Form:
 
 @dataclass(frozen=True, kw_only=True)
 class Target(Form):
-    """A simulator or library that a vehicle is exported for.
+    """A form of which something flies otherwise than any sum of weights.
 
     Attributes
     ----------
-    package : str
-        That flies it; empty where this program does.
+    fly, fly_as_held : callable
+        From the text of the file and a course to states at the samples behind each start, shape (run, horizon, ...);
+        the second leaves out what it does otherwise.
     step_s : float
-        Longest step that it is flown with; infinite where it takes the flight's own.
-    levels : int
-        Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
-        takes the very steps of a playback.
-    fly : callable
-        From the text of the file and a course to states at the samples behind each start, shape (run, horizon, ...).
-    fly_as_held : callable or None
-        The same without what the target does otherwise than any sum of weights; None where that is nothing.
+        Longest step that it is flown with.
     otherwise : str
         What that is, in words.
     """
 
     fly: Callable[[str, Course], State]
-    package: str
-    step_s: float = np.inf
-    levels: int = 0
-    fly_as_held: Callable[[str, Course], State] | None = None
-    otherwise: str = ""
+    fly_as_held: Callable[[str, Course], State]
+    step_s: float
+    otherwise: str
 
 
 def _whole(model: VehicleModel) -> tuple[Held, Holds]:
@@ -91,30 +83,21 @@ def _c(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
     return source.header if path.suffix == ".h" else source.source
 
 
-TARGETS = {
-    "mjcf": Target("MuJoCo", ".xml", mjcf_held, mjcf_text, fly=fly_mjcf, package="mujoco", step_s=1e-3, levels=4),
-    "sdf": Target("Gazebo's motor model", ".sdf", sdf_held, sdf_text, fly=fly_sdf, package="", step_s=1e-3, levels=4),
-    "px4": Target("PX4's Gazebo", ".sdf", sdf_held, px4_text, AIRFRAME, fly=fly_sdf, package="", step_s=1e-3, levels=4),
-    "crazyflow": Target(
-        "crazyflow",
-        ".toml",
-        crazyflow_held,
-        crazyflow_text,
-        fly=fly_crazyflow,
-        package="drone_models",
-        step_s=STEP_S,
-        levels=4,
-    ),
+FORMS: dict[str, Form] = {
+    "json": Form("JSON", ".json", _whole, lambda sheet, _held, told, _file: json_text(sheet, told)),
+    "c": Form("C", ".c", _whole, _c, also=".h"),
+    "mjcf": Form("MuJoCo", ".xml", mjcf_held, mjcf_text),
+    "sdf": Form("Gazebo's motor model", ".sdf", sdf_held, sdf_text),
+    "px4": Form("PX4's Gazebo", ".sdf", sdf_held, px4_text, AIRFRAME),
+    "crazyflow": Form("crazyflow", ".toml", crazyflow_held, crazyflow_text),
     "urdf": Target(
         "gym-pybullet-drones",
         ".urdf",
         urdf_held,
         urdf_text,
         fly=fly_urdf,
-        package="",
-        step_s=1e-3,
-        levels=4,
         fly_as_held=partial(fly_urdf, in_world=False),
+        step_s=1e-3,
         otherwise=OTHERWISE,
     ),
     "ardupilot": Target(
@@ -123,22 +106,13 @@ TARGETS = {
         ardupilot.ardupilot_held,
         ardupilot.ardupilot_text,
         fly=ardupilot.fly_ardupilot,
-        package="",
-        step_s=ardupilot.STEP_S,
-        levels=4,
         fly_as_held=partial(ardupilot.fly_ardupilot, own=False),
+        step_s=ardupilot.STEP_S,
         otherwise=ardupilot.OTHERWISE,
     ),
-    "rotorpy": Target("RotorPy", ".py", rotorpy_held, rotorpy_text, fly=fly_rotorpy, package="rotorpy", levels=4),
-    "casadi": Target("CasADi", ".py", _whole, casadi_text, fly=fly_casadi, package="casadi"),
-    "jax": Target("JAX", ".py", _whole, jax_text, fly=fly_jax, package="jax"),
-}
-"""Those that can be flown, by the word of ``--format``."""
-
-FORMS: dict[str, Form] = {
-    "json": Form("JSON", ".json", _whole, lambda sheet, _held, told, _file: json_text(sheet, told)),
-    "c": Form("C", ".c", _whole, _c, also=".h"),
-    **TARGETS,
+    "rotorpy": Form("RotorPy", ".py", rotorpy_held, rotorpy_text),
+    "casadi": Form("CasADi", ".py", _whole, casadi_text),
+    "jax": Form("JAX", ".py", _whole, jax_text),
 }
 """All, by the word of ``--format``."""
 
@@ -179,7 +153,7 @@ def exported(sheet: Sheet, form: str, file: str) -> Exported:
 def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
     """List what is left of a vehicle, and say so."""
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
-    otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) and form.otherwise else []
+    otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) else []
     left = (*about_hover, *otherwise, *sheet.outside)
     told = tuple(each.sentence for each in left)
     if len(about_hover) - any(sheet.wind) > 1:
@@ -190,7 +164,6 @@ def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Mis
 
 def _otherwise(sheet: Sheet, held: Held, target: Target) -> Iterator[Missing]:
     """Tell how far half a second about hover ends off by what a target does otherwise than a sum of weights."""
-    assert target.fly_as_held is not None, "what is otherwise is flown both ways"
     text, course = target.write(sheet, held, (), f"uav{target.ending}"), _probe_course(sheet.model, held, target.step_s)
     ends = [course.errors(fly(text, course))[:, -1] for fly in (target.fly, target.fly_as_held)]
     off = Off.of(np.linalg.norm(ends[0] - ends[1], axis=2).mean(axis=0))

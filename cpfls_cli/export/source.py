@@ -216,13 +216,6 @@ def _templates() -> Environment:
     )
 
 
-def executed(text: str) -> dict[str, Any]:
-    """Run exported Python, and give what it names."""
-    module: dict[str, Any] = {"__name__": "exported"}
-    exec(compile(text, "exported", "exec"), module)
-    return module
-
-
 def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
     """Gather what all languages ask for: names, numbers, and which parts of the code the model needs."""
     vehicle, rules = sheet.model.vehicle, sheet.rules

@@ -13,9 +13,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gap_flights import FlightsGroup
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
-from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -36,9 +34,12 @@ from cpfls_cli.export.tracks import (
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.response.flown import Responses
-from cpfls_cli.simulation.twin import FRAMES, UNITS
+from cpfls_cli.result import described_fields
+from cpfls_cli.simulation.twin import Twin
+from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
 from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
+from cpfls_cli.validation.prediction import AlongFlight
 
 _ASKED = "setpoint_"
 _FRAMES = {"body": BODY, "angles": EULER, "world": WORLD}
@@ -137,9 +138,8 @@ def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
     )
 
 
-def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
-    begins = np.nan if record.clock is None else record.clock.begins
-    time = _log_time(record.time, begins)
+def _of_prediction(title: str, record: AlongFlight, study: Study) -> View:
+    time = _log_time(record.time, record.begins_s)
     force = None if record.force is None or record.measured_force is None else record.measured_force - record.force
     held: dict[str, dict[str, Array | None]] = {
         "torque": {
@@ -152,17 +152,20 @@ def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
         "body_torque": {MODEL: record.body_torque},
         "force": {MEASURED: record.measured_force, MODEL: record.force, DIFFERENCE: force},
         "attitude": {MEASURED: record.attitude},
-        "outside": {MODEL: record.outside.astype(float)},
+        "extrapolates": {MODEL: record.extrapolates.astype(float)},
     }
+    abouts = {own.name: own.about for own in described_fields(AlongFlight)}
     tracks = []
     for name, values in held.items():
         known = {what: own for what, own in values.items() if own is not None}
-        spec = record.spec().dataset(name)
-        if known and spec is not None:
+        own = abouts[name]
+        if known and own is not None:
+            spec = DatasetSpec(name, own.axes, own.unit, own.frame, own.text)
             axes = _axes(spec, next(iter(known.values())))
-            about = {"unit": spec.units, "frame": spec.frame, "description": spec.description}
-            tracks.append(Track(name=name, time=time, values=known, axes=axes, **about))
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.clock is not None)
+            words = {"unit": own.unit, "frame": own.frame, "description": own.text}
+            name = "outside" if name == "extrapolates" else name
+            tracks.append(Track(name=name, time=time, values=known, axes=axes, **words))
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=bool(np.isfinite(record.begins_s)))
 
 
 def _of_replay(title: str, given: Playback, study: Study) -> View:
@@ -317,33 +320,33 @@ def _of_response(title: str, given: Responses, study: Study) -> View:
     return View(title, (), curves)
 
 
-def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
-    begins = np.nan if record.clock is None else record.clock.begins
-    time, last = _log_time(record.time, begins), len(record.vehicle) - 1
-    tracks, names = [], _vehicle_names(record.vehicle)
-    for index, channel in enumerate(record.channel):
-        simulated = {name: record.simulated[each, :, index] for each, name in enumerate(names)}
-        difference = record.measured[:, index] - record.simulated[last, :, index]
-        own = {MEASURED: record.measured[:, index], SETPOINT: record.setpoint[:, index], **simulated}
-        if record.in_gusts is not None and index in record.held:
-            own |= {"gusts_low": record.in_gusts.low[:, index], "gusts_high": record.in_gusts.high[:, index]}
+def _of_twin(title: str, given: Twin, study: Study) -> View:
+    time, names = _log_time(given.time, given.begins), _vehicle_names(list(given.vehicles))
+    vehicles = dict(zip(names, given.vehicles.values(), strict=True))
+    tracks = []
+    for index, channel in enumerate(given.channel):
+        measured = given.measured[:, index]
+        own = {MEASURED: measured, SETPOINT: given.setpoint[:, index]}
+        own |= {name: each.simulated[:, index] for name, each in vehicles.items()}
+        if given.in_gusts is not None and channel in given.in_gusts.channels:
+            gusty = given.in_gusts.channels[channel]
+            own |= {"gusts_low": gusty.low, "gusts_high": gusty.high}
         tracks.append(
             Track(
                 name=channel.replace(" ", "_"),
                 time=time,
-                values={**own, DIFFERENCE: difference},
+                values={**own, DIFFERENCE: measured - given.judged.simulated[:, index]},
                 unit=UNITS[channel],
                 frame=_FRAMES[FRAMES[channel]],
                 description=f"{channel} of the flight, and of vehicles simulated along its setpoints",
             )
         )
     poses = [
-        pose
-        for each, name in enumerate(names)
-        for pose in _pose(name, time, record.simulated[each, :, 3:6], record.position[each])
+        pose for name, each in vehicles.items() for pose in _pose(name, time, each.simulated[:, 3:6], each.position)
     ]
-    measured = _pose(BODY_FRAME, time, record.measured[:, 3:6], record.measured_position)
-    return View(title, tracks, poses=[*measured, *poses], stamps=_stamps(study), on_log_clock=record.clock is not None)
+    measured_pose = _pose(BODY_FRAME, time, given.measured[:, 3:6], given.measured_position)
+    on_clock = bool(np.isfinite(given.begins))
+    return View(title, tracks, poses=[*measured_pose, *poses], stamps=_stamps(study), on_log_clock=on_clock)
 
 
 def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
@@ -358,10 +361,10 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
 
 _KINDS: dict[type, Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
-    PredictionRecord: _of_prediction,
+    AlongFlight: _of_prediction,
     Playback: _of_replay,
     DisagreementRecord: _of_disagreement,
     DiagnosisRecord: _of_diagnosis,
     Responses: _of_response,
-    TwinRecord: _of_twin,
+    Twin: _of_twin,
 }

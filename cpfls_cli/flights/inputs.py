@@ -37,6 +37,26 @@ def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
     return (file.sha256,) if log is None else (file.sha256, log.sha256)
 
 
+def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
+    """Leave out copies of a flight; one that is of today and of the reference is refused."""
+    known: dict[str, str] = {}
+    kept, warnings = {}, []
+    for role, path in given.items():
+        hashes = hashes_of(path, inputs[role])
+        same = next((known[each] for each in hashes if each in known), None)
+        if same is None:
+            kept[role] = path
+            known.update(dict.fromkeys(hashes, role))
+        elif same.partition("-")[0] != role.partition("-")[0]:
+            also = "" if given[same].name == path.name else f", as {given[same]}"
+            raise InputError(
+                f"{path}: is both a flight of today and one of the reference (--reference){also}; leave it out of one"
+            )
+        else:
+            warnings.append(f"{path.name}: is given twice, also as {given[same].name}; counted once")
+    return kept, warnings
+
+
 def log_formats(paths: Sequence[Path]) -> set[str]:
     """Gather the endings, in small letters, of the logs among some files, and of those that flights were made from."""
     known = {path.suffix.lstrip(".").lower() for path in paths if is_log(path)}

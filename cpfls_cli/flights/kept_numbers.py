@@ -6,14 +6,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.artifacts.job import header_of
+from cpfls_cli import store
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds, read_record, write_record
-from cpfls_cli.changes.numbers import KINDS, flight_numbers
+from cpfls_cli.changes.numbers import FlightNumbers, StatedFact, flight_numbers
 from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.errors import InputError, visible
 from cpfls_cli.flightlog.stated_vehicle import stated_vehicle
 from cpfls_cli.flights.recordings import read_alone
 from cpfls_cli.logs.formats import is_log, log_contents
@@ -23,12 +21,12 @@ FOLDER = "flights"
 """Of the folder that a command fills, where numbers are kept."""
 
 _HASH = 8
-"""Digits by which flights of one name are told apart."""
+"""Digits by which flights of one name are kept apart."""
 
 
 def kept_numbers(
     flight: Path, file: InputFile, study: Study, folder: Path, cautions: Iterable[str] = ()
-) -> FlightNumbersRecord:
+) -> FlightNumbers:
     """Give the numbers of a flight or log as they are kept in a folder, or compute them and keep them there.
 
     Those that are kept are taken where content, vehicle and import are the same, and the code of the program.
@@ -36,28 +34,31 @@ def kept_numbers(
     Raises
     ------
     InputError
-        If the flight tells none.
+        If the flight has none.
     """
     kept = find_kept(flight, file, study, folder)
     if kept is not None:
         return kept
     read = read_alone(flight, study)
     has_gyroscope = "body_rate" in read.flight.signals
-    told = flight_numbers(read.recording, read.full_voltage, has_gyroscope=has_gyroscope)
-    made = FlightNumbersRecord.of(
-        told,
-        [KINDS[name.split()[0]].unit for name in told.values],
-        read.recording.signals.period,
-        read.flight.flown_at,
-        code_fingerprint(),
-        read.warnings,
-        read.contradictions,
-        read.flight.stated,
+    made = replace(
+        flight_numbers(read.recording, read.full_voltage, has_gyroscope=has_gyroscope),
+        flown_at_s=read.flight.flown_at,
+        code=code_fingerprint(),
+        contradictions=tuple(read.contradictions),
+        warnings=tuple(read.warnings),
+        stated=tuple(StatedFact(name=name, value=value) for name, value in read.flight.stated.items()),
     )
-    record = made.with_header(header_of(study, {"flight": file}, cautions))
     folder.mkdir(parents=True, exist_ok=True)
-    write_record(_path(flight, file, folder), record)
-    return record
+    origin = store.Origin(
+        stage="flight-numbers",
+        inputs={"flight": file},
+        seed=study.seed,
+        config=resolved_yaml(study),
+        cautions=tuple(map(visible, cautions)),
+    )
+    store.write(_path(flight, file, folder), made, origin)
+    return made
 
 
 def stated_of(flight: Path) -> dict[str, str]:
@@ -81,18 +82,18 @@ def _path(flight: Path, file: InputFile, folder: Path) -> Path:
     return folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
 
 
-def find_kept(flight: Path, file: InputFile, study: Study, folder: Path) -> FlightNumbersRecord | None:
+def find_kept(flight: Path, file: InputFile, study: Study, folder: Path) -> FlightNumbers | None:
     """Give the numbers of a flight as they are kept in a folder; None where those of another content or config are."""
     path = _path(flight, file, folder)
-    if not path.is_file() or not holds(path, FlightNumbersRecord):
+    if not path.is_file():
         return None
     try:
-        record = read_record(path, FlightNumbersRecord)
-        made_by = stored_study(record.origin.config, path)
+        kept, origin = store.read(path, FlightNumbers)
+        made_by = stored_study(origin.config, path)
     except InputError:
         return None
-    same = record.made_from("flight") == file.sha256 and record.code == code_fingerprint()
-    return record if same and _of_flight(made_by) == _of_flight(study) else None
+    same = origin.inputs["flight"].sha256 == file.sha256 and kept.code == code_fingerprint()
+    return kept if same and _of_flight(made_by) == _of_flight(study) else None
 
 
 def _of_flight(study: Study) -> tuple[object, ...]:

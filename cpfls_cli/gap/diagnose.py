@@ -157,14 +157,14 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
     except InputError:
         # Torques are stated, or it hardly flies.
         return ()
-    of_vehicle = [each for each in change.found if not each.cause.of_air]
+    of_vehicle = [each for each in change.causes if not each.of_air]
     if not of_vehicle:
         return ()
-    first, p_value = of_vehicle[0], change.p_value
-    alike = ", ".join(f"{name} {100 * share:.0f} %" for name, share in first.alike)
+    first, p_value = of_vehicle[0], change.p
+    alike = ", ".join(f"{each.name} {100 * each.belief:.0f} %" for each in first.alike)
     return (
         f"the vehicle of the held-out flights is not that of the training flights (p = {p_value:.2g}): "
-        f"{first.cause.name}, sure to {100 * first.belief:.0f} %{f' ({alike})' if alike else ''}; cpfls changed says by"
+        f"{first.name}, sure to {100 * first.belief:.0f} %{f' ({alike})' if alike else ''}; cpfls changed says by"
         " how much",
     )
 

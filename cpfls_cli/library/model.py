@@ -128,9 +128,7 @@ class Model:
         Artifact
             Of the format ``cpfls/prediction``, in memory.
         """
-        from cpfls_cli.commands import predict
-
-        return self._made(lambda job: predict.run(job, self._file("predict"), _path_of(flight)))
+        return self._of_stage("predict", model=self._file("predict"), flight=_path_of(flight))
 
     def replay(
         self,
@@ -321,17 +319,6 @@ class Model:
         if self.artifact is None:
             raise InputError(f"{task} needs a model that a command found; a stated vehicle takes replay, step and fly")
         return self._path
-
-    def _made(self, command: Callable[[Job], Outcome]) -> Artifact:
-        """Run a command, and keep in memory what it writes."""
-        from tempfile import TemporaryDirectory
-
-        from cpfls_cli.report.outcome import cautioned
-
-        with TemporaryDirectory(prefix="cpfls-") as folder:
-            job = self._job(Path(folder, "artifact.h5"), force=False)
-            _warn(cautioned(command(job), job), 4)
-            return _read(job.output)
 
     def _of_stage(self, name: str, **given: Any) -> Artifact:
         """Run a stage, and keep in memory what it writes."""

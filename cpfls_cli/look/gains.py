@@ -14,7 +14,7 @@ from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.law import flown_feedback
-from cpfls_cli.look.manoeuvres import Manoeuvre, manoeuvres
+from cpfls_cli.look.vibration import Change
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, disk_of, frequencies, is_stable, moved_by
@@ -42,6 +42,16 @@ _MOSTLY = 0.5
 _NO_ANGLE = 1e-3
 """Gain of the angle, 1/s, that is none: the search takes a loop around the rate."""
 _NOISE_STEP_HZ = 8.0
+_STICK_MODES = {
+    "px4": "Stabilized",
+    "ardupilot": "Stabilize",
+    "betaflight": "acro",
+    "crazyflie": "attitude setpoints",
+}
+"""Modes in which the stick is the setpoint of the attitude or of the rate: no position or height control moves it."""
+_STICK_MOVES = {"roll": (0.4, 0.5, 4.0), "pitch": (0.4, 0.5, 4.0), "yaw": (0.6, 0.3, 2.0)}
+"""Share of the full stick, and lowest and highest frequency, Hz, of moves that identify an axis."""
+_STICK_S = 20.0
 _LOWEST_NOISE_HZ = 40.0
 """Below, a spectrum holds more motion than noise; then noise is taken for white."""
 
@@ -124,6 +134,18 @@ class AxisGains:
 
 
 @result
+class Manoeuvre:
+    """Moves of one stick that make a log identify the vehicle about that axis."""
+
+    axis: str = about("roll, pitch or yaw")
+    mode: str = about("of the autopilot, in which the stick is the setpoint")
+    amplitude: float = about("share of the full stick, to both sides")
+    lowest: float = about("slowest moves, there and back, in a second", unit="Hz")
+    highest: float = about("fastest moves", unit="Hz")
+    seconds: float = about("that moves take, slow ones first", unit="s")
+
+
+@result
 class TunedGains:
     """Gains for the autopilot that wrote a log."""
 
@@ -148,6 +170,13 @@ class TunedGains:
         return tuple(row for row in self.rows if row.direction != "keep")
 
 
+@result
+class LogGains(TunedGains):
+    """Gains from a log alone, with the filters that its spectra ask for."""
+
+    filters: tuple[Change, ...] = part(default=())
+
+
 def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins | None = None) -> TunedGains:
     """Find the gains of all axes that a log identifies.
 
@@ -165,7 +194,7 @@ def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins 
     if autopilot is not None and not reason:
         work = _Work(autopilot, flight, plants, asked, autopilot.of_log(known))
         axes, rows = work.found()
-    weak = [AXES.index(plant.axis) for plant in plants if not plant.identified]
+    weak = [plant.axis for plant in plants if not plant.identified]
     return TunedGains(
         autopilot="" if autopilot is None else autopilot.name,
         title="" if autopilot is None else autopilot.title,
@@ -174,11 +203,25 @@ def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins 
         asked_gain=asked.gain_db,
         asked_phase=asked.phase_deg,
         asked_disk=asked.disk_deg,
-        required=float(np.degrees(2 * np.arctan(asked.disk / 2))),
+        required=asked.required_deg,
         rows=tuple(rows),
         axes=tuple(axes),
-        fly=tuple(manoeuvres(flight.autopilot, weak)),
+        fly=tuple(_manoeuvres(flight.autopilot, weak)),
     )
+
+
+def _manoeuvres(autopilot: str, axes: Sequence[str]) -> Iterator[Manoeuvre]:
+    """Say which sticks to move about axes, by an autopilot whose modes are known."""
+    for axis in axes if autopilot in _STICK_MODES else ():
+        amplitude, low, high = _STICK_MOVES[axis]
+        yield Manoeuvre(
+            axis=axis,
+            mode=_STICK_MODES[autopilot],
+            amplitude=amplitude,
+            lowest=low,
+            highest=high,
+            seconds=_STICK_S,
+        )
 
 
 def _unusable(autopilot: Autopilot | None, system: str, known: Mapping[str, float]) -> str:
@@ -500,7 +543,7 @@ def _noise(flight: LogFlight, autopilot: Autopilot, law: Law) -> Noise | None:
     step = _NOISE_STEP_HZ
     frequency = np.arange(step, 0.5 * law.rate_hz, step)
     mean = np.stack([_binned(noise.frequency, each, frequency, step) for each in noise.density.T], axis=1)
-    return Noise(frequency, np.where(np.isfinite(mean), mean, level))
+    return Noise(frequency=frequency, density=np.where(np.isfinite(mean), mean, level))
 
 
 def _binned(frequency: Array, values: Array, middle: Array, width: float) -> Array:

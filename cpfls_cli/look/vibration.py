@@ -210,7 +210,7 @@ class _Power(NamedTuple):
     def noise(self) -> Noise:
         """Give the spectrum of vibration."""
         shown = self.frequency > _ABOVE_HZ - 0.5 * self.frequency[1]
-        return Noise(self.frequency[shown], self.density[:, shown].mean(axis=0))
+        return Noise(frequency=self.frequency[shown], density=self.density[:, shown].mean(axis=0))
 
     def _above(self) -> Array:
         """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""

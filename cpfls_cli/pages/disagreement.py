@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup
+from cpfls_cli.artifacts.playback import by_horizon
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_name, channel_unit, channel_words
 from cpfls_cli.pages.playback import against_rivals, playback_figure
@@ -147,7 +148,7 @@ def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) ->
 
 
 def _played(record: DisagreementRecord) -> Iterator[Text]:
-    yield from map(Text, against_rivals(record.playback and record.playback.by_horizon))
+    yield from map(Text, against_rivals(by_horizon(record.playback)))
 
 
 def _axes_table(record: DisagreementRecord, index: int) -> Table:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.playback import by_horizon
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, intervals_figure, named_sentences, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
@@ -38,12 +39,11 @@ def grounds(record: ExtendedRecord) -> Iterator[str]:
 
 
 def _trusted(record: ExtendedRecord) -> list[str]:
-    held = record.playback and record.playback.by_horizon
-    return trust_sentences(record.trust, held, None, record.audit.contradiction)
+    return trust_sentences(record.trust, by_horizon(record.playback), None, record.audit.contradiction)
 
 
 def _played(record: ExtendedRecord) -> Iterator[Text]:
-    yield from map(Text, against_rivals(record.playback and record.playback.by_horizon))
+    yield from map(Text, against_rivals(by_horizon(record.playback)))
 
 
 def _shrunk(record: ExtendedRecord) -> str:

@@ -7,27 +7,20 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.flight import flight_blocks, vehicle_section
-from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
-from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
 from cpfls_cli.pages.model import model_blocks, recorded_models
-from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.trend import trend_blocks
-from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
@@ -104,19 +97,14 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("sweep"),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
-    _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
-    _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
+    _of_stage("predict"),
+    _of_stage("twin"),
     _of_stage("response"),
-    _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
+    _of_stage("tune"),
     _of_stage("replay"),
-    _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
-    _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
-    _of_each(
-        "flight-numbers",
-        "What each flight tells",
-        lambda given: given.of_kind(FlightNumbersRecord),
-        flight_numbers_blocks,
-    ),
+    _of_stage("trend"),
+    _of_stage("changed"),
+    _of_stage("_flight_numbers"),
     _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )

@@ -10,11 +10,11 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import Block, Listing, Section, Table
+from cpfls_cli.validation.prediction import AlongFlight
 
 
 def provenance_section(sources: Sources) -> Section:
@@ -63,7 +63,7 @@ _LACKS: tuple[_Lack, ...] = (
     (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
     (IdentifiedModel, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
     (
-        PredictionRecord,
+        AlongFlight,
         "Figure 7 and the inertia matrix along a flight",
         "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
     ),

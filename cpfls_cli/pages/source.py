@@ -23,22 +23,21 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.changed import ChangedRecord
     from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
-    from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedModel
-    from cpfls_cli.artifacts.prediction import PredictionRecord
-    from cpfls_cli.artifacts.trend import TrendRecord
-    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import Vehicle
+    from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.flights.path import PlannedPath
     from cpfls_cli.identification.replicates import Sweep
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
+    from cpfls_cli.simulation.twin import Twin
+    from cpfls_cli.tuning.vehicle import Gains
+    from cpfls_cli.validation.prediction import AlongFlight
 
 R = TypeVar("R", default=Any)
 
@@ -66,16 +65,16 @@ class Sources:
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
     models: ClassVar[_OfFormat[IdentifiedModel]] = _OfFormat("cpfls/identified")
     sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
-    predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
+    predictions: ClassVar[_OfFormat[AlongFlight]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
-    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
-    gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
+    twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
+    gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
-    trends: ClassVar[_OfFormat[TrendRecord]] = _OfFormat("cpfls/trend")
-    changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
+    trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
+    changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property
@@ -146,4 +145,4 @@ def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:
         return
     source: Source[Any] = Source(path.name, "", record, resolved(study), study.vehicle, 0)
     answer = import_module(f"cpfls_cli.pages.{page}").answer
-    yield from answer(source.record.findings if record.FORMAT.name == "cpfls/prediction" else source)
+    yield from answer(source)

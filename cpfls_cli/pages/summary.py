@@ -7,16 +7,12 @@ from collections.abc import Iterator, Sequence
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged, Winner
-from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
-from cpfls_cli.pages.gains import gains_box
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trend import trend_box
 from cpfls_cli.pages.trust import learned_words
-from cpfls_cli.pages.twin import twin_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 from cpfls_cli.stage import loaded
@@ -28,16 +24,9 @@ def summary_section(sources: Sources) -> Section:
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    blocks += [twin_box(twin.record) for twin in sources.twins]
-    blocks += [gains_box(gains.record) for gains in sources.gains]
-    blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
-    blocks += [trend_box(trend.record, trend.vehicle) for trend in sources.trends]
-    blocks += [
-        box
-        for source in sources.all
-        if source.stage not in ("", "identify")
-        for box in loaded(source.stage).verdict(source)
-    ]
+    # The verdict on an identified model is a line here, and stands whole in its own section.
+    others = (source for source in sources.all if source.stage not in ("", "identify"))
+    blocks += [box for source in others for box in loaded(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

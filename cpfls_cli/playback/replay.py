@@ -356,7 +356,7 @@ def replay(
             done += len(batch)
             progress(done / total)
     windows = ReplayWindows(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
-    horizon_s = flights[0].flight.motion.period * np.arange(1, horizon + 1)
+    horizon_s: Array = flights[0].flight.motion.period * np.arange(1.0, horizon + 1.0)
     return Replay(sums.predictions((windows.diverged >= 0).sum(axis=1)), horizon_s, windows)
 
 

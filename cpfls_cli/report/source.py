@@ -9,7 +9,7 @@ from typing import Any, Generic
 from typing_extensions import TypeVar
 
 from cpfls_cli import store
-from cpfls_cli.config.load import stored_study
+from cpfls_cli.config.load import stored_study, validate
 from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Origin
@@ -55,6 +55,6 @@ def source_of_result(
     given: Any, origin: store.Origin, path: object, label: str, sha256: str, study: Study | None = None
 ) -> Source:
     """Name a result; its study is the one that it holds where none is given, of a stage without one the usual."""
-    study = study or stored_study(origin.config, path)
+    study = study or (stored_study(origin.config, path) if origin.config else validate({}, "default"))
     parameters = model_structure(study.identification).parameters
     return Source(label, sha256, given, resolved(study), study.vehicle, parameters, found=origin)

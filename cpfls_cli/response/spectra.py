@@ -394,7 +394,7 @@ def _of_spectra(frequency: Array, spectra: _Spectra, instrumented: bool) -> Freq
     )
 
 
-def _coherence(cross: Array, first: Array, second: Array, averages: Array) -> Array:
+def _coherence(cross: Numbers, first: Array, second: Array, averages: Array) -> Array:
     """Compute the share that one signal explains of another, less what chance explains with so few windows."""
     with np.errstate(divide="ignore", invalid="ignore"):
         raw = np.abs(cross) ** 2 / (first * second)

@@ -68,11 +68,11 @@ def _worst(r: Playback, figure: Figure) -> None:
 
 def _panels(r: Playback) -> list[tuple[str, Array, Array]]:
     """List what is drawn of a stretch: of each panel its title, the flight and the model, shape (run, sample)."""
-    own, positions = r.drawn, (r.drawn.measured_position, r.drawn.model_position)
+    own = r.drawn
     found = [(f"rate about {axis}, rad/s", own.measured[:, :, at], own.model[:, :, at]) for at, axis in enumerate(AXES)]
-    if positions[0] is not None and positions[1] is not None:
-        measured, model = positions
-        found += [(f"position {axis}, m", measured[:, :, at], model[:, :, at]) for at, axis in enumerate("xyz")]
+    if own.measured_position is not None and own.model_position is not None:
+        both = own.measured_position, own.model_position
+        found += [(f"position {axis}, m", both[0][:, :, at], both[1][:, :, at]) for at, axis in enumerate("xyz")]
     return found
 
 
@@ -128,7 +128,8 @@ def replay(
     history: HistoryOption = None,
 ) -> Playback | None:
     """Play a model back along flights and sum up its errors by horizon."""
-    options = ReplayOptions(horizon or 0.5, every, None if hold is None else hold.value, history or 0.0)
+    between: Any = None if hold is None else hold.value
+    options = ReplayOptions(horizon or 0.5, every, between, history or 0.0)
     roles = numbered_roles("flight", flights)
     inputs = run.take(({} if is_vehicle(model) else {"model": model}) | roles)
     with_numbers(run, "replay", model, whole=not is_vehicle(model))

@@ -38,6 +38,7 @@ from cpfls_cli.report.canvas import (
     plain_ticks,
     style_of,
 )
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.response.flown import Responses, VehicleResponse, vehicle_responses
 from cpfls_cli.response.mismatch import (
@@ -193,7 +194,8 @@ def response(
     )
     run.next.append(_next(run, found, flights, model))
     if table is not None:
-        run.write_text(table, _csv(found), "written, the curves as CSV")
+        run.texts[table] = _csv(found)
+        run.said.append(Text(f"{table}: written, the curves as CSV"))
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Numbers
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.result import about
 from cpfls_cli.tuning.margins import axis_loops, disk_of, frequencies, is_stable, moved_by
 from cpfls_cli.tuning.noise import Noise
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
@@ -34,7 +35,7 @@ _OVERSHOOT = 1.1
 """Largest gain from asked angle to angle: a step is passed by about as much less 1."""
 _ROUNDS = 24
 _LOUDER = 2.0
-"""Jitter of the commands beside that of the gains before: those are known to fly, and what motors bear is not."""
+"""Jitter of the commands over that of the gains before: those are known to fly, and what motors bear is not."""
 _NEAR = 0.99
 _NOISE_HZ, _NOISE_POINTS = 10.0, 100
 _YAW_ALONE = ("yaw.error.first", "yaw.output.first")
@@ -43,17 +44,11 @@ _RAISED = 3
 
 @dataclass(frozen=True)
 class AskedMargins:
-    """Margins that gains have to have, over all vehicles that flights leave possible.
+    """Margins that gains have to have, over all vehicles that flights leave possible."""
 
-    Attributes
-    ----------
-    gain_db, phase_deg, disk_deg : float
-        Of gain alone, of phase alone, and the phase that the disk of both together holds.
-    """
-
-    gain_db: float = 6.0
-    phase_deg: float = 45.0
-    disk_deg: float = 35.0
+    gain_db: float = about("of gain alone", unit="dB", default=6.0)
+    phase_deg: float = about("of phase alone", unit="deg", default=45.0)
+    disk_deg: float = about("phase that the disk of both together holds", unit="deg", default=35.0)
 
     @property
     def disk(self) -> float:
@@ -61,6 +56,11 @@ class AskedMargins:
         factor = 10 ** (self.gain_db / 20)
         of_phase = 2 * np.tan(np.radians(max(self.phase_deg, self.disk_deg)) / 2)
         return float(max(2 * (factor - 1) / (factor + 1), of_phase))
+
+    @property
+    def required_deg(self) -> float:
+        """The phase that this disk holds, degrees."""
+        return float(np.degrees(2 * np.arctan(self.disk / 2)))
 
 
 @dataclass(frozen=True)

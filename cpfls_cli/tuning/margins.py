@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, nan
+from math import nan
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
+from cpfls_cli.result import about, part, result
+from cpfls_cli.tuning.noise import Noise
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
 _LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 300, 0.98
@@ -17,32 +20,25 @@ STEP_RAD = np.radians(10.0)
 """Size of the step of the asked attitude that is shown."""
 
 
-@dataclass(frozen=True)
+_MOST_DB, _MOST_DEG = 99.0, 180.0
+"""Margins of a loop that no change of its gain, or of its phase, makes unstable."""
+_SHOWN = 300
+"""Samples of a step that are kept."""
+
+
+@result
 class Margins:
-    """How far a loop is from instability.
+    """How far a loop is from instability."""
 
-    Attributes
-    ----------
-    gain_db, phase_deg : float
-        Change of gain (up or down), and of phase, that it bears alone; infinite where none makes it unstable, and not
-        finite as a number where it is unstable already.
-    disk : float
-        Of gain and phase together: alpha of Seiler, Packard and Gahinet, 2 at most.
-    crossover_hz : float
-        Frequency at which the loop's gain is 1.
-    stable : bool
-    """
-
-    gain_db: float
-    phase_deg: float
-    disk: float
-    crossover_hz: float
-    stable: bool
+    gain_db: float = about("change of gain alone, up or down; not finite: unstable", unit="dB", gaps=True)
+    phase_deg: float = about("change of phase alone; not finite: unstable", unit="deg", gaps=True)
+    disk_deg: float = about("phase of the disk of gain and phase together; 0: unstable", unit="deg")
+    crossover_hz: float = about("where the gain of the loop is 1", unit="Hz", gaps=True)
 
     @property
-    def disk_deg(self) -> float:
-        """The phase alone that the disk holds, degrees."""
-        return float(np.degrees(2 * np.arctan(self.disk / 2)))
+    def stable(self) -> bool:
+        """Whether the closed loop is stable."""
+        return bool(np.isfinite(self.gain_db))
 
 
 @dataclass(frozen=True)
@@ -106,16 +102,15 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     """
     from control import FRD, stability_margins
 
-    stable, disk = bool(is_stable(frequency, loop)), float(disk_of(loop))
+    stable = bool(is_stable(frequency, loop))
     system = FRD(loop, 2 * np.pi * frequency)
     gain, phase, _, _, crossover, _ = (float(each) for each in stability_margins(system))
-    in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else inf
+    in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else _MOST_DB
     return Margins(
-        gain_db=in_db if stable else nan,
-        phase_deg=abs(phase) if stable else nan,
-        disk=disk if stable else 0.0,
+        gain_db=min(in_db, _MOST_DB) if stable else nan,
+        phase_deg=min(abs(phase), _MOST_DEG) if stable else nan,
+        disk_deg=float(np.degrees(2 * np.arctan(disk_of(loop) / 2))) if stable else 0.0,
         crossover_hz=crossover / (2 * np.pi),
-        stable=stable,
     )
 
 
@@ -146,7 +141,10 @@ def crossing_margins(frequency: Array, loop: Numbers) -> tuple[Array, Array, Arr
 
 
 def disk_of(loop: Numbers) -> Array:
-    """Give the disk margins of stable loops, shape (..., frequency), balanced: 1 over the largest half of |S - T|."""
+    """Give the disk margins of stable loops, shape (..., frequency), balanced: 1 over the largest half of |S - T|.
+
+    That is alpha of Seiler, Packard and Gahinet, 2 at most; the phase alone that it holds is 2 arctan(alpha / 2).
+    """
     return np.asarray(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max(axis=-1))
 
 
@@ -228,70 +226,100 @@ def step_answer(law: Law, plants: tuple[AxisPlant, ...]) -> StepAnswer:
     return StepAnswer(np.arange(count, dtype=float) * period, shown / STEP_RAD)
 
 
-@dataclass(frozen=True)
+@result
+class AxisEvaluation:
+    """What a law does with a vehicle about one axis, with the plant that was found and with all possible ones."""
+
+    plants: int = about("possible plants: the best guess, and the corners of the intervals")
+    command: Margins = part()
+    command_worst: Margins = part()
+    angle: Margins = part()
+    angle_worst: Margins = part()
+    bandwidth_hz: float = about("where the angle follows its setpoint at half power", unit="Hz", gaps=True)
+    overshoot: float = about("of a step of the angle setpoint, share of it")
+    overshoot_most: float = about("the largest with three possible plants")
+    rise_s: float = about("of that step, from a tenth to nine tenths", unit="s", gaps=True)
+    jitter: float | None = about(
+        "root mean square of the command that the noise of the gyroscope makes, share of the full one", default=None
+    )
+    loop: ComplexArray = about("gain of the loop, cut at the command", "frequency", brief=False)
+    loop_worst: ComplexArray = about("the same with the plant that comes nearest to -1", "frequency", brief=False)
+    angle_closed: ComplexArray = about("angle over its setpoint", "frequency", brief=False)
+    step: Array = about("angle after a step of its setpoint, share of it", "time", brief=False)
+    step_low: Array = about("the least with three possible plants", "time", brief=False)
+    step_high: Array = about("the largest", "time", brief=False)
+
+    @property
+    def disk_deg(self) -> float:
+        """The least disk margin with all possible plants, cut at the command or at the angle."""
+        return min(self.command_worst.disk_deg, self.angle_worst.disk_deg)
+
+
+@result
 class Evaluation:
-    """What a law does with a vehicle, by axis.
+    """What a law does with a vehicle: margins cut at the command and at the angle, and a step of the angle."""
 
-    Attributes
-    ----------
-    rate_hz : float
-        Steps of the law in a second.
-    command, angle : list of Margins
-        Of the plant that was found, cut at the command and at the angle.
-    command_worst, angle_worst : list of Margins
-        The smallest of each margin over all plants that are possible.
-    bandwidth_hz : array, shape (3,)
-        Frequency at which the angle follows its setpoint at half power.
-    loops : list of AxisLoops
-    corners : list of list of AxisLoops
-        Of all plants that are possible.
-    steps : list of StepAnswer
-        Of the plants that were found, then of the softest and the sharpest ones.
-    """
+    rate_hz: float = about("steps of the law in a second", unit="Hz")
+    frequency: Array = about("of the loops", "frequency", unit="Hz", brief=False)
+    time: Array = about("after the step", "time", unit="s", brief=False)
+    roll: AxisEvaluation = part()
+    pitch: AxisEvaluation = part()
+    yaw: AxisEvaluation = part()
 
-    rate_hz: float
-    command: list[Margins]
-    angle: list[Margins]
-    command_worst: list[Margins]
-    angle_worst: list[Margins]
-    bandwidth_hz: Array
-    loops: list[AxisLoops]
-    corners: list[list[AxisLoops]]
-    steps: list[StepAnswer]
+    @property
+    def axes(self) -> tuple[AxisEvaluation, AxisEvaluation, AxisEvaluation]:
+        """Those about x, y, z of the body."""
+        return self.roll, self.pitch, self.yaw
 
 
-def evaluate(law: Law, hover: HoverPlant) -> Evaluation:
+def evaluate(law: Law, hover: HoverPlant, noise: Noise | None = None) -> Evaluation:
     """Evaluate a law with a vehicle in hover."""
-    frequency = frequencies(law)
-    corners = [
-        [axis_loops(law, axis, moved_by(law, each, frequency), frequency) for each in hover.corners(axis)]
-        for axis in range(3)
-    ]
-    commands = [[margins(frequency, each.command) for each in own] for own in corners]
-    angles = [[margins(frequency, each.angle) for each in own] for own in corners]
     every = [hover.corners(axis) for axis in range(3)]
+    # The plants that were found, then the softest and the sharpest ones.
     ends = [hover.axes, tuple(own[min(1, len(own) - 1)] for own in every), tuple(own[-1] for own in every)]
-    return Evaluation(
-        rate_hz=law.rate_hz,
-        command=[own[0] for own in commands],
-        angle=[own[0] for own in angles],
-        command_worst=[_worst(own) for own in commands],
-        angle_worst=[_worst(own) for own in angles],
-        bandwidth_hz=np.array([_bandwidth(own[0]) for own in corners]),
-        loops=[own[0] for own in corners],
-        corners=corners,
-        steps=[step_answer(law, plants) for plants in ends],
+    steps = [step_answer(law, plants) for plants in ends]
+    time = steps[0].time
+    kept = np.unique(np.linspace(0, len(time) - 1, _SHOWN).astype(int))
+    roll, pitch, yaw = (_about_axis(law, axis, own, steps, kept, noise) for axis, own in enumerate(every))
+    return Evaluation(rate_hz=law.rate_hz, frequency=frequencies(law), time=time[kept], roll=roll, pitch=pitch, yaw=yaw)
+
+
+def _about_axis(
+    law: Law, axis: int, plants: Sequence[AxisPlant], steps: Sequence[StepAnswer], kept: IntArray, noise: Noise | None
+) -> AxisEvaluation:
+    frequency = frequencies(law)
+    loops = [axis_loops(law, axis, moved_by(law, each, frequency), frequency) for each in plants]
+    commands, angles = ([margins(frequency, getattr(each, cut)) for each in loops] for cut in ("command", "angle"))
+    worst = min(loops, key=lambda each: float(np.abs(1 + each.command).min()))
+    shown = np.array([each.angle[kept, axis] for each in steps])
+    return AxisEvaluation(
+        plants=len(plants),
+        command=commands[0],
+        command_worst=_worst(commands),
+        angle=angles[0],
+        angle_worst=_worst(angles),
+        bandwidth_hz=_bandwidth(loops[0]),
+        overshoot=float(steps[0].overshoot[axis]),
+        overshoot_most=max(float(each.overshoot[axis]) for each in steps),
+        rise_s=float(steps[0].rise_s[axis]),
+        jitter=None if noise is None else noise.of_command(law, axis),
+        loop=loops[0].command,
+        loop_worst=worst.command,
+        angle_closed=loops[0].angle_closed,
+        step=shown[0],
+        step_low=shown.min(axis=0),
+        step_high=shown.max(axis=0),
     )
 
 
-def _worst(found: list[Margins]) -> Margins:
+def _worst(found: Sequence[Margins]) -> Margins:
+    """Give the least of each margin; a loop that is unstable with some plant has none."""
     stable = all(each.stable for each in found)
     return Margins(
         gain_db=min(each.gain_db for each in found) if stable else nan,
         phase_deg=min(each.phase_deg for each in found) if stable else nan,
-        disk=min(each.disk for each in found),
+        disk_deg=min(each.disk_deg for each in found),
         crossover_hz=found[0].crossover_hz,
-        stable=stable,
     )
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import Law, chain
+from cpfls_cli.result import about, result
 
 _WINDOW_S = 1.0
 LEAST = 256
@@ -18,22 +20,26 @@ _FLOOR_SHARE = 0.25
 _LINE_DB, _LOWEST_LINE_HZ, _FROM_THE_END = 10.0, 25.0, 0.95
 _MOST_LINES = 2
 _LEFT = 1e-3
-"""Part of the power that a filter leaves, below which what was in front of it is not told by what is behind."""
+"""Part of the power that a filter leaves, below which what is behind it does not show what was in front."""
 
 
-@dataclass(frozen=True)
+@result
+class Line:
+    """A line of a spectrum."""
+
+    hz: float = about("its frequency", unit="Hz")
+    width_hz: float = about("its width", unit="Hz")
+    above_db: float = about("over the floor around it", unit="dB")
+
+
+@result
 class Noise:
-    """Spectrum of body rates.
+    """Spectrum of body rates, single-sided, mean over flights."""
 
-    Attributes
-    ----------
-    frequency : array, shape (frequency,), Hz
-    density : array, shape (frequency, 3), (rad/s)^2/Hz
-        Single-sided, mean over flights.
-    """
+    SHOWN = ("lines",)
 
-    frequency: Array
-    density: Array
+    frequency: Array = about("as far as the logs show", "noise frequency", unit="Hz", brief=False)
+    density: Array = about("of body rates", "noise frequency", "axis", unit="rad^2/s^2/Hz", frame="body", brief=False)
 
     @property
     def highest_hz(self) -> float:
@@ -60,10 +66,11 @@ class Noise:
         left = np.stack([np.abs(chain(axis.measured, back, law.period)) ** 2 for axis in law.axes], axis=1)
         return replace(self, density=self.density / np.maximum(left, _LEFT))
 
-    def lines(self) -> list[Line]:
-        """List what stands out by 10 dB and more, the strongest first."""
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """Lines of 10 dB and more over the floor, the strongest first."""
         total = self.density.sum(axis=1)
-        floor = np.array([np.median(total[self._beside(hz)]) for hz in self.frequency])
+        floor = np.array([np.median(total[self._near(hz)]) for hz in self.frequency])
         above = 10 * np.log10(np.maximum(total, 1e-30) / np.maximum(floor, 1e-30))
         inside = (self.frequency > _LOWEST_LINE_HZ) & (self.frequency < _FROM_THE_END * self.highest_hz)
         peaks = np.flatnonzero(inside[1:-1] & (above[1:-1] >= np.maximum(above[:-2], above[2:]))) + 1
@@ -72,27 +79,18 @@ class Noise:
             hz = float(self.frequency[peak])
             apart = all(abs(hz - each.hz) > max(each.width_hz, hz / 5) for each in found)
             if above[peak] >= _LINE_DB and apart and len(found) < _MOST_LINES:
-                found.append(Line(hz, self._width(above, int(peak)), float(above[peak])))
-        return found
+                found.append(Line(hz=hz, width_hz=self._width(above, int(peak)), above_db=float(above[peak])))
+        return tuple(found)
 
-    def _beside(self, hz: float) -> Array:
+    def _near(self, hz: float) -> Array:
         return np.asarray(np.abs(self.frequency - hz) <= max(_FLOOR_SHARE * hz, 5.0))
 
     def _width(self, above: Array, peak: int) -> float:
-        """Give the width of a line where it stands half its decibels above the floor, at least a tenth of it, Hz."""
+        """Give the width of a line where it is half its decibels above the floor, at least a tenth of it, Hz."""
         half = 0.5 * above[peak]
         left = peak - int(np.argmax(above[peak::-1] < half))
         right = peak + int(np.argmax(above[peak:] < half))
         return max(float(self.frequency[right] - self.frequency[left]), 0.1 * float(self.frequency[peak]))
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line of a spectrum: its frequency, its width in Hz, and how far it stands out, dB."""
-
-    hz: float
-    width_hz: float
-    above_db: float
 
 
 def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
@@ -121,7 +119,7 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
     if not spectra:
         return None
     frequency = np.fft.rfftfreq(count, 1 / slowest)
-    return Noise(np.asarray(frequency[1:], dtype=float), np.mean(spectra, axis=0)[1:])
+    return Noise(frequency=np.asarray(frequency[1:], dtype=float), density=np.mean(spectra, axis=0)[1:])
 
 
 def _between_pauses(time: Array, rate: Array) -> Iterator[tuple[Array, Array]]:

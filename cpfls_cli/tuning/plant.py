@@ -104,7 +104,7 @@ class HoverPlant:
     axes: tuple[AxisPlant, AxisPlant, AxisPlant]
     share: float
     signal: float
-    spreads: tuple[Spread, Spread, Spread] = field(default=(Spread(), Spread(), Spread()))
+    spreads: tuple[Spread, ...] = field(default=(Spread(), Spread(), Spread()))
     drawn: tuple[tuple[AxisPlant, ...], ...] = ()
 
     def corners(self, axis: int) -> list[AxisPlant]:

@@ -13,8 +13,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import Predictor, turning_law
-from cpfls_cli.dynamics.integration import RotationState, free_runs
+from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, free_runs, turning_law
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.result import about

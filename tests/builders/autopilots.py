@@ -1,13 +1,8 @@
 """A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
-from dataclasses import replace
-
 import numpy as np
 from control import FRD, stability_margins
 
-import cpfls_cli
-from cpfls_cli.artifacts.gains import GainsRecord
-from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -19,9 +14,7 @@ from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.tuning.gains import AskedMargins, with_filters
-from cpfls_cli.tuning.margins import StepAnswer, evaluate
-from cpfls_cli.tuning.plant import Spread, hover_plant
+from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.vehicle_models import vehicle_of
 
@@ -164,17 +157,3 @@ def found_vehicle(vehicle=CROSS, *, commanded=True, instrumented=True):
         instruments=instruments if instrumented else None,
         responses=tuple(ResponseMismatch(name, 20.0, 1.0, 5.0) for name in ("roll", "pitch")),
     )
-
-
-def gains_record():
-    """The artifact of gains for PX4, and what its defaults give."""
-    autopilot = AUTOPILOTS["px4"]
-    values = autopilot.defaults()
-    hover = replace(hover_plant(autopilot.law(), CROSS, None, 0.03), spreads=(Spread((0.9, 1.1)),) * 3)
-    found = with_filters(autopilot, values, hover, AskedMargins()).proposals
-    proposed = values | {each.parameter.name: each.value for each in found}
-    sets = {name: evaluate(autopilot.law(own), hover) for name, own in (("proposed", proposed), ("default", values))}
-    made = GainsRecord.of(
-        autopilot, "vehicle.h5", AskedMargins(), hover, sets, found, {}, None, ("roll: held back by noise",)
-    )
-    return made.with_header(Header(cpfls_cli.__version__, 1, STUDY))

@@ -482,3 +482,8 @@ def rotorpy_flight(name):
 def rotorpy_truth(name):
     """Give the model that flew."""
     return VehicleModel(vehicle=ROTORPY, effects=ROTORPY_HIDDEN[name])
+
+
+def mean_errors(found, signal):
+    """Mean norms of errors of a signal, shape (prediction, horizon)."""
+    return np.array([own.signals[signal].mae for own in found.models.values()])

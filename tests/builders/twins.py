@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.twin import GainsGroup
-from cpfls_cli.commands.twin import record_of
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import Gusts
@@ -16,9 +13,9 @@ from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.twin import CHANNELS, InGusts, asked_of, fly_twin
+from cpfls_cli.simulation.twin import ChannelInGusts, InGusts, TwinGains, twin_of
+from cpfls_cli.simulation.twin_flight import CHANNELS, asked_of, fly_twin
 from tests.builders.autopilots import CROSS
-from tests.builders.studies import VEHICLE as STUDY
 
 LOOP = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.03, integration_rate_hz=400.0)
 PERIOD = 0.02
@@ -56,22 +53,29 @@ def flown(seconds=12.0, seed=3, gusts=True, inertia_x=1.0):
     return LoggedFlight.of("flight", signals)
 
 
-def twin_record():
-    """Arrange a flight beside a vehicle with rotors that are too slow, and beside the one that flew."""
+def twin_found():
+    """A flight compared with a vehicle with rotors that are too slow, and with the one that flew."""
     flight = flown(6.0)
     asked = asked_of(flight, LOOP, CROSS, share=True)
     loops = {VEHICLE: replace(LOOP, rotor_time_constant_s=0.1), "found.h5": LOOP}
     twins = {name: fly_twin(flight, asked, CROSS, loop, None, SimulatedEffects()) for name, loop in loops.items()}
-    gains = GainsGroup(source="defaults", name=("MC_ROLLRATE_P",), value=np.array([0.15]))
-    made = record_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"], beside(twins["found.h5"]))
-    return made.with_header(Header("0", 1, STUDY))
+    gains = TwinGains(source="defaults", name=("MC_ROLLRATE_P",), value=np.array([0.15]))
+    return twin_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"], blown(twins["found.h5"]))
 
 
-def beside(twin):
-    """Vehicles in gusts, as if they had flown beside a twin: nearer than the flight in roll rate alone."""
-    rms = np.full((3, len(CHANNELS)), np.nan)
-    rms[:, [0, 2, 6]] = [[0.001, 0.1, 0.5], [0.002, 0.2, 0.6], [0.003, 0.3, 2.0]]
-    held = np.where(np.isfinite(rms[0]), 0.0, np.nan)
-    beyond = np.arange(len(CHANNELS)) == 0
-    low, high = twin.values - 0.1 + held, twin.values + 0.1 + held
-    return InGusts(rms, low, high, np.zeros(len(CHANNELS)), beyond, 1)
+def blown(twin):
+    """Vehicles in gusts, as if they had flown the same setpoints: nearer than the flight in roll rate alone."""
+    drawn = {0: [0.001, 0.002, 0.003], 2: [0.1, 0.2, 0.3], 6: [0.5, 0.6, 2.0]}
+    channels = {
+        CHANNELS[at]: ChannelInGusts(
+            rms=0.05,
+            drawn=np.array(each),
+            noise=0.0,
+            inside_share=0.5,
+            beyond=at == 0,
+            low=twin.values[:, at] - 0.1,
+            high=twin.values[:, at] + 0.1,
+        )
+        for at, each in drawn.items()
+    }
+    return InGusts(vehicle="found.h5", flights=3, lost=1, channels=channels)

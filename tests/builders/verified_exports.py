@@ -11,11 +11,12 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
-from cpfls_cli.export.registry import TARGETS, Exported
+from cpfls_cli.export.registry import FORMS, Exported, Target
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import Player, free_runs, in_the_air
 from cpfls_cli.rounding import less
+from tests.builders.flown_exports import FLYING
 
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""
@@ -74,7 +75,7 @@ def verified(
     flight = in_the_air(flight, model[1].wind)
     found = flight.starts(horizon, 1)
     starts = found[np.unique(np.linspace(0, len(found) - 1, windows).round().astype(int))]
-    target, held = TARGETS[form], exported.held
+    target, held, described = FLYING[form], exported.held, FORMS[form]
     course = Course(flight, starts, horizon, gravity=held.body.gravity)
     replayed = free_runs(model[1], model[0], starts, horizon).errors
     same = free_runs(held.player(flight), flight, starts, horizon).errors
@@ -86,7 +87,7 @@ def verified(
         finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
         flown, limit = _limit(form, exported.text, course, finer)
         fine = _fine(held, course)
-        if target.fly_as_held is not None:
+        if isinstance(described, Target):
             # What no sum of weights is counts as not held, and not as a fault of the equations.
             otherwise = course.errors(target.fly(exported.text, replace(course, finer=finer))) - flown
     for errors in (replayed, same, flown, limit, fine, otherwise):
@@ -117,9 +118,9 @@ def _largest(errors: Array) -> Array:
 
 def _limit(form: str, text: str, course: Course, finer: int) -> tuple[Array, Array]:
     """Fly with the step of the target and with halves of it: each takes a term of ``a h + b h^2 + ...`` out."""
-    target = TARGETS[form]
+    target, described = FLYING[form], FORMS[form]
     steps = [replace(course, finer=finer * 2**level) for level in range(target.levels)]
-    fly = target.fly_as_held or target.fly
+    fly = described.fly_as_held if isinstance(described, Target) else target.fly
     once, *rest = found = [course.errors(fly(text, each)) for each in steps]
     for power in range(1, len(rest) + 1):
         found = [(2**power * fine - coarse) / (2**power - 1) for coarse, fine in pairwise(found)]

@@ -13,9 +13,10 @@ import pytest
 
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle
-from cpfls_cli.export.registry import TARGETS
+from cpfls_cli.export.registry import FORMS
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
+from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import truth
 from tests.builders.vehicle_models import HEXA, vehicle_of, whole, write_vehicle
 
@@ -32,25 +33,25 @@ def vehicle(tmp_path):
 
 def read(form, output):
     """Take a file as its target does."""
-    if TARGETS[form].ending == ".py":
+    if FORMS[form].ending == ".py":
         compile(output.read_text(), str(output), "exec")
-    elif TARGETS[form].ending == ".json":
+    elif FORMS[form].ending == ".json":
         return json.loads("\n".join(line for line in output.read_text().splitlines() if not line.startswith("#")))
-    elif TARGETS[form].ending == ".toml":
+    elif FORMS[form].ending == ".toml":
         return tomllib.loads(output.read_text())
     else:
         return ElementTree.fromstring(output.read_text())
     return None
 
 
-@pytest.mark.parametrize("form", TARGETS)
+@pytest.mark.parametrize("form", FLYING)
 def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form):
     inputs = {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")}
     path = tmp_path / ("x--" + "' \"; raise SystemExit(8)\n#-->.h5")
     write_vehicle(path, vehicle_of(replace(truth(), effects=(*truth().effects, LOAD))), inputs=inputs)
     with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
-    output = tmp_path / f"uav{TARGETS[form].ending}"
+    output = tmp_path / f"uav{FORMS[form].ending}"
     words = ("export", path, "--format", form, "-o", output)
     result = cpfls(*words, "--json")
     assert result.exit_code == 0, result.stderr
@@ -201,7 +202,7 @@ def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
         ("crazyflow", "crazyflow and drone-models mix four"),
         ("urdf", "turns four rotors, two each way"),
     ):
-        (line,) = refuse("export", path, "--format", form, "-o", tmp_path / f"uav{TARGETS[form].ending}")
+        (line,) = refuse("export", path, "--format", form, "-o", tmp_path / f"uav{FORMS[form].ending}")
         assert words in line
 
 

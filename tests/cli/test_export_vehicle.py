@@ -66,7 +66,7 @@ def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     assert effects == "Effects: linear rotational damping, quadratic rotational damping."
     assert learned == "Learned, without a name: torque x, torque z, force z over the direction of the airflow."
     assert judged == (
-        "NOT JUDGED: not judged as a forecast; its constants are told; 1 of 2 numbers are not determined."
+        "NOT JUDGED: not judged as a forecast; its constants are identified; 1 of 2 numbers are not determined."
     )
     assert whole_of_it == "JAX holds all of it."
     assert effects in (tmp_path / "quad.py").read_text()
@@ -134,14 +134,14 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
 def test_a_vehicle_of_wrong_content_is_refused(refuse, vehicle, tmp_path):
     with edited(vehicle) as file:
         names = np.char.encode(np.array(["linear_damping", "quadratic_dampin"]), "utf-8")
-        del file["vehicle/effect/name"]
-        file["vehicle/effect/name"] = names
+        del file["model/effects/name"]
+        file["model/effects/name"] = names
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
     assert line.startswith(f"{vehicle}: quadratic_dampin: no such effect (did you mean quadratic_damping")
     with edited(vehicle) as file:
-        file["vehicle/mass"][()] = np.nan
+        file["model/vehicle/mass_kg"][()] = np.nan
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
-    assert line == f"{vehicle}: vehicle/mass: 1 samples are not finite, the first at index 0"
+    assert line == f"{vehicle}: model/vehicle/mass_kg: 1 of 1 values are not finite"
 
 
 PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")

@@ -64,11 +64,11 @@ def test_a_format_of_several_kinds_is_described_kind_by_kind(cpfls):
 def test_without_a_name_all_are_listed(cpfls):
     names = [each["format"] for each in described(cpfls)]
     assert {"cpfls/flight", "cpfls/look"} <= set(names)
-    assert "cpfls info --format trajectory" in cpfls("info").stdout
+    assert "cpfls info --format flight" in cpfls("info").stdout
 
 
 def test_a_wrong_name_lists_those_that_there_are(cpfls):
     result = cpfls("info", "--format", "flihgt")
     assert result.exit_code == 2
-    assert "no such format (did you mean flight or flight-numbers?); there are trajectory, flight," in result.stderr
+    assert "no such format (did you mean flight or flight-numbers?); there are flight," in result.stderr
     assert "leave out FILE or --format" in cpfls("info", "flight.h5", "--format", "flight").stderr

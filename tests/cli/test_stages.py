@@ -3,6 +3,7 @@
 import importlib
 import json
 import sys
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ import typer
 
 import cpfls_cli.stages
 from cpfls_cli.cli.stages import AllCommands, stage_commands
+from cpfls_cli.config.load import validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage, unique_names
@@ -126,7 +128,8 @@ def test_common_options(house, capsys, tmp_path):
     assert (code, err) == (2, "cpfls: error: w.h5: exists already; --force replaces it\n")
     assert called(house, capsys, "craft.txt", "-o", "w.h5", "--force", "-q") == (0, "", "")
     code, out, _ = called(house, capsys, "craft.txt", "-o", "x.h5", "--dry-run")
-    assert (code, out) == (0, "x.h5: would be written; all inputs are good\n")
+    config = "the config and " if house[1] else ""
+    assert (code, out) == (0, f"x.h5: would be written; {config}all inputs are good\n")
     assert not (tmp_path / "x.h5").exists()
     code, _, err = called(house, capsys, "craft.txt", "-o", "x.h5", "--set", "seed=9")
     assert code == (0 if house[1] else 2)
@@ -178,9 +181,23 @@ def at_home(monkeypatch, tmp_path):
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
 
 
+def run_to(output=None):
+    """Make a run of a stage without a config."""
+    return Run(
+        validate({}, "default"),
+        output or Path("look"),
+        force=False,
+        dry_run=False,
+        progress=lambda *_: None,
+        reads=lambda _: None,
+        writes=output is not None,
+        with_config=False,
+    )
+
+
 @pytest.mark.usefixtures("at_home")
 def test_several_results_have_a_page_each_and_an_index(tmp_path):
-    run = Run(output=tmp_path / "out")
+    run = run_to(tmp_path / "out")
     run.caution("all")
     run.caution("of b", "b")
     outcome = several.run(run, names=["a", "b"])
@@ -195,14 +212,14 @@ def test_several_results_have_a_page_each_and_an_index(tmp_path):
     assert "<h1>A b</h1>" in (tmp_path / "out" / "b.html").read_text()
     assert [block.text for block in outcome.blocks] == ["2 things", "- a", "- b", "A a", "A b", "all", "of b"]
     assert outcome.summary["b"]["name"] == "b"
-    assert run.origin("a").cautions == ("all",)
-    assert run.origin("b").cautions == ("all", "of b")
+    assert run.origin("look", "a").cautions == ("all",)
+    assert run.origin("look", "b").cautions == ("all", "of b")
 
 
 @pytest.mark.usefixtures("at_home")
 def test_names_of_files_that_are_no_text_are_written_and_linked(tmp_path):
     names = ["a\udcff", "[b](c) <i>"]
-    several.run(Run(output=tmp_path / "out"), names=names)
+    several.run(run_to(tmp_path / "out"), names=names)
     assert "a%FF" in (page := (tmp_path / "out" / "index.html").read_text())
     assert "%5Bb%5D%28c%29%20%3Ci%3E" in page
     assert read(tmp_path / "out" / "a\udcff.h5", Named)[0].name == "a\\udcff"
@@ -210,9 +227,9 @@ def test_names_of_files_that_are_no_text_are_written_and_linked(tmp_path):
 
 @pytest.mark.usefixtures("at_home")
 def test_one_result_is_the_answer_and_without_output_nothing_is_written(tmp_path):
-    outcome = several.run(Run(), names=["a"])
+    outcome = several.run(run_to(), names=["a"])
     assert outcome.summary == {"name": "a", "system": ""}
-    several.run(Run(output=tmp_path / "out"), names=["a"])
+    several.run(run_to(tmp_path / "out"), names=["a"])
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.h5", "a.html"]
 
 
@@ -253,7 +270,6 @@ def test_info_check_and_report_know_results(cpfls, looked):
 def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
     log = looked.parents[1] / "log.csv"
     for words, message in (
-        (("report", "study.yaml", looked, looked, "-o", "x.html"), "has a page of its own"),
         (("export", looked, "-o", "x.json"), "`cpfls info` shows what it holds"),
         (("look", looked), "is an artifact of this program"),
         (("look", log, "-o", "x.html"), "-o x\n"),
@@ -268,6 +284,6 @@ def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
 @pytest.mark.usefixtures("at_home")
 def test_a_result_that_breaks_its_description_is_refused_by_the_name_of_its_file(tmp_path):
     with pytest.raises(ComputationError) as error:
-        several.run(Run(output=tmp_path / "out"), names=["nothing"])
+        several.run(run_to(tmp_path / "out"), names=["nothing"])
     assert str(error.value) == f"{tmp_path / 'out' / 'nothing.h5'}: not written: name: is missing"
     assert not (tmp_path / "out").exists()

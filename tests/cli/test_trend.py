@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.artifacts.store import read_record, write_record
-from cpfls_cli.commands import trend as command
+from cpfls_cli import store
+from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.stages import trend as command
 from cpfls_cli.workers.employ import Serial
 from tests.builders.command_line import undrawn
 from tests.builders.studies import VEHICLE
@@ -99,7 +99,13 @@ def test_a_second_call_reads_what_is_new_and_names_what_cannot_be_read(told):
 
 
 def test_what_the_folder_holds(cpfls, told):
-    assert {path.name for path in told.out.iterdir()} == {*command.FILES, "flights"}
+    assert {path.name for path in told.out.iterdir()} == {
+        "trend.h5",
+        "report.html",
+        "trend.json",
+        "trend.csv",
+        "flights",
+    }
     rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
     assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 14)]
     assert [row["part"] for row in rows] == ["1"] * 10 + ["2"] * 3
@@ -114,11 +120,11 @@ def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
     out = tmp_path / "trend"
     shutil.copytree(told.out / "flights", out / "flights")
     for path in (out / "flights").iterdir():
-        record = read_record(path, FlightNumbersRecord)
-        number = int(record.flight.removeprefix("log").removesuffix(".csv"))
+        kept, origin = store.read(path, FlightNumbers)
+        number = int(kept.name.removeprefix("log").removesuffix(".csv"))
         path.unlink()
         # The last was flown first.
-        write_record(path, replace(record, flown_at=1.7e9 - number * DAYS))
+        store.write(path, replace(kept, flown_at_s=1.7e9 - number * DAYS), origin)
     words = ("trend", logs / "study.yaml", logs / "logs", "-o", out)
     with undrawn():
         by_date, by_name = (cpfls(*words, *order, "--json") for order in ((), ("--order", "name")))
@@ -168,7 +174,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     ("words", "message"),
     [
         (["log1.csv", "log2.csv"], "flights that tell the same numbers: 2, and a trend needs 4 at least"),
-        (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log tells when it was flown"),
+        (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log says when it was flown"),
         (["log14.csv"], "log14.csv"),
         (["empty"], "holds no flight and no log"),
     ],

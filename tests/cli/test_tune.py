@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.gains import GainsRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli import page, store
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
+from cpfls_cli.stage import loaded
+from cpfls_cli.tuning.vehicle import Gains
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
@@ -42,6 +43,11 @@ def gains(cpfls, folder):
     return told
 
 
+def read(path):
+    gains, _ = store.read(path, Gains)
+    return gains
+
+
 def written(folder, name, stem=""):
     """Read the parameters of a ground station's file."""
     text = (folder / f"{stem or name}{ENDINGS[name]}").read_text()
@@ -63,15 +69,13 @@ def written(folder, name, stem=""):
 @pytest.mark.parametrize("name", ENDINGS)
 def test_the_file_of_a_ground_station_holds_what_the_artifact_proposes(name, gains, folder):
     assert gains[name].exit_code == 0
-    record = read_record(folder / f"{name}.h5", GainsRecord)
-    assert written(folder, name) == pytest.approx(
-        dict(zip(record.parameter.name, record.parameter.proposed, strict=True))
-    )
+    rows = read(folder / f"{name}.h5").parameters
+    assert written(folder, name) == pytest.approx({each: row.proposed for each, row in rows.items()})
     ranges = {each.name: each for each in AUTOPILOTS[name].parameters}
-    assert all(ranges[each.name].low <= each.proposed <= ranges[each.name].high for each in record.rows)
+    assert all(ranges[each].low <= row.proposed <= ranges[each].high for each, row in rows.items())
     # A comment says of each what it is, and what the documentation allows.
     text = (folder / f"{name}{ENDINGS[name]}").read_text()
-    assert text.count("documented range") == len(record.rows)
+    assert text.count("documented range") == len(rows)
 
 
 @pytest.mark.parametrize("name", ENDINGS)
@@ -82,14 +86,14 @@ def test_the_answer_comes_first_and_is_short(name, gains):
 
 
 def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
-    record = read_record(folder / "px4.h5", GainsRecord)
+    found = read(folder / "px4.h5")
     assert gains["px4"].exit_code == 0
-    # Inertia and lag are told, the thrust factor is as the config has it.
-    assert record.plants == 5
-    assert record.falls_short("proposed") == []
-    assert (record.command_worst.disk[0] <= record.command.disk[0]).all()
-    assert record.hover == pytest.approx(0.363, abs=0.01)
-    assert "THR_MDL_FAC" in record.parameter.name
+    # Inertia and lag are identified, the thrust factor is as the config has it.
+    assert found.sets["proposed"].roll.plants == 5
+    assert found.falls_short["proposed"] == ()
+    assert all(axis.command_worst.disk_deg <= axis.command.disk_deg for axis in found.sets["proposed"].axes)
+    assert found.hover_thrust == pytest.approx(0.363, abs=0.01)
+    assert "THR_MDL_FAC" in found.parameters
 
 
 def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
@@ -97,9 +101,8 @@ def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     result = cpfls("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")
     assert result.exit_code == 0, result.stderr
     page = (folder / "px4.html").read_text()
-    for figure in ("gains-bode-roll", "gains-nichols-yaw", "gains-step"):
+    for figure in ("tune-1-bode-roll", "tune-1-nichols-yaw", "tune-1-step"):
         assert figure in page
-    assert "--autopilot px4 --gain-margin 6" in page
 
 
 def test_info_tells_the_answer_again(gains, cpfls, folder):
@@ -111,8 +114,7 @@ def test_info_tells_the_answer_again(gains, cpfls, folder):
 def test_rotors_in_another_order_are_told(gains):
     assert "mixer: rotors" not in gains["px4"].output
     assert (
-        "mixer: rotors 1, 2, 3 and 4 of the config do not stand where those of Betaflight do"
-        in gains["betaflight"].output
+        "mixer: rotors 1, 2, 3 and 4 of the config are not where those of Betaflight are" in gains["betaflight"].output
     )
 
 
@@ -139,6 +141,36 @@ def test_a_model_that_is_no_vehicle_is_refused(refuse, folder, tmp_path):
     assert "gains need a vehicle that `cpfls vehicle` found" in " ".join(message)
 
 
+def said_of(gains):
+    """Every block that is said of gains: boxes and texts first."""
+    return page.blocks(loaded("tune").text(gains))
+
+
+def test_each_verdict_on_margins_is_said(gains, folder):
+    assert gains["px4"].exit_code == 0
+    found = read(folder / "px4.h5")
+    box = said_of(found)[0]
+    assert (box.label, box.tone) == ("GAINS", "good")
+    assert "All axes keep the asked margin (disk 45.0°) with 5 possible vehicles" in box.sentences[0]
+    assert box.sentences[1].startswith("The defaults give roll ")
+    before = found.sets["default"]
+    unstable = replace(before.yaw.command_worst, gain_db=np.nan, phase_deg=np.nan, disk_deg=0.0)
+    sets = {"proposed": replace(before, roll=replace(before.roll, plants=9)), "today": before}
+    sets["today"] = replace(before, yaw=replace(before.yaw, command_worst=unstable))
+    row = replace(found.parameters["MC_YAW_P"], today=2.0, clipped=True, wanted=7.0)
+    other = replace(found, sets=sets, parameters={"MC_YAW_P": row}, noise=None, warnings=("take care",))
+    box, warning, *_, folded, _ = said_of(other)
+    assert (box.tone, warning.tone, warning.text) == ("warning", "warning", "take care")
+    assert "less than the asked margin" in box.sentences[0]
+    assert "with some of 9, 5 and 5 possible vehicles about roll, pitch and yaw" in box.sentences[0]
+    assert box.sentences[1].startswith("Today's give roll ")
+    assert box.sentences[1].endswith(", yaw unstable with some.")
+    (cells,) = folded.blocks[1].cells
+    assert folded.summary == "each parameter with today's value"
+    assert (cells[1].tone, cells[2].text) == ("warning", "2")
+    assert cells[4].text.endswith("; 7 was wanted, which the range does not hold")
+
+
 LOGGED = """
 import:
   time_column: IMU.timestamp
@@ -162,10 +194,10 @@ def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
     assert result.exit_code == 0, result.stderr
-    record = read_record(tmp_path / "gains.h5", GainsRecord)
-    assert record.set_of == ("proposed", "today")
-    assert {row.name: row.today for row in record.rows}["ATC_RAT_RLL_P"] == pytest.approx(0.2)
-    assert record.noise.line == pytest.approx([95.0], abs=1.0)
+    found = read(tmp_path / "gains.h5")
+    assert list(found.sets) == ["proposed", "today"]
+    assert found.parameters["ATC_RAT_RLL_P"].today == pytest.approx(0.2)
+    assert [each.hz for each in found.noise.lines] == pytest.approx([95.0], abs=1.0)
     text = (tmp_path / "gains.param").read_text()
     assert "roll rate, proportional (s): now 0.2; documented range 0.01 to 0.5" in text
     assert "INS_HNTCH_FREQ,95" in text
@@ -183,9 +215,9 @@ def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path)
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
     assert result.exit_code == 0, result.stderr
-    record = read_record(tmp_path / "gains.h5", GainsRecord)
-    assert (record.beside, record.noise) == ("today", None)
-    assert any("the config has no import.signals.body_rate" in words for words in record.warning)
+    found = read(tmp_path / "gains.h5")
+    assert (found.before, found.noise) == ("today", None)
+    assert any("the config has no import.signals.body_rate" in words for words in found.warnings)
 
 
 def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
@@ -197,8 +229,8 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
     assert result.exit_code == 0, result.stderr
-    record = read_record(tmp_path / "gains.h5", GainsRecord)
-    assert any("no log holds 256 samples" in words for words in record.warning)
+    found = read(tmp_path / "gains.h5")
+    assert any("no log holds 256 samples" in words for words in found.warnings)
     told = json.loads(result.stdout)
     assert told["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
     assert told["falls_short"]["proposed"] == []
@@ -219,11 +251,11 @@ def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
         *("--flight", tmp_path / "flight.h5", "-o", tmp_path / "gains.h5"),
     )
     assert result.exit_code == 0, result.stderr
-    record = read_record(tmp_path / "gains.h5", GainsRecord)
-    assert (record.beside, record.noise) == ("today", None)
-    assert {row.name: row.today for row in record.rows}["ATC_RAT_RLL_P"] == pytest.approx(0.2)
-    assert any("imported flights are low-passed" in words for words in record.warning)
-    assert any("not in the log" in words for words in record.warning)
+    found = read(tmp_path / "gains.h5")
+    assert (found.before, found.noise) == ("today", None)
+    assert found.parameters["ATC_RAT_RLL_P"].today == pytest.approx(0.2)
+    assert any("imported flights are low-passed" in words for words in found.warnings)
+    assert any("not in the log" in words for words in found.warnings)
 
 
 def test_the_file_of_ardupilot_is_read_by_a_parser_of_others(gains, folder):
@@ -235,19 +267,29 @@ def test_the_file_of_ardupilot_is_read_by_a_parser_of_others(gains, folder):
     assert (folder / "betaflight.txt").read_text().startswith("# For Betaflight 2025.12.\n")
 
 
-def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypatch):
-    own = looked_flight("px4")
-    plants = [looked_plant(*PLANTS["px4"], axis=axis) for axis in ("roll", "pitch", "yaw")]
-    # Reading and the estimate of plants have tests of their own.
-    monkeypatch.setattr("cpfls_cli.commands.tune.read_flight", lambda *_: own)
-    monkeypatch.setattr("cpfls_cli.commands.tune.effectiveness", lambda _: plants)
+@pytest.fixture
+def looked(monkeypatch, folder):
+    """A log that holds what is given: reading it and the estimate of plants have tests of their own."""
+
+    def of(system="", changes=()):
+        own = looked_flight("px4", system=system) if system else looked_flight("px4")
+        plants = [looked_plant(*PLANTS["px4"], axis=axis) for axis in ("roll", "pitch", "yaw")]
+        monkeypatch.setattr("cpfls_cli.stages.tune.read_flight", lambda *_: own)
+        monkeypatch.setattr("cpfls_cli.stages.tune.effectiveness", lambda _: plants)
+        monkeypatch.setattr("cpfls_cli.stages.tune.vibration_of", lambda _: SimpleNamespace(changes=changes))
+        log = folder / "log.csv"
+        save(log, np.zeros((9, 2)), "t,p")
+        return log
+
+    return of
+
+
+def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, looked):
     notch, other = (
         Change(parameter=name, now=20.0, proposed=hz, reason="notch off the line")
         for name, hz in (("IMU_GYRO_NF0_FRQ", 81.0), ("another", 60.0))
     )
-    monkeypatch.setattr("cpfls_cli.commands.tune.vibration_of", lambda _: SimpleNamespace(changes=(notch, other)))
-    log = folder / "log.csv"
-    save(log, np.zeros((9, 2)), "t,p")
+    log = looked(changes=(notch, other))
     answered = cpfls("tune", log, "-o", folder / "looked", "--json")
     assert answered.exit_code == 0
     told = json.loads(answered.stdout)
@@ -256,6 +298,7 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypa
     # What has no known range is said, and left to the pilot.
     assert changed == pytest.approx({**gains, "IMU_GYRO_NF0_FRQ": 81.0})
     assert [each["parameter"] for each in told["filters"]] == ["IMU_GYRO_NF0_FRQ", "another"]
+    assert not (folder / "looked").exists()
     again = cpfls("tune", log, "-o", folder / "looked")
     assert again.exit_code == 2
     assert "--force" in again.stderr
@@ -263,6 +306,13 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, monkeypa
         refused = cpfls("tune", log, *more)
         assert refused.exit_code == 2
         assert said in refused.stderr
+
+
+def test_nothing_is_written_of_a_log_whose_gains_stay(cpfls, tmp_path, looked):
+    said = cpfls("tune", looked(system="ArduPlane 4.3"), "-o", tmp_path / "none")
+    assert said.exit_code == 0
+    assert "not written, nothing changes" in said.stdout
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_config_needs_its_vehicle(cpfls, folder):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.commands.twin import with_autopilot
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.stages.twin import with_autopilot
 from tests.builders import blackbox_logs, ulogs
 from tests.builders.autopilots import CROSS
 from tests.builders.spread_vehicles import found_record
@@ -74,8 +74,8 @@ def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
     said, output = twin
     assert (said["autopilot"], said["asked"], said["thrust_from"]) == ("px4", "attitude", "setpoint")
     assert said["gains"]["source"] == "log"
-    assert said["gains"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
-    assert "UNRELATED" not in said["gains"]
+    assert said["gains"]["values"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert "UNRELATED" not in said["gains"]["values"]
     channels = said["vehicles"]["vehicle"]["channels"]
     assert channels["roll rate"]["word"] == channels["pitch rate"]["word"] == "good"
     assert not any(each["parts"] for each in channels.values())
@@ -84,7 +84,7 @@ def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
         said["rms"][name]["roll"] for name in ("setpoint", "nothing-moves")
     )
     with h5py.File(output) as file:
-        assert float(file["clock/begins"][()]) == pytest.approx(1e-6 * ulogs.BEGIN)
+        assert float(file["begins"][()]) == pytest.approx(1e-6 * ulogs.BEGIN)
 
 
 def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
@@ -107,7 +107,7 @@ def test_an_imported_flight_is_flown_with_the_gains_of_its_log_and_by_another_la
     words = ("simulate", logged / "study.yaml", flight, "--json", "--force", "-o", logged / "usual.h5")
     said = json.loads(cpfls(*words, "--autopilot", "px4").stdout)
     assert said["gains"]["source"] == "log"
-    assert said["gains"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert said["gains"]["values"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
     said = json.loads(cpfls(*words, "--autopilot", "ardupilot").stdout)
     assert said["gains"]["source"] == "defaults"
     assert any("defaults of ArduPilot" in warning for warning in said["warnings"])
@@ -126,7 +126,7 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
 
 
 def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, monkeypatch):
-    monkeypatch.setattr("cpfls_cli.commands.twin.DRAWS", 3)
+    monkeypatch.setattr("cpfls_cli.stages.twin.DRAWS", 3)
     model = VehicleModel(vehicle=CROSS, effects=(ModelEffect("linear_damping", {}, np.full(3, 0.01)),))
     found = found_record(model, lack=[0.3, 0.2])
     write_vehicle(logged / "vehicle.h5", found, resolved_yaml(load_study(logged / "study.yaml")))

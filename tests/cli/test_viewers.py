@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from cpfls_cli.export.viewed import view_of
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
-from tests.builders.twins import twin_record
+from tests.builders.twins import twin_found
 
 BEGIN_US = 1_700_000_000_123_456
 TIME_US = BEGIN_US + 5_000 * np.arange(800)
@@ -134,7 +134,7 @@ def test_a_replay_shows_measured_model_and_difference_of_each_flight(cpfls, logg
     exported(cpfls, logged / "replay.h5", tmp_path / f"replay.{form}")
     with h5py.File(logged / "replay.h5") as file:
         first, last = (1e-6 * float(TIME_US[index]) for index in (200, 600))
-        np.testing.assert_allclose(file["flight/begins"], [first, first], atol=1e-6)
+        np.testing.assert_allclose(file["flights/begins_s"], [first, first], atol=1e-6)
         period = float(file["horizon_s"][0])
     if form == "csv":
         columns = columns_of(tmp_path / "replay.csv")
@@ -187,8 +187,9 @@ def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path)
 
 
 def test_a_model_that_is_called_as_the_vehicle_is_told_from_it():
-    record = replace(twin_record(), vehicle=("vehicle", "vehicle.h5"))
-    view = view_of(Path("twin.h5"), record)
+    found = twin_found()
+    first, second = found.vehicles.values()
+    view = view_of(Path("twin.h5"), replace(found, vehicles={"vehicle": first, "vehicle.h5": second}), VEHICLE)
     (roll,) = (track for track in view.tracks if track.name == "roll")
     assert list(roll.values) == ["measured", "setpoint", "vehicle", "vehicle_model", "difference"]
     assert [pose.child for pose in view.poses] == ["body", "vehicle", "vehicle_model"]

@@ -1,15 +1,14 @@
 """A whole vehicle flies, predicts and is compared: nothing of its model is left out on the way."""
 
 import json
-import runpy
 from dataclasses import asdict, replace
 
 import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.config.load import load_study
@@ -17,7 +16,9 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
+from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
 
@@ -202,7 +203,7 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
 def predicted(cpfls, config, model, flown, output):
     result = cpfls("predict", config, model, flown, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), read_record(output, PredictionRecord)
+    return json.loads(result.stdout), store.read(output, AlongFlight)[0]
 
 
 def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):
@@ -219,7 +220,7 @@ def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flig
 def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
     result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
     assert result.exit_code == 0, result.stderr
-    first, *_, last = result.stdout.splitlines()
+    _, first, *_, last = result.stdout.splitlines()
     assert first.endswith(
         "held against what the motion takes with its inertia, noise of the differentiated rates included"
     )
@@ -228,7 +229,7 @@ def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, n
     assert page.exit_code == 0, page.stderr
     text = (tmp_path / "page.md").read_text()
     assert "Force on the body without weight" in text
-    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from." in text
+    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from" in text
 
 
 def without(flown, target, *names):
@@ -393,12 +394,12 @@ def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
 
 def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
     """The recipe keeps the size, and after its memory 37 % of a gust."""
-    for form in ("gusty.py", "gusty.c"):
-        result = cpfls("export", gusty, "-o", folder / form, "--force")
+    for form, file in (("jax", "gusty.py"), ("c", "gusty.c")):
+        result = cpfls("export", gusty, "--format", form, "-o", folder / file, "--force")
         assert result.exit_code == 0, result.stderr
-        assert "x = k x + size sqrt(1 - k^2) n" in " ".join((folder / form).read_text().replace("#", "").split())
+        assert "x = k x + size sqrt(1 - k^2) n" in " ".join((folder / file).read_text().replace("#", "").split())
     assert "_GUST_SIZE {0.02, 0.03, 0.01, 0.2, 0.2, 0.2}" in (folder / "gusty.h").read_text()
-    module = runpy.run_path(str(folder / "gusty.py"))
+    module = on_numpy((folder / "gusty.py").read_text())
     size, memory, h = module["GUST_SIZE"][0], module["GUST_MEMORY"][0], 0.01
     k, rng = np.exp(-h / memory), np.random.default_rng(1)
     x, seen = size * rng.standard_normal(), []

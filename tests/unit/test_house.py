@@ -193,7 +193,6 @@ SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
-    "pages/flight_numbers.py": "the page of an artifact",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
     "search/vehicle_search.py": "a search for a model does not load what plays a vehicle back",

@@ -11,27 +11,21 @@ one curve for all rotors, and speeds follow commands by rotor_dyn_coef.
 from __future__ import annotations
 
 import json
-import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.integration import runge_kutta_step
 from cpfls_cli.effects.effect import thrust_wrench, wrench
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
 STEP_S = 2.5e-3
@@ -111,55 +105,3 @@ def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) ->
     return "\n".join(
         [*lines, "", f"[{sheet.name}]", *(f"{name} = {json.dumps(each)}" for name, each in given.items()), ""]
     )
-
-
-def fly_crazyflow(text: str, course: Course) -> State:
-    """Fly an exported vehicle by the function of drone-models, by Runge-Kutta of order 4; see `Target.fly`."""
-    from scipy.spatial.transform import Rotation
-
-    dynamics = _dynamics()
-    (section,) = tomllib.loads(text).values()
-    unused = {"thrust_min", "thrust_max"}
-    given = {name: np.asarray(value) for name, value in section.items() if name not in unused}
-    given |= {"J_inv": np.linalg.inv(given["J"])}
-    rate = given["rotor_dyn_coef"][0]
-    before = course.lagged(RotorResponse(lag_s=1.0 / rate if rate else 0.0))
-    start, runs = course.start, len(course.starts)
-    now = np.hstack([*(part.reshape(runs, -1) for part in start), _RPM * before])
-
-    def parts(state: Array) -> list[Array]:
-        position, velocity, rotation, turning, speed = np.split(state, [3, 6, 15, 18], axis=-1)
-        return [position, velocity, _turned(rotation.reshape(*rotation.shape[:-1], 3, 3)), turning, speed]
-
-    def slope(state: Array, command: Array) -> Array:
-        position, velocity, rotation, turning, speed = parts(state)
-        quaternion, speed = Rotation.from_matrix(rotation).as_quat(), speed if rate else command
-        moved, _, faster, spun, wound = dynamics(position, quaternion, velocity, turning, command, speed, **given)
-        turned = state[:, 6:15].reshape(runs, 3, 3) @ rotations.cross(np.eye(3), turning[:, None])
-        return np.hstack([moved, faster, turned.reshape(runs, 9), spun, wound if rate else 0 * speed])
-
-    rows = []
-    for index, command in enumerate(_RPM * course.commands.swapaxes(0, 1), 1):
-        now = runge_kutta_step(slope, now, (command, command, command), course.period)
-        now[:, 6:15] = parts(now)[2].reshape(runs, 9)
-        if index % course.finer == 0:
-            rows.append(now)
-    return State(*parts(np.stack(rows, axis=1))[:4])
-
-
-def _dynamics() -> Any:
-    """Load the function, which refuses a SciPy that was loaded for NumPy alone; it gets nothing else here."""
-    before = os.environ.get(_ARRAYS)
-    os.environ[_ARRAYS] = "1"
-    try:
-        from drone_models.first_principles import dynamics
-    finally:
-        os.environ.pop(_ARRAYS)
-        os.environ.update({_ARRAYS: before} if before else {})
-    return dynamics
-
-
-def _turned(matrix: Array) -> Array:
-    """Give the nearest rotations to matrices, shape (run, 3, 3)."""
-    first, _, last = np.linalg.svd(matrix)
-    return np.asarray(first @ last)

@@ -15,13 +15,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.polynomial import STATE_TERMS
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
 STEP_S = 0.001
@@ -143,39 +141,3 @@ def _attributes(actuator: _Actuator, lag: float) -> dict[str, str]:
     kind = {"gaintype": "affine"} if actuator.damps else {}
     filtered = {"dyntype": "filterexact", "dynprm": number(lag)} if lag else {}
     return found | kind | {"gainprm": by_velocity} | filtered
-
-
-def fly_mjcf(text: str, course: Course) -> State:
-    """Fly an exported vehicle in MuJoCo; see `Target.fly`."""
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.timestep = course.period
-    data = mujoco.MjData(model)
-    rotor, power = (model.numeric(f"ctrl_{name}").data.astype(int) for name in ("rotor", "power"))
-    response = RotorResponse(lag_s=float(model.numeric("rotor_lag_s").data[0]))
-    before = np.stack([course.lagged(response, k) for k in (1, 2)])[np.maximum(power, 1) - 1, :, rotor].T
-    start, commands = course.start, course.commands
-    states = _room(len(commands), course.horizon)
-    for run, command in enumerate(commands):
-        mujoco.mj_resetData(model, data)
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, start.rotation[run].ravel())
-        data.qpos[:] = *start.position[run], *quaternion
-        data.qvel[:] = *start.velocity[run], *start.rate[run]
-        data.act[:] = before[run, power > 0] if model.na else []
-        controls = command[:, rotor] ** power
-        for step, control in enumerate(controls, 1):
-            data.ctrl[:] = control
-            mujoco.mj_step(model, data)
-            if step % course.finer == 0:
-                at = run, step // course.finer - 1
-                states.position[at], states.velocity[at], states.rate[at] = data.qpos[:3], data.qvel[:3], data.qvel[3:]
-                mujoco.mju_quat2Mat(turned := np.empty(9), data.qpos[3:7])
-                states.rotation[at] = turned.reshape(3, 3)
-    return states
-
-
-def _room(runs: int, horizon: int) -> State:
-    vector = runs, horizon, 3
-    return State(np.empty(vector), np.empty(vector), np.empty((*vector, 3)), np.empty(vector))

@@ -10,14 +10,12 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.source import executed, fill_template
+from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
 # What RotorPy's `Multirotor` allocates to, and has in its code.
@@ -26,7 +24,6 @@ _FASTEST_S = 1e-3
 """RotorPy divides by the time constant of its motors."""
 
 # So exact that what its step leaves is below what it is compared by.
-_INTEGRATOR = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
 
 
 def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
@@ -78,31 +75,3 @@ def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> st
         "directions": python_rows(spins(model.vehicle), 0),
     }
     return fill_template("rotorpy.py.j2", words)
-
-
-def fly_rotorpy(text: str, course: Course) -> State:
-    """Fly an exported vehicle in RotorPy; see `Target.fly`."""
-    from rotorpy.vehicles.multirotor import Multirotor
-    from scipy.spatial.transform import Rotation
-
-    module = executed(text)
-    parameters = module["quad_params"]
-    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=dict(_INTEGRATOR))
-    lags, start = module["ROTORS_LAG"], course.start
-    before = course.lagged(RotorResponse(lag_s=parameters["tau_m"]))
-    rows = []
-    for run, commands in enumerate(course.commands):
-        now = flown.initial_state | {
-            "x": start.position[run],
-            "v": start.velocity[run],
-            "q": Rotation.from_matrix(start.rotation[run]).as_quat(),
-            "w": start.rate[run],
-            "rotor_speeds": before[run],
-        }
-        for step, speed in enumerate(commands, 1):
-            now["rotor_speeds"] = now["rotor_speeds"] if lags else speed
-            now = flown.step(now, {"cmd_motor_speeds": speed}, course.period)
-            if step % course.finer == 0:
-                rows.append([now["x"], now["v"], Rotation.from_quat(now["q"]).as_matrix(), now["w"]])
-    shape = len(course.starts), course.horizon
-    return State(*(np.array(part).reshape(*shape, *part[0].shape) for part in zip(*rows, strict=True)))

@@ -15,18 +15,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import hub_wrench, wrench
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import number, xml_text
-from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
 _PLUGIN = {"filename": "gz-sim-multicopter-motor-model-system", "name": "gz::sim::systems::MulticopterMotorModel"}
@@ -87,9 +84,9 @@ def sdf_root(
     rotor = _rotor_inertia(sheet, held)
     mass = held.body.mass * (1.0 - len(hubs) * _ROTOR_SHARE)
     centre = -(_ROTOR_SHARE * held.body.mass / mass) * hubs.sum(axis=0)
-    own = held.body.inertia - mass * _apart(centre)
+    own = held.body.inertia - mass * apart(centre)
     for hub in hubs:
-        own = own - rotor[0] * _apart(hub) - np.diag(rotor[1])
+        own = own - rotor[0] * apart(hub) - np.diag(rotor[1])
     _link(model, "base_link", np.zeros(3), centre, mass, own)
     for i, hub in enumerate(hubs, 1):
         _link(model, f"rotor_{i}", hub, np.zeros(3), rotor[0], np.diag(rotor[1]))
@@ -131,7 +128,7 @@ def _rotor_inertia(sheet: Sheet, held: Held) -> tuple[float, Array]:
     return mass, mass * float(np.mean(radii)) ** 2 * np.array([0.25, 0.25, 0.5])
 
 
-def _apart(place: Array) -> Array:
+def apart(place: Array) -> Array:
     """Inertia per mass of a point at a place."""
     return np.asarray(place @ place * np.eye(3) - np.outer(place, place))
 
@@ -172,50 +169,3 @@ def _motor(sheet: Sheet, held: Held, rotor: int) -> dict[str, str | float]:
         "rotorVelocitySlowdownSim": _SLOWER,
         "motorType": "velocity",
     }
-
-
-def fly_sdf(text: str, course: Course) -> State:
-    """Fly an exported vehicle by the published equations of the plugin; see `Target.fly`."""
-    model = ElementTree.fromstring(text).find("model")
-    assert model is not None
-    mass, inertia, hubs = _whole_body(model)
-    motors = [{child.tag: child.text or "" for child in plugin} for plugin in model.iter("plugin")]
-
-    def column(name: str) -> Array:
-        return np.array([float(motor[name]) for motor in motors])
-
-    thrust, drag, rolling = (
-        column(name) for name in ("motorConstant", "rotorDragCoefficient", "rollingMomentCoefficient")
-    )
-    yaw = -np.array([1.0 if motor["turningDirection"] == "ccw" else -1.0 for motor in motors]) * column(
-        "momentConstant"
-    )
-    lag = float(column("timeConstantUp")[0])
-
-    def wrench(speed: Array, air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
-        across = (air[:, None] + rotations.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
-        up = [0.0, 0.0, 1.0]
-        force = -drag[:, None] * across + (thrust * speed**2)[..., None] * up
-        torque = rotations.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * up
-        return torque.sum(axis=1), force.sum(axis=1)
-
-    # Without a lag the filter is at the command at once.
-    return fly_body(course, mass, inertia, wrench, 0.0 if lag <= SHORTEST_S else lag)
-
-
-def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:
-    """Read mass, inertia about the centre of mass and places of the rotors from links."""
-    masses, centres, own, hubs = [], [], [], []
-    for link in model.iter("link"):
-        place = np.array([float(word) for word in link.findtext("pose", "").split()[:3]])
-        inner = np.array([float(word) for word in link.findtext("inertial/pose", "").split()[:3]])
-        masses.append(float(link.findtext("inertial/mass", "")))
-        centres.append(place + inner)
-        own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in ENTRIES]))
-        if link.get("name") != "base_link":
-            hubs.append(place)
-    mass = float(sum(masses))
-    centre = np.average(centres, axis=0, weights=masses)
-    parts = zip(masses, centres, own, strict=True)
-    inertia = sum(tensor + weight * _apart(place - centre) for weight, place, tensor in parts)
-    return mass, np.asarray(inertia), np.array(hubs) - centre

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.config.load import load_study
@@ -68,7 +68,7 @@ def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, fl
         output = tmp_path / name
         result = cpfls("predict", gap_config, extended, tmp_path / "long.h5", "-o", output, "--json")
         assert result.exit_code == 0
-        return read_record(output, PredictionRecord).data, json.loads(result.stdout)["samples"], output.read_bytes()
+        return store.flat(output), json.loads(result.stdout)["samples"], output.read_bytes()
 
     whole, samples, _ = predicted("whole.h5")
     monkeypatch.setattr(flight_source, "STRETCH", PART)
@@ -77,8 +77,8 @@ def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, fl
     assert samples == in_parts == len(tiled["time"]) > 2 * PART
     assert written == again
     assert parts.keys() == whole.keys()
-    for name, values in whole.items():
-        if np.asarray(values).dtype.kind == "U":
-            assert parts[name] == values
+    for name, (_, values) in whole.items():
+        if values.dtype.kind == "U":
+            assert parts[name][1].tolist() == values.tolist()
             continue
-        np.testing.assert_allclose(parts[name], values, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(parts[name][1], values, rtol=1e-9, atol=1e-12)

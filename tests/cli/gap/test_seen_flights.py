@@ -56,7 +56,7 @@ def test_predict_says_that_it_has_seen_the_flight(cpfls, gap_config, two_models,
         assert f"extended.h5 along {path.name}: {seen}" in result.stdout.splitlines()
     page = tmp_path / "page.md"
     assert cpfls("report", gap_config, two_models, flight, tmp_path / "p.h5", "-o", page).exit_code == 0
-    assert f"extended.h5 along flight.h5: {seen}." in page.read_text()
+    assert f"extended.h5 along flight.h5: {seen}" in page.read_text()
     result = cpfls("predict", gap_config, two_models, with_attitude[1], "-o", tmp_path / "new.h5")
     assert "learned from" not in result.stdout
 

@@ -127,7 +127,7 @@ def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
     figures = prediction.figures(flight, model)
     assert list(figures) == json.loads(report.stdout)["figures"]
     with matplotlib.rc_context({"font.size": 30}):
-        drawn = figures["torques-1"]
+        drawn = figures["predict-1-torques"]
     assert isinstance(drawn, Figure)
     assert [axes.get_title(loc) for axes in drawn.axes for loc in ("left", "right") if axes.get_title(loc)]
     assert drawn.axes[0].yaxis.label.get_size() == 9.5

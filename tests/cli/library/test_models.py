@@ -86,9 +86,8 @@ def test_an_identified_model_flies_as_it_is_played_back(pipeline):
     """The errors of its windows are those of a free run from the same sample."""
     model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
     replay = model.replay(flight, horizon_s=0.5, every=100)
-    window = int(replay["drawn/window"][0])
     time, rates = flight["time"], replay["drawn/model"][0]
-    first = int(np.argmin(np.abs(time - replay["window/start"][window])))
+    first = int(np.argmin(np.abs(time - replay["drawn/start_s"][0])))
     rows = slice(first, first + len(rates))
     begin = model.state(*(flight[name][first] for name in ("position", "velocity", "attitude", "body_rate")))
     flown = model.fly(begin, flight["rotor_speed"][rows], time[1] - time[0], hold="linear")

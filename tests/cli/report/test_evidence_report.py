@@ -213,7 +213,10 @@ def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
         block["name"]: block for part in page["sections"] for block in part["blocks"] if block["kind"] == "figure"
     }
     drawn = [
-        series for panel in figures["torques-1"]["panels"] for series in panel["series"] if series["form"] == "band"
+        series
+        for panel in figures["predict-1-torques"]["panels"]
+        for series in panel["series"]
+        if series["form"] == "band"
     ]
     assert len(drawn) == 3
     assert np.array(drawn[0]["high"]) - np.array(drawn[0]["low"]) == pytest.approx(0.5, rel=1e-3)

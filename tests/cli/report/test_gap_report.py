@@ -47,7 +47,8 @@ def full(tmp_path_factory):
 
 def test_the_answer_comes_first_and_every_figure_once(full):
     assert full.summary["sections"] == [
-        "summary", "model", "diagnosis", "extension", "disagreement", "sensors", "unseen", "stated-vehicle", "provenance",
+        "summary", "model", "diagnosis", "extension", "disagreement", "sensors", "unseen", "stated-vehicle",
+        "provenance",
     ]  # fmt: skip
     assert full.summary["figures"] == FIGURES
     assert full.summary["missing"] == []

@@ -36,47 +36,43 @@ def by_setpoints(flights):
     return replace(found, repeats=Repeats(({},) * len(flights), {})).beside
 
 
-def by_name(responses):
-    return {each.name: each for each in responses}
-
-
 @pytest.mark.parametrize("source", [by_repeats, by_setpoints])
 def test_the_right_model_is_good(flights, source):
-    found = by_name(vehicle_responses(RIGHT, flights, source(flights)))
+    found = vehicle_responses(RIGHT, flights, source(flights))
     assert list(found)[:4] == ["roll", "pitch", "yaw", "thrust"]
     for name in ("roll", "pitch", "thrust"):
-        low, high = found[name].mismatch.band
+        low, high = found[name].band
         assert low < 1.0
         assert high > 10.0
-        assert found[name].mismatch.cost < 8.0
-        assert all(each.right for each in found[name].mismatch.deviations)
+        assert found[name].cost < 8.0
+        assert all(each.right for each in found[name].deviations)
     # Nothing turns the vehicle about yaw but gusts, and that is said.
-    assert found["roll"].estimate.instrumented
-    assert not found["yaw"].estimate.instrumented
+    assert found["roll"].instrumented
+    assert not found["yaw"].instrumented
 
 
 def test_without_instruments_gusts_are_taken_for_the_vehicle(flights):
-    found = by_name(vehicle_responses(RIGHT, flights))
-    assert found["yaw"].mismatch.cost > 500.0
-    assert found["thrust"].mismatch.deviations[0].gain > 1.5
-    assert not found["thrust"].mismatch.deviations[0].right
+    found = vehicle_responses(RIGHT, flights)
+    assert found["yaw"].cost > 500.0
+    assert found["thrust"].deviations[0].gain > 1.5
+    assert not found["thrust"].deviations[0].right
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.3, 2.0])
 def test_a_body_of_another_weight_is_seen(flights, factor):
     inertia = tuple(factor * value for value in SMALL.inertia)
     wrong = VehicleModel(vehicle=replace(SMALL.vehicle, inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0)))
-    found = by_name(vehicle_responses(wrong, flights, by_repeats(flights)))
+    found = vehicle_responses(wrong, flights, by_repeats(flights))
     for name in ("roll", "pitch"):
-        (only,) = found[name].mismatch.deviations
+        (only,) = found[name].deviations
         assert not only.right
         assert only.gain == pytest.approx(1 / factor, rel=0.03)
-        assert found[name].mismatch.cost > 80.0
+        assert found[name].cost > 80.0
 
 
 def test_a_lag_that_is_not_there_is_seen(flights):
     slow = VehicleModel(vehicle=SMALL.vehicle, response=RotorResponse(lag_s=0.03))
-    found = by_name(vehicle_responses(slow, flights, by_repeats(flights)))["roll"].mismatch
+    found = vehicle_responses(slow, flights, by_repeats(flights))["roll"]
     widest = max((each for each in found.deviations if not each.right), key=lambda each: each.high / each.low)
     assert widest.high > 10.0
     late = np.degrees(np.arctan(2 * np.pi * np.geomspace(widest.low, widest.high, 30) * 0.03))
@@ -91,7 +87,7 @@ def test_specific_force_of_velocity_is_that_of_an_accelerometer(flights):
     along = np.einsum("tji,tj->ti", part.rotation, felt)
     measured = replace(flights[0], parts=(replace(part, specific_force=along),))
     assert specific_force(measured.parts[0]).integral is None
-    one, other = (by_name(vehicle_responses(RIGHT, [each]))["thrust"].estimate for each in (flights[0], measured))
+    one, other = (vehicle_responses(RIGHT, [each])["thrust"] for each in (flights[0], measured))
     clear = (one.coherence > 0.9) & (one.frequency < 4.0)
     assert clear.any()
     assert np.abs(other.gain / one.gain - 1)[clear].max() < 0.05
@@ -104,21 +100,21 @@ def test_speeds_follow_their_commands(flights):
     speed = behind.terms_at_samples(part.rotor_speed, part.period, "linear")[:, 1:5]
     logged_both = replace(flights[0], parts=(replace(part, rotor_speed=speed, rotor_command=part.rotor_speed),))
     model = VehicleModel(vehicle=SMALL.vehicle, response=behind, commanded=True, hold="linear")
-    found = by_name(vehicle_responses(model, [logged_both]))["rotor speed"]
-    lag = 1 / (1 + 2j * np.pi * found.estimate.frequency * 0.05)
-    seen = found.estimate.frequency < 10.0
-    assert np.abs(found.estimate.gain / lag - 1)[seen].max() < 0.03
-    assert found.mismatch.cost < 1.0
-    without = by_name(vehicle_responses(RIGHT, [logged_both]))["rotor speed"]
-    assert without.estimate.model is None
+    found = vehicle_responses(model, [logged_both])["rotor speed"]
+    lag = 1 / (1 + 2j * np.pi * found.frequency * 0.05)
+    seen = found.frequency < 10.0
+    assert np.abs(found.gain / lag - 1)[seen].max() < 0.03
+    assert found.cost < 1.0
+    without = vehicle_responses(RIGHT, [logged_both])["rotor speed"]
+    assert without.model is None
 
 
 def test_a_flight_in_parts_is_one_flight(flights):
     whole = flights[0].parts[0]
     halves = [slice(0, 1900), slice(2100, len(whole))]
     cut = [replace(f, parts=tuple(_part(f.parts[0], half) for half in halves)) for f in flights]
-    found = by_name(vehicle_responses(RIGHT, cut, by_repeats(cut)))
-    assert found["roll"].mismatch.cost < 10.0
+    found = vehicle_responses(RIGHT, cut, by_repeats(cut))
+    assert found["roll"].cost < 10.0
 
 
 def _part(signals, part):

@@ -22,14 +22,14 @@ def test_margins_and_step_are_flown_as_predicted(gains):
     if gains == "tuned":
         found = with_filters(autopilot, values, hover, AskedMargins()).proposals
         values |= {each.parameter.name: each.value for each in found}
-    told = evaluate(autopilot.law(values), hover)
+    own = evaluate(autopilot.law(values), hover).roll
     same = {"gusts": GUSTS, "noise": 0.01}
-    lowest = 0.5 * told.command[0].crossover_hz
+    lowest = 0.5 * own.command.crossover_hz
     gain, phase = flown_margins("px4", values, CROSS, LAG, 0, lowest_hz=lowest, periods=3, **same)
-    assert gain == pytest.approx(told.command[0].gain_db, abs=1.5)
-    assert phase == pytest.approx(told.command[0].phase_deg, abs=6.0)
+    assert gain == pytest.approx(own.command.gain_db, abs=1.5)
+    assert phase == pytest.approx(own.command.phase_deg, abs=6.0)
     step = flown_step("px4", values, CROSS, LAG, 0, steps=1, held_s=1.5, **same)
-    assert step.overshoot[0] == pytest.approx(told.steps[0].overshoot[0], abs=0.12)
-    assert step.rise_s[0] == pytest.approx(told.steps[0].rise_s[0], rel=0.25)
+    assert step.overshoot[0] == pytest.approx(own.overshoot, abs=0.12)
+    assert step.rise_s[0] == pytest.approx(own.rise_s, rel=0.25)
     # The defaults do not hold what is asked with this vehicle, and the flight shows it.
     assert (phase > 40.0) == (gains == "tuned")

@@ -10,11 +10,12 @@ from scipy.stats import multivariate_t, norm
 
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, _Space, changed, drawn_by_chance
-from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.numbers import UnsureRatio
 from cpfls_cli.changes.reference import Reference, kinds_of, load_directions, usual_covariance
-from cpfls_cli.commands.changed import _flown_unlike
+from cpfls_cli.stages.changed import flown_unlike
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.drawn_numbers import flight_of, having
 
 ARM = 0.2
 QUAD = VehicleSettings(
@@ -108,10 +109,7 @@ def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
     if change is not None:
         drawn = drawn + change
     return [
-        FlightNumbers(
-            f"flight {index}", dict(zip(names, row, strict=True)), dict.fromkeys(names, 0.0), voltage, 20.0, True
-        )
-        for index, row in enumerate(drawn)
+        flight_of(f"flight {index}", dict(zip(names, row, strict=True)), voltage) for index, row in enumerate(drawn)
     ]
 
 
@@ -124,10 +122,7 @@ def test_how_much_a_kind_scatters_is_learned(factor):
 
     def learned(count):
         drawn = rng.normal(size=(count, 4)) @ root.T
-        made = [
-            FlightNumbers("", dict(zip(LOADS, row, strict=True)), dict.fromkeys(LOADS, 0.0), np.nan, 20.0, True)
-            for row in drawn
-        ]
+        made = [flight_of("", dict(zip(LOADS, row, strict=True))) for row in drawn]
         reference = Reference.of(made, LOADS, QUAD)
         return np.trace(reference.covariance) / (1 + 1 / count), reference.freedom[0]
 
@@ -158,22 +153,22 @@ def test_unchanged_flights_seldom_look_changed():
 def test_a_change_is_found(cause, change, size):
     rng = np.random.default_rng(3)
     found = changed(flights(2, rng, change), flights(6, rng), QUAD, rng)
-    assert found.p_value <= FALSE_ALARM
-    (first, *more), (told, *_) = found.found, found.found[0].sizes
+    assert found.p <= FALSE_ALARM
+    (first, *more), (told, *_) = found.causes, found.causes[0].sizes
     assert not more
-    alike = {first.cause.name, *(name for name, _ in first.alike)}
+    alike = {first.name, *(each.name for each in first.alike)}
     assert cause in alike
     if cause == "rotor M3":
-        assert first.cause.name == cause
+        assert first.name == cause
         assert first.belief > 0.9
-    if first.cause.name == cause:
+    if first.name == cause:
         assert told.low < size < told.high
 
 
 def test_two_rotors_at_once_are_no_third_change():
     rng = np.random.default_rng(4)
     found = changed(flights(3, rng, 0.4 * (np.arange(10) < 2)), flights(8, rng), QUAD, rng)
-    assert [each.cause.name for each in found.found] in (["rotors M1 and M2"], ["mass"])
+    assert [each.name for each in found.causes] in (["rotors M1 and M2"], ["mass"])
 
 
 def test_a_mass_at_a_place_by_a_hover_that_is_solved():
@@ -201,18 +196,23 @@ def test_a_mass_and_weak_rotors_look_alike(more, what):
     rng = np.random.default_rng(14)
     before = flights(6, rng)
     mean = {name: float(np.mean([flight.values[name] for flight in before])) for name in NAMES}
-    today = [replace(before[0], values={**mean, **{name: mean[name] + x for name, x in zip(LOADS, more, strict=True)}})]
+    today = [having(before[0], {**mean, **{name: mean[name] + x for name, x in zip(LOADS, more, strict=True)}})]
     found = changed(today, before, QUAD, rng)
-    (first,) = found.found
-    assert {what, "mass"} <= {first.cause.name, *(name for name, _ in first.alike)}
-    assert first.belief < NAMED if what != "mass" else first.cause.name == "mass"
+    (first,) = found.causes
+    assert {what, "mass"} <= {first.name, *(each.name for each in first.alike)}
+    assert first.belief < NAMED if what != "mass" else first.name == "mass"
+
+
+def smallest(change):
+    """Smallest size of each change that shows."""
+    return {each.cause: each.smallest for each in change.shows}
 
 
 def test_what_shows_does():
     """A rotor that lost as much as is said to show is found in most of many draws."""
     rng = np.random.default_rng(7)
     before = flights(8, rng)
-    size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
+    size = smallest(changed(before[:1], before[1:], QUAD, rng))["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD), kinds_of(NAMES))
     drawn = partial(drawn_by_chance, kinds=kinds_of(NAMES), freedom=reference.freedom)
@@ -228,20 +228,20 @@ def test_less_voltage_asks_for_more():
     def empties(count, voltages):
         made = flights(count, rng, names=LOADS)
         return [
-            replace(flight, voltage=v, values={n: x - 2 * np.log(v) for n, x in flight.values.items()})
+            having(flight, {n: x - 2 * np.log(v) for n, x in flight.values.items()}, voltage=v)
             for flight, v in zip(made, voltages, strict=True)
         ]
 
     before, today = empties(6, np.linspace(0.8, 1.0, 6)), empties(1, [0.7])
     blind = [replace(flight, voltage=np.nan) for flight in [*before, *today]]
-    assert changed(today, before, QUAD, rng).p_value > 0.05
-    assert changed(blind[6:], blind[:6], QUAD, rng).p_value < changed(today, before, QUAD, rng).p_value
+    assert changed(today, before, QUAD, rng).p > 0.05
+    assert changed(blind[6:], blind[:6], QUAD, rng).p < changed(today, before, QUAD, rng).p
 
 
 def test_speeds_and_commands_are_not_compared():
     rng = np.random.default_rng(9)
     before, today = flights(4, rng), [replace(flight, commanded=False) for flight in flights(1, rng)]
-    assert not [name for name in changed(today, before, QUAD, rng).names if name.startswith("load ")]
+    assert not [each for each in changed(today, before, QUAD, rng).numbers if each.name.startswith("load ")]
 
 
 def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
@@ -250,10 +250,10 @@ def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
     weak = -np.log(0.75) * (np.arange(10) == 2)
     today = [*flights(4, rng), *flights(2, rng, weak)]
     found = changed(today, before, QUAD, rng)
-    assert found.p_value <= FALSE_ALARM
-    assert found.since == 4
-    assert found.found[0].cause.name == "rotor M3"
-    assert found.found[0].sizes[0].low < 0.25 < found.found[0].sizes[0].high
+    assert found.p <= FALSE_ALARM
+    assert found.since_flight == 4
+    assert found.causes[0].name == "rotor M3"
+    assert found.causes[0].sizes[0].low < 0.25 < found.causes[0].sizes[0].high
 
 
 def flown(count, rng, agility):
@@ -261,11 +261,7 @@ def flown(count, rng, agility):
     made = flights(count, rng)
     sooner = -0.03 * np.log(1 + agility)
     return [
-        replace(
-            flight,
-            agility=each,
-            values={name: x + less * name.startswith("late") for name, x in flight.values.items()},
-        )
+        having(flight, {name: x + less * name.startswith("late") for name, x in flight.values.items()}, agility=each)
         for flight, each, less in zip(made, agility, sooner, strict=True)
     ]
 
@@ -276,20 +272,20 @@ def test_flights_that_are_flown_otherwise_are_no_change():
     slow, fast = np.full(8, 0.5), np.array([3.0])
     alike, many = flown(8, rng, slow), flown(8, rng, np.geomspace(0.3, 5.0, 8))
     today = flown(1, rng, fast)
-    assert changed(today, alike, QUAD, rng).p_value > 0.05
-    assert changed([replace(today[0], agility=0.5)], alike, QUAD, rng).p_value <= FALSE_ALARM
+    assert changed(today, alike, QUAD, rng).p > 0.05
+    assert changed([replace(today[0], agility=0.5)], alike, QUAD, rng).p <= FALSE_ALARM
     of_many = changed(today, many, QUAD, rng)
-    assert of_many.p_value > 0.05
-    assert of_many.shows["late"] < 0.7 * changed(today, alike, QUAD, rng).shows["late"]
+    assert of_many.p > 0.05
+    assert smallest(of_many)["late"] < 0.7 * smallest(changed(today, alike, QUAD, rng))["late"]
 
 
 def test_flights_that_are_flown_otherwise_are_said_to_be():
     rng = np.random.default_rng(13)
     before, today = flown(5, rng, np.linspace(0.4, 0.6, 5)), flown(1, rng, np.array([3.0]))
-    (words,) = _flown_unlike(changed(today, before, QUAD, rng), today, before)
+    (words,) = flown_unlike(changed(today, before, QUAD, rng), today, before, QUAD)
     assert words.startswith("flown unlike the reference: with accelerations of 3 m/s^2 (root mean square), those of")
     assert "late count" in words
-    assert not [*_flown_unlike(changed(before[:1], before[1:], QUAD, rng), before[:1], before[1:])]
+    assert not [*flown_unlike(changed(before[:1], before[1:], QUAD, rng), before[:1], before[1:], QUAD)]
 
 
 def test_two_changes_at_once_hide_each_other_and_are_found():
@@ -297,8 +293,8 @@ def test_two_changes_at_once_hide_each_other_and_are_found():
     rng = np.random.default_rng(15)
     both = np.concatenate([np.log(0.75) + 0.15 * np.array([1.0, -1.0, 1.0, -1.0]), np.zeros(6)])
     change = changed(flights(1, rng, both), flights(2, rng), QUAD, rng)
-    assert change.p_value <= FALSE_ALARM
-    assert {"torque about z", "hover"} <= {found.cause.name for found in change.found}
+    assert change.p <= FALSE_ALARM
+    assert {"torque about z", "hover"} <= {found.name for found in change.causes}
 
 
 @pytest.mark.parametrize("names", [LOADS, NAMES])
@@ -310,9 +306,9 @@ def test_a_number_beyond_its_limit_is_never_unchanged(names):
         apart = rng.choice([0.0, 0.1, 0.3, 1.0], len(names)) * rng.normal(size=len(names))
         before = flights(int(rng.integers(1, 6)), rng, names=names)
         change = changed(flights(2, rng, apart, names=names), before, QUAD, rng)
-        beyond = np.abs(change.apart.mean(axis=0)) > change.limit * change.deviation
-        assert change.changed >= beyond.any()
-        seen += bool(beyond.any())
+        beyond = [abs(own.today.mean() - own.reference) > own.limit for own in change.numbers]
+        assert change.p <= FALSE_ALARM or not any(beyond)
+        seen += any(beyond)
     assert seen > 5
 
 
@@ -321,17 +317,17 @@ def test_a_larger_change_does_not_count_less():
     for lost in (0.3, 0.6, 0.9, 0.99):
         rng = np.random.default_rng(17)
         change = changed(flights(1, rng, -np.log(1 - lost) * np.eye(10)[2]), flights(3, rng), QUAD, rng)
-        assert change.p_value <= FALSE_ALARM
-        assert change.found[0].cause.name == "rotor M3"
+        assert change.p <= FALSE_ALARM
+        assert change.causes[0].name == "rotor M3"
 
 
 def test_a_ratio_that_is_reversed_today_is_a_change_and_one_that_is_missing_is_not():
     rng = np.random.default_rng(18)
     before, (today,) = flights(4, rng), flights(1, rng)
     left = {name: value for name, value in today.values.items() if name != "late yaw"}
-    missing = changed([replace(today, values=left)], before, QUAD, rng)
+    missing = changed([having(today, left)], before, QUAD, rng)
     assert (missing.changed, missing.missing, missing.reversed) == (False, ("late yaw",), ())
-    turned = changed([replace(today, values=left, reversed=("late yaw",))], before, QUAD, rng)
+    turned = changed([having(today, left, reversed=("late yaw",))], before, QUAD, rng)
     assert (turned.changed, turned.missing, turned.reversed) == (True, (), ("late yaw",))
 
 
@@ -342,6 +338,6 @@ def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_tha
     usual = float(np.exp(np.mean([flight.values["late yaw"] for flight in before])))
     left = {name: value for name, value in today.values.items() if name != "late yaw"}
     for share, expected in ((0.7, ()), (0.3, ("late yaw",)), (-0.1, ("late yaw",))):
-        unsure = replace(today, values=left, unsure={"late yaw": share * usual})
+        unsure = having(today, left, unsure=(UnsureRatio(name="late yaw", ratio=share * usual),))
         told = changed([unsure], before, QUAD, rng)
         assert (told.missing, told.undetermined) == (("late yaw",), expected)

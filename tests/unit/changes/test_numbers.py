@@ -79,9 +79,9 @@ def test_a_load_on_a_cable():
     flight = of_a_day(20, effects={"payload": LOAD})
     today = flight_numbers(flight)
     found = changed([today], before, VEHICLE, rng)
-    assert found.p_value <= FALSE_ALARM
-    (load,) = found.found
-    assert load.cause.name == "load on a cable"
+    assert found.p <= FALSE_ALARM
+    (load,) = found.causes
+    assert load.name == "load on a cable"
     assert load.belief > NAMED
     assert load.sizes[0].low < 0.1 < load.sizes[0].high
     assert today.cable_m == pytest.approx(1.0, rel=0.05)

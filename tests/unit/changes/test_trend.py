@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
-from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
-from cpfls_cli.changes.reference import EACH_TEST, Reference
+from cpfls_cli.changes.reference import EACH_TEST, Reference, furthest, number_limits
 from cpfls_cli.changes.trend import most_told, trend
-from cpfls_cli.commands.changed import units_of
 from cpfls_cli.errors import InputError
-from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
+from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights, having
 
 
 @pytest.fixture(autouse=True)
@@ -53,10 +51,9 @@ def test_a_step_is_found_at_its_flight():
     """Of three deviations in one of ten numbers, in the middle of the flights after the reference."""
     step = 3 * DEVIATION * (np.arange(10) == 7)
     found = trend(flights(30, np.random.default_rng(3), step, since=20), QUAD, np.random.default_rng(1))
-    assert [shift.start for shift in found.shifts] == [20]
-    assert found.shifts[0].end == 30
-    assert found.p_value <= FALSE_ALARM
-    assert found.reference == 15
+    assert [shift.flight for shift in found.shifts] == [21]
+    assert found.p <= FALSE_ALARM
+    assert len(found.reference_flights) == 15
 
 
 def test_a_rotor_is_named_with_its_size():
@@ -64,8 +61,8 @@ def test_a_rotor_is_named_with_its_size():
     weak = 0.25 * (np.arange(10) == 2)
     found = trend(flights(24, np.random.default_rng(4), weak, since=16), QUAD, np.random.default_rng(1))
     (shift,) = found.shifts
-    (cause,) = shift.change.found
-    assert (shift.start, cause.cause.name) == (16, "rotor M3")
+    (cause,) = shift.causes
+    assert (shift.flight, cause.name) == (17, "rotor M3")
     assert cause.belief > 0.9
     assert cause.sizes[0].low < 0.25 < cause.sizes[0].high
 
@@ -75,17 +72,16 @@ def test_a_change_that_is_taken_back_is_two():
     given = flights(30, rng)
     moved = {name: 6 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name.startswith("late")}
     given[12:20] = [
-        replace(flight, values={name: value + moved.get(name, 0.0) for name, value in flight.values.items()})
+        having(flight, {name: value + moved.get(name, 0.0) for name, value in flight.values.items()})
         for flight in given[12:20]
     ]
     found = trend(given, QUAD, rng)
-    assert [(shift.start, shift.end) for shift in found.shifts] == [(12, 20), (20, 30)]
+    assert [shift.flight for shift in found.shifts] == [13, 21]
     # A reference that holds a change would tell of no limits.
-    assert found.reference == 12
-    late = [name.startswith("late") for name in NAMES]
-    beyond = (np.abs(found.apart) > found.limit * found.deviation)[:, late].any(axis=1)
-    assert beyond[12:20].any()
-    assert not beyond[20:].any()
+    assert len(found.reference_flights) == 12
+    late = [any(name.startswith("late") for name in flight.beyond) for flight in found.flights]
+    assert any(late[12:20])
+    assert not any(late[20:])
 
 
 def test_a_battery_that_is_used_up_is_no_change():
@@ -93,10 +89,10 @@ def test_a_battery_that_is_used_up_is_no_change():
     rng = np.random.default_rng(6)
     volts = np.linspace(1.0, 0.8, 20)
     given = [
-        replace(
+        having(
             flight,
+            {name: x - np.log(each) * name.startswith("load") for name, x in flight.values.items()},
             voltage=each,
-            values={name: x - np.log(each) * name.startswith("load") for name, x in flight.values.items()},
         )
         for flight, each in zip(flights(20, rng, scatter=0.5), volts.tolist(), strict=True)
     ]
@@ -107,12 +103,12 @@ def test_a_battery_that_is_used_up_is_no_change():
 def test_numbers_and_flights_that_are_the_most_together():
     given = flights(6, np.random.default_rng(7))
     few = {name: value for name, value in given[0].values.items() if name.startswith("load")}
-    names, kept = most_told([replace(given[0], values=few), *given[1:]])
+    names, kept = most_told([having(given[0], few), *given[1:]])
     assert (names, len(kept)) == (NAMES, 5)
     speeds = [replace(flight, commanded=False) for flight in given[:2]]
     assert not [name for name in most_told([*speeds, *given[2:]])[0] if name.startswith("load")]
     with pytest.raises(InputError, match="no number in common"):
-        most_told([replace(given[0], values={})])
+        most_told([having(given[0], {})])
 
 
 def test_too_few_flights_are_refused():
@@ -125,36 +121,33 @@ def test_too_few_flights_are_refused():
 
 def test_the_reference_that_is_asked_for_is_taken():
     given = flights(8, np.random.default_rng(9))
-    assert trend(given, QUAD, np.random.default_rng(1), 5).reference == 5
-    assert trend(given, QUAD, np.random.default_rng(1)).reference == 4
+    assert len(trend(given, QUAD, np.random.default_rng(1), 5).reference_flights) == 5
+    assert len(trend(given, QUAD, np.random.default_rng(1)).reference_flights) == 4
 
 
 def test_a_single_flight_beyond_its_limits_is_no_green_answer():
     """One flight of thirty that is off by itself, in a direction that is no known change, and that ends again."""
     given = flights(30, np.random.default_rng(8))
     moved = {name: 60 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name == "load M2"}
-    given[22] = replace(given[22], values={name: x + moved.get(name, 0.0) for name, x in given[22].values.items()})
+    given[22] = having(given[22], {name: x + moved.get(name, 0.0) for name, x in given[22].values.items()})
     found = trend(given, QUAD, np.random.default_rng(1))
-    assert found.p_value <= FALSE_ALARM
-    made = TrendRecord.of(
-        found, [np.nan] * 30, "given", units_of(found.names, QUAD), [], [], false_alarm=FALSE_ALARM, named_from=0.95
-    )
-    assert made.verdict == "CHANGED"
-    assert [row["flight"] for row in made.rows if row["beyond"]] == ["flight23"]
+    assert found.p <= FALSE_ALARM
+    assert found.verdict == "CHANGED"
+    assert [row.flight for row in found.flights if row.beyond] == ["flight23"]
 
 
 def test_a_flight_that_has_a_ratio_reversed_is_a_change():
     given = flights(12, np.random.default_rng(9))
     left = {name: value for name, value in given[9].values.items() if name != "late yaw"}
-    given[9] = replace(given[9], values=left, reversed=("late yaw",))
+    given[9] = having(given[9], left, reversed=("late yaw",))
     found = trend(given, QUAD, np.random.default_rng(1))
     assert found.left_out == ("flight10",)
     assert found.reversed == ("flight10: late yaw reversed, or nothing",)
 
 
 def test_the_probability_and_the_limit_are_one_rule():
-    """A number is beyond the limit of all just where the probability of that is half the rate of false alarms."""
+    """A number is beyond its limit just where the probability of any that far is half the rate of false alarms."""
     freedom = np.array([4.0, 4.0, 30.0, 30.0])
-    limit = module._limit(freedom, 3)
-    assert module._as_far(freedom, 3, limit) == pytest.approx(EACH_TEST, rel=0.02)
-    assert module._as_far(freedom, 3, 0.99 * limit) > EACH_TEST
+    limit = number_limits(freedom, 3)
+    assert furthest(limit, freedom, 3) == pytest.approx(EACH_TEST, rel=1e-6)
+    assert furthest(0.99 * limit, freedom, 3) > EACH_TEST

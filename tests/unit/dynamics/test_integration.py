@@ -5,8 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.equations_of_motion import momentum_form, turning_law
-from cpfls_cli.dynamics.integration import RotationState, free_runs, runge_kutta_step
+from cpfls_cli.dynamics.equations_of_motion import (
+    RotationState,
+    free_runs,
+    momentum_form,
+    runge_kutta_step,
+    turning_law,
+)
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.catalogue.payload import integrate
 from cpfls_cli.inertia import symmetric

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export.registry import exported
-from cpfls_cli.export.source import executed, jax_parameters, python_source
+from cpfls_cli.export.source import jax_parameters, python_source
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.spread import Estimates, drawn
 from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import executed
 from tests.builders.playback_flights import flown, truth
 from tests.builders.spread_vehicles import found_record
 

@@ -8,25 +8,26 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_flight, sized
-from cpfls_cli.export.registry import TARGETS, exported
+from cpfls_cli.export.registry import exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import HEXA, QUAD, whole
 from tests.builders.verified_exports import AGREES, verified
 
 LIBRARIES = ("casadi", "jax")
-SIMULATORS = [form for form in TARGETS if form not in LIBRARIES]
+SIMULATORS = [form for form in FLYING if form not in LIBRARIES]
 # JAX compiles for seconds what CasADi does not; both are written by one template.
 STRUCTURES = ["paper", "rigid body, rules", "classic, full-circle, tensor", "harmonic, data-range", "zero width"]
 
 
 def require(form):
-    if TARGETS[form].package and find_spec(TARGETS[form].package) is None:
-        pytest.skip(f"needs the package {TARGETS[form].package}, of the extra simulators")
+    if FLYING[form].package and find_spec(FLYING[form].package) is None:
+        pytest.skip(f"needs the package {FLYING[form].package}, of the extra simulators")
 
 
 def fly(form, model, horizon=8, windows=3, **changed):

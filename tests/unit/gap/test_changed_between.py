@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap import diagnose
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
+from tests.builders.drawn_numbers import flight_of
 
 LOADS = [f"load M{index}" for index in range(1, 5)]
 GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
@@ -23,9 +23,7 @@ def told(monkeypatch):
         load, rough = map(float, recording.name.split())
         values = [*(0.01 * rng.normal(size=4) + [0, 0, load, 0]), *(0.1 * rng.normal(size=3) + rough)]
         names = [*LOADS, *GUSTS]
-        return FlightNumbers(
-            recording.name, dict(zip(names, values, strict=True)), dict.fromkeys(names, 0.0), np.nan, 9.0, True
-        )
+        return flight_of(recording.name, dict(zip(names, values, strict=True)))
 
     monkeypatch.setattr(diagnose, "flight_numbers", numbers)
     return lambda *names: diagnose._changed_between(

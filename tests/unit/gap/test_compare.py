@@ -108,7 +108,7 @@ def test_model_with_the_effect_leaves_the_noise():
     recordings = [recording_of_sines(1, damping), recording_of_sines(2, damping)]
     found = compared(recordings, with_effect("linear_damping", 0.12, 0.12, 0.12))
     assert (found.floors[:3] < 1.4).all()
-    after, before = (each.playback.errors["body_rate"].mae[0, -1] for each in (found, compared(recordings)))
+    after, before = (each.playback.models["model"].body_rate.mae[-1] for each in (found, compared(recordings)))
     assert after < 0.3 * before
 
 

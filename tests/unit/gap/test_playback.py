@@ -12,6 +12,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.whole_vehicle import whole_vehicle
+from cpfls_cli.playback.errors import MODEL
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
@@ -19,6 +20,7 @@ from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
+from tests.builders.playback_flights import mean_errors
 
 BIAS = np.array([0.0, 0.01, 0.05])
 PARAMETERS = [coefficient.name for coefficient in VEHICLE_NUMBERS.coefficients]
@@ -55,7 +57,7 @@ def logged(*parts):
 def played_back(model, signals, horizon=30):
     flight, player = made_ready(model, logged(signals))
     found = replay([Played(flight, player, player_of(VehicleModel(vehicle=VEHICLE), flight))], horizon, 5)
-    return {name: errors.mae.sum(axis=1) for name, errors in found.errors.items()}, flight
+    return {name: mean_errors(found, name).sum(axis=1) for name in found.models[MODEL].signals}, flight
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -129,7 +131,7 @@ def test_stretches_are_played_apart():
     assert [part.stop - part.start for part in flight.stretches] == [120, 150]
     found = replay([Played(flight, player, player)], 30, 5)
     whole, _ = played_back(model, signals)
-    rates = found.errors["body_rate"].mae.sum(axis=1)
+    rates = mean_errors(found, "body_rate").sum(axis=1)
     assert rates[0] < 2 * whole["body_rate"][0]
 
 
@@ -146,8 +148,8 @@ def test_before_and_after_are_those_of_each_model_alone():
     pairs = played_pairs([Recording("flight", signals)], model, given)
     found = errors_by_horizon(pairs, 0.3)
     after, before = (played_back(each, signals)[0] for each in (model, given))
-    for name, errors in found.errors.items():
-        sums = errors.mae.sum(axis=1)
+    for name in found.models[MODEL].signals:
+        sums = mean_errors(found, name).sum(axis=1)
         np.testing.assert_allclose(sums[:3], after[name][:3])
         assert sums[3] == pytest.approx(before[name][0])
         # Of noise there is none, so that without a model nothing is as good.
@@ -159,7 +161,7 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
     faulty = replace(exact, body_rate=exact.body_rate + BIAS)
     model = replace(model_of({}), repairs=Repairing())
     pairs = played_pairs([Recording("flight", faulty)], model, model_of({}))
-    after, _, _, before = errors_by_horizon(pairs, 0.3).errors["attitude"].mae[:, -1]
+    after, _, _, before = mean_errors(errors_by_horizon(pairs, 0.3), "attitude")[:, -1]
     assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
     assert after < 0.02 * before
     stretch = worst_stretch(pairs, 1.0, 2.0)
@@ -171,9 +173,9 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
 @pytest.mark.parametrize(("horizon_s", "samples"), [(100.0, 295), (0.3, 30), (0.001, 1)])
 def test_a_horizon_is_in_seconds_and_within_the_flight(horizon_s, samples):
     pairs = played_pairs([Recording("flight", signals_of(flown()))], *[model_of({})] * 2)
-    errors = errors_by_horizon(pairs, horizon_s).errors["body_rate"]
-    assert errors.mae.shape == (4, samples)
-    np.testing.assert_array_equal(errors.mae[0], errors.mae[3])
+    errors = mean_errors(errors_by_horizon(pairs, horizon_s), "body_rate")
+    assert errors.shape == (4, samples)
+    np.testing.assert_array_equal(errors[0], errors[3])
 
 
 def test_the_worst_stretch_is_where_the_model_as_given_is_wrong():

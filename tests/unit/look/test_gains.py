@@ -8,12 +8,12 @@ from control import FRD, stability_margins
 
 import cpfls_cli.look.gains
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.tune import of_flight
 from cpfls_cli.look.flight import AXES
-from cpfls_cli.look.gains import tuned_gains
+from cpfls_cli.look.gains import LogGains, tuned_gains
 from cpfls_cli.look.reasons import TOO_SLOW
-from cpfls_cli.pages.look_gains import answer
+from cpfls_cli.page import blocks
 from cpfls_cli.report.content import Text
+from cpfls_cli.stage import loaded
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.margins import crossing_margins
 from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked_plant, weak_plant
@@ -45,6 +45,11 @@ def loops(autopilot, values, draws):
     gain, delay, lag, damping, _ = draws.T[:, :, None]
     moved = gain * np.exp(-s * delay) / ((1 + s * lag) * (s + damping))
     return frequency, moved * law.response(0, frequency).feedback
+
+
+def answer(gains):
+    """What is said of them."""
+    return blocks(loaded("tune").text(LogGains(**vars(gains))))
 
 
 def by_term(gains):
@@ -198,21 +203,6 @@ def test_names_are_those_of_the_version():
         "i_roll",
         "d_roll",
     }
-
-
-def test_only_what_changes_is_written(tmp_path):
-    own, plants = (
-        looked_flight("betaflight"),
-        [looked_plant(*PLANTS["betaflight"]), weak_plant("pitch"), weak_plant("yaw")],
-    )
-    outcome = of_flight(own, plants, tmp_path / "gains", AskedMargins())
-    text = (tmp_path / "gains.txt").read_text()
-    changes = {row.parameter: row.proposed for row in tuned_gains(own, plants).changes}
-    lines = [line.split() for line in text.splitlines() if line.startswith("set ") and "simplified" not in line]
-    assert {words[1]: float(words[3]) for words in lines} == changes
-    assert outcome.summary["changes"]
-    kept = looked_flight("betaflight", system="Betaflight 3.0.1")
-    assert of_flight(kept, plants, tmp_path / "none", AskedMargins()).written is None
 
 
 def test_crossings_are_those_of_python_control():

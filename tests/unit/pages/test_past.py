@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from cpfls_cli.artifacts.replay import HeldOutGroup
-from cpfls_cli.pages.replay import beside_past, errors_table, horizon_figure
 
+from cpfls_cli.pages.playback import errors_table, playback_figure, with_past_words
+from cpfls_cli.playback.errors import PREDICTIONS, WITH_PAST
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of
-from cpfls_cli.playback.replay import PREDICTIONS, WITH_PAST, Played, replay
+from cpfls_cli.playback.replay import Played, replay
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 
 
@@ -19,15 +19,14 @@ def test_errors_with_the_past_stand_beside_those_without():
     known = replace(player, observer=Observer(rate=np.full(6, 20.0), memory_s=np.full(6, 0.5), past_s=0.5))
     pair = Played(flight, player, player, with_past=known)
     found = replay([pair], 20, 5)
-    held = HeldOutGroup.judged([pair], found)
-    assert held.prediction == (*PREDICTIONS, WITH_PAST)
+    held = found.along([pair])
+    assert tuple(held.models) == (*PREDICTIONS, WITH_PAST)
     runs = free_runs(known, flight, flight.starts(20, 5), 20)
     expected = np.linalg.norm(runs.errors[:, :, 3], axis=2).mean(axis=0)
-    np.testing.assert_allclose(held.body_rate.mae[-1], expected)
-    (sentence,) = beside_past(held, 0.5)
-    smaller = 1 - held.body_rate.total[-1] / held.body_rate.total[0]
+    np.testing.assert_allclose(held.models[WITH_PAST].body_rate.mae, expected)
+    (sentence,) = with_past_words(held, 0.5)
+    smaller = 1 - held.models[WITH_PAST].body_rate.sum / held.model.body_rate.sum
     assert f"body rate {100 * smaller:.0f} % smaller" in sentence
-    table = errors_table(held, 1)
-    assert [row[1] for row in table.rows].count("with the past") == 4
-    assert set(held.summary["models"]) == {*PREDICTIONS, WITH_PAST}
-    assert len(horizon_figure("errors", held).picture.panels) == 4
+    _, table = errors_table("errors", held, "the vehicle found", held.windows, held.flights)
+    assert [row[1].text for row in table.rows].count("with the past") == 4
+    assert len(playback_figure("errors", held, "the vehicle found").picture.panels) == 4

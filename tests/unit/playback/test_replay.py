@@ -10,24 +10,15 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
+from cpfls_cli.playback.errors import MODEL, NOTHING_MOVES, RATE_FADES, RATE_STAYS, STATED
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
-from cpfls_cli.playback.replay import (
-    MODEL,
-    NOTHING_MOVES,
-    RATE_FADES,
-    RATE_STAYS,
-    SIGNALS,
-    STATED,
-    Played,
-    fading,
-    replay,
-    where_better,
-)
+from cpfls_cli.playback.replay import SIGNALS, Played, fading, replay, where_better
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.rotations import cross, euler_angles
 from cpfls_cli.vehicle.rotors import body_wrench
+from tests.builders.playback_flights import mean_errors
 from tests.builders.random_flights import VEHICLE, flight_of
 
 INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
@@ -196,19 +187,17 @@ def test_chance_is_what_blocks_of_windows_tell_of_the_difference_from_the_model(
     found = replay([played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS))], 10, 1)
     runs = [played(flight).runs(name, np.arange(120), 10).errors for name in (RATE_STAYS, NOTHING_MOVES)]
     sizes = [np.linalg.norm(errors[:, :, 3], axis=2) for errors in runs]
-    model = found.predictions.index(MODEL)
-    assert np.all(found.errors["body_rate"].chance[model] == 0)
+    assert np.all(found.models[MODEL].body_rate.chance == 0)
     stated = np.linalg.norm(played(flight).runs(STATED, np.arange(120), 10).errors[:, :, 3], axis=2)
     own = played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS)).runs(MODEL, np.arange(120), 10).errors
     apart = stated - np.linalg.norm(own[:, :, 3], axis=2)
     # Six blocks of two horizons; leaving out one of six is to leave the mean of five.
     means = apart.reshape(6, 20, 10).mean(axis=1)
     error = means.std(axis=0, ddof=1) / np.sqrt(6)
-    row = found.predictions.index(STATED)
-    np.testing.assert_allclose(found.errors["body_rate"].chance[row], 2.5706 * error, rtol=1e-4)
+    np.testing.assert_allclose(found.models[STATED].body_rate.chance, 2.5706 * error, rtol=1e-4)
     np.testing.assert_allclose(sizes[0], sizes[1])
     few = replay([played(flight_of(samples=80))], 10, 1)
-    assert few.errors["body_rate"].chance is None
+    assert few.models[MODEL].body_rate.chance is None
 
 
 def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
@@ -221,8 +210,9 @@ def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
         errors = np.concatenate([each.runs(prediction, own, 10).errors for each, own in pairs])
         for index, signal in enumerate(SIGNALS):
             own = errors[:, :, index]
-            np.testing.assert_allclose(found.errors[signal].mae[row], np.linalg.norm(own, axis=2).mean(axis=0))
-            np.testing.assert_allclose(found.errors[signal].rms[row], np.sqrt((own**2).mean(axis=0)))
+            known = found.models[prediction].signals[signal]
+            np.testing.assert_allclose(known.mae, np.linalg.norm(own, axis=2).mean(axis=0))
+            np.testing.assert_allclose(known.rms_by_axis, np.sqrt((own**2).mean(axis=0)))
         np.testing.assert_allclose(found.windows.size[row], np.linalg.norm(errors[:, :, 3], axis=2).mean(axis=1))
     assert found.windows.flight.tolist() == [0] * 17 + [1] * 12
 
@@ -232,7 +222,7 @@ def test_batches_do_not_show(monkeypatch):
     whole = replay([played(flight)], 20, 1)
     monkeypatch.setattr("cpfls_cli.playback.replay._BATCH", 140)
     parts = replay([played(flight)], 20, 1)
-    np.testing.assert_allclose(parts.errors["attitude"].mae, whole.errors["attitude"].mae, rtol=1e-12)
+    np.testing.assert_allclose(mean_errors(parts, "attitude"), mean_errors(whole, "attitude"), rtol=1e-12)
     np.testing.assert_array_equal(parts.windows.start, whole.windows.start)
 
 
@@ -250,27 +240,22 @@ def test_a_model_is_better_where_it_was_played_along_what_it_flies():
     region = where_better(all_played, replay(all_played, 10, 1))
     assert 0.3 < region.share <= 0.5
     sizes = np.linalg.norm(flown[:110], axis=1)
-    assert sizes.min() <= region.rate[0] < region.rate[1] <= sizes.max()
-    assert region.speed is not None
+    assert sizes.min() <= region.rate_rad_s[0] < region.rate_rad_s[1] <= sizes.max()
+    assert region.speed_m_s is not None
     alone = [played(replace(moving, has_velocity=False))]
-    assert where_better(alone, replay(alone, 10, 1)).speed is None
+    assert where_better(alone, replay(alone, 10, 1)).speed_m_s is None
 
 
 def test_a_signal_that_no_flight_knows_has_no_errors():
     found = replay([played(flight_of(has_velocity=False))], 10, 1)
-    assert {name: errors is None for name, errors in found.errors.items()} == {
-        "position": True,
-        "velocity": True,
-        "attitude": False,
-        "body_rate": False,
-    }
+    assert {tuple(own.signals) for own in found.models.values()} == {("body_rate", "attitude")}
 
 
 def test_a_signal_is_averaged_over_the_flights_that_know_it():
     known, alone = flight_of(seed=1), flight_of(seed=2, has_attitude=False)
     both, one = replay([played(known), played(alone)], 10, 1), replay([played(known)], 10, 1)
-    np.testing.assert_allclose(both.errors["velocity"].mae, one.errors["velocity"].mae)
-    assert not np.allclose(both.errors["body_rate"].mae, one.errors["body_rate"].mae)
+    np.testing.assert_allclose(mean_errors(both, "velocity"), mean_errors(one, "velocity"))
+    assert not np.allclose(mean_errors(both, "body_rate"), mean_errors(one, "body_rate"))
 
 
 @pytest.mark.parametrize("fuzzy", [None, Rigid()], ids=["rigid", "fuzzy"])
@@ -279,8 +264,8 @@ def test_a_run_that_diverges_is_counted_and_bounded(fuzzy):
     found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, effects=driven, fuzzy=fuzzy))], 60, 5)
     lost = (found.windows.diverged >= 0).sum(axis=1)
     assert lost.tolist() == [4, 0, 0, 0]
-    assert all(np.isfinite(errors.mae).all() for errors in found.errors.values())
-    assert found.errors["body_rate"].mae.max() < 600
+    assert all(np.isfinite(mean_errors(found, signal)).all() for signal in found.models[MODEL].signals)
+    assert mean_errors(found, "body_rate").max() < 600
 
 
 class Hollow(Rigid):
@@ -296,7 +281,7 @@ def test_a_run_stops_where_no_body_has_the_inertia():
     found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, fuzzy=Hollow()))], 40, 1)
     lost = found.windows.diverged[0]
     assert 0 < (lost >= 0).sum() < len(lost)
-    assert np.isfinite(found.errors["attitude"].mae).all()
+    assert np.isfinite(mean_errors(found, "attitude")).all()
 
 
 def test_no_window_crosses_a_pause():

@@ -33,12 +33,13 @@ def test_the_asked_margins_hold_with_every_vehicle_that_is_possible(name):
     held = [axis for axis, word in enumerate(("roll", "pitch", "yaw")) if not _clipped(proposals, word)]
     assert {0, 1} <= set(held)
     for axis in held:
-        worst = evaluation.command_worst[axis]
+        own = evaluation.axes[axis]
+        worst = own.command_worst
         # Gains have few digits.
-        assert min(worst.disk_deg, evaluation.angle_worst[axis].disk_deg) > 44.5
+        assert own.disk_deg > 44.5
         assert worst.phase_deg > 44.5
         assert worst.gain_db > 6.0
-        assert evaluation.steps[0].overshoot[axis] < 0.1
+        assert own.overshoot < 0.1
 
 
 def _clipped(proposals, axis):
@@ -52,7 +53,7 @@ def test_what_flights_leave_open_costs_gain():
     _, more = found("px4", asked=AskedMargins(6.0, 60.0, 35.0))
     _, late = found("px4", lag=0.08)
     for other in (open_, more, late):
-        assert other.bandwidth_hz[0] < 0.95 * sure.bandwidth_hz[0]
+        assert other.roll.bandwidth_hz < 0.95 * sure.roll.bandwidth_hz
 
 
 def test_one_disk_holds_all_margins_that_are_asked_for():
@@ -73,7 +74,7 @@ def test_a_line_in_the_noise_is_found_beside_its_floor():
     rng = np.random.default_rng(1)
     rate = 0.02 * rng.standard_normal((len(time), 3)) + 0.05 * np.sin(2 * np.pi * 118.0 * time)[:, None]
     noise = noise_of([(time, rate)])
-    (line,) = noise.lines()
+    (line,) = noise.lines
     assert line.hz == pytest.approx(118.0, abs=1.0)
     assert line.above_db > 10.0
     spacing = noise.frequency[1] - noise.frequency[0]

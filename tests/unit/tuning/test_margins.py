@@ -112,8 +112,8 @@ def test_the_answer_to_a_step_is_that_of_the_closed_loop(name):
 def test_what_is_unstable_has_no_margins():
     law = AUTOPILOTS["px4"].law({"MC_ROLLRATE_P": 0.5, "MC_ROLLRATE_K": 3.0})
     found = evaluate(law, hover_plant(law, CROSS, None, 0.05))
-    assert not found.command[0].stable
-    assert np.isnan(found.command[0].gain_db)
-    assert found.command[0].disk == 0.0
-    assert found.command[2].stable
+    assert not found.roll.command.stable
+    assert np.isnan(found.roll.command.gain_db)
+    assert found.roll.command.disk_deg == 0.0
+    assert found.yaw.command.stable
     assert frequencies(law)[-1] < 200.0

@@ -1,31 +1,37 @@
 """To which horizon a model is better than what knows no model."""
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cpfls_cli.artifacts.replay import (
-    HeldOutGroup,
-    SignalErrorGroup,
-    behind_both,
-    better_to,
-    like_fading,
-    lost_to,
-    rival_row,
-    trust_by_playback,
-)
 
+from cpfls_cli.playback.errors import MODEL, ByHorizon, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of, still_runs
-from cpfls_cli.playback.replay import MODEL, Played, fading, replay
-from cpfls_cli.validation.trust import GOOD, Trust
+from cpfls_cli.playback.replay import Played, fading, replay
+from cpfls_cli.validation.trust import GOOD, Trust, trust_by_playback
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 
 HORIZON = np.array([0.1, 0.2, 0.3, 0.4])
 PREDICTION = ("model", "nothing-moves", "rate-stays", "stated")
 FADES = (*PREDICTION, "rate-fades")
 NOTHING, STAYS, STATED = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 2.0, 2.0], [9.0] * 4
+
+
+def errors_of(horizon, **signals):
+    """Errors by horizon of predictions by name, those of each signal given as mean norms and perhaps their chance."""
+
+    def own(rows, name):
+        mae, chance = rows[name] if isinstance(rows[name], tuple) else (rows[name], None)
+        mae = np.broadcast_to(np.asarray(mae, dtype=float), horizon.shape)
+        return Errors(mae=mae, rms_by_axis=np.zeros((len(horizon), 3)), chance=chance)
+
+    names = next(iter(signals.values()))
+    known = {"body_rate": dict.fromkeys(names, 1.0), **signals}
+    models = {
+        name: Prediction(diverged=0, **{signal: own(rows, name) for signal, rows in known.items()}) for name in names
+    }
+    return ByHorizon(horizon_s=horizon, models=models)
 
 
 @pytest.mark.parametrize(
@@ -40,24 +46,23 @@ NOTHING, STAYS, STATED = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 2.0, 2.0], [9.0] * 4
     ],
 )
 def test_sums_up_to_a_horizon_are_compared(model, horizon):
-    group = SignalErrorGroup(mae=np.array([model, NOTHING, STAYS, STATED]), rms=np.zeros((4, 4, 3)))
-    errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group, "velocity": None}, prediction=PREDICTION)
-    assert better_to(errors, "body_rate") == horizon
-    assert np.isnan(better_to(errors, "velocity"))
+    errors = errors_of(HORIZON, body_rate=dict(zip(PREDICTION, (model, NOTHING, STAYS, STATED), strict=True)))
+    assert errors.better_to("body_rate") == horizon
+    assert np.isnan(errors.better_to("velocity"))
 
 
-def held_out(rate, attitude=None, velocity=None, chance=None):
+def held_out(rate, attitude=None, velocity=None, chance=None, names=FADES):
     """Errors from 0.02 to 0.5 s; all rivals grow from 0 to 1."""
     horizon = np.linspace(0.02, 0.5, 25)
+    within = None if chance is None else np.full(25, chance)
 
-    def group(model):
-        rows = [np.broadcast_to(model, horizon.shape), 2 * horizon, 2 * horizon, horizon, 2 * horizon]
-        within = None if chance is None else np.vstack([np.zeros(25), np.full((4, 25), chance)])
-        return SignalErrorGroup(mae=np.array(rows), rms=np.zeros((5, 25, 3)), chance=within)
+    def rows(model):
+        given = (model(horizon), 2 * horizon, 2 * horizon, horizon, 2 * horizon)
+        known = zip(names, given, strict=False)
+        return {name: (mae, within if name != MODEL or within is None else np.zeros(25)) for name, mae in known}
 
-    known = {"body_rate": rate, "attitude": attitude, "velocity": velocity, "position": None}
-    errors = {name: None if model is None else group(model(horizon)) for name, model in known.items()}
-    return SimpleNamespace(horizon_s=horizon, errors=errors, prediction=FADES)
+    known = {"body_rate": rate, "attitude": attitude, "velocity": velocity}
+    return errors_of(horizon, **{name: rows(model) for name, model in known.items() if model is not None})
 
 
 def good(horizon):
@@ -117,43 +122,31 @@ def test_a_loss_is_one_beyond_chance_and_so_is_what_is_better_than_mere_decay(ra
 
 
 def test_files_that_do_not_know_how_rates_fade_are_judged_without_it():
-    errors = held_out(decays, good)
-    before = SimpleNamespace(
-        horizon_s=errors.horizon_s,
-        prediction=PREDICTION,
-        errors={
-            name: group and SignalErrorGroup(mae=group.mae[:4], rms=group.rms[:4])
-            for name, group in errors.errors.items()
-        },
-    )
-    assert like_fading(errors) == pytest.approx(0.24)
-    assert like_fading(before) is None
+    before = held_out(decays, good, names=PREDICTION)
+    assert held_out(decays, good).like_fading() == pytest.approx(0.24)
+    assert before.like_fading() is None
     assert trust_by_playback(before) == Trust.CONTROL
 
 
 @pytest.mark.parametrize(("model", "behind"), [(0.9, ()), (1.5, ()), (2.1, ("position",))])
 def test_motion_is_behind_only_where_both_rivals_are_better(model, behind):
-    rows = np.array([4 * [model], 4 * [1.0], 4 * [2.0], STATED])
-    group = SignalErrorGroup(mae=rows, rms=np.zeros((4, 4, 3)))
-    errors = SimpleNamespace(horizon_s=HORIZON, errors={"velocity": None, "position": group}, prediction=PREDICTION)
-    assert behind_both(errors) == behind
+    rows = dict(zip(PREDICTION, (model, 1.0, 2.0, STATED), strict=True))
+    assert errors_of(HORIZON, position=rows).behind_both() == behind
 
 
 def test_a_loss_is_named_with_its_rival_and_horizons():
-    lost = lost_to(held_out(slow, good))
+    lost = held_out(slow, good).lost_to()
     assert list(lost) == ["body_rate"]
     assert lost["body_rate"] == ("nothing-moves", pytest.approx(0.04), pytest.approx(0.1))
 
 
-def test_rows_are_found_by_their_names():
+def test_predictions_are_found_by_their_names():
     """Whatever the order in which a file holds them."""
     mixed = ("with-past", "stated", "rate-stays", "model", "nothing-moves")
     rows = {"model": good(HORIZON), "nothing-moves": 3 * HORIZON, "rate-stays": 2 * HORIZON}
-    mae = np.array([rows.get(name, 9 * HORIZON) for name in mixed])
-    group = SignalErrorGroup(mae=mae, rms=np.zeros((5, 4, 3)))
-    errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group}, prediction=mixed)
-    assert rival_row(errors, group) == mixed.index("rate-stays")
-    assert better_to(errors, "body_rate") == 0.4
+    errors = errors_of(HORIZON, body_rate={name: rows.get(name, 9 * HORIZON) for name in mixed})
+    assert errors.rival("body_rate") == "rate-stays"
+    assert errors.better_to("body_rate") == 0.4
 
 
 @dataclass(frozen=True)
@@ -176,10 +169,10 @@ def test_a_model_of_mere_decay_is_not_good_whatever_else_it_beats():
 
     def judged(knows_share):
         pair = Decaying(held, player, player, knows_share=knows_share, fading_s=fading_s)
-        return HeldOutGroup.judged([pair], replay([pair], 50, 10))
+        return replay([pair], 50, 10).along([pair])
 
     found, better = judged(0.0), judged(0.5)
-    assert found.body_rate.chance is not None
-    assert like_fading(found) == pytest.approx(0.25)
-    assert like_fading(better) is None
+    assert found.model.body_rate.chance is not None
+    assert found.like_fading() == pytest.approx(0.25)
+    assert better.like_fading() is None
     assert (trust_by_playback(found) in GOOD, trust_by_playback(better) in GOOD) == (False, True)

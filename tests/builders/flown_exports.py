@@ -1,0 +1,284 @@
+"""How exported vehicles are flown in their targets, from the text of the file and a course to states.
+
+Targets that nobody can install are flown by their published equations.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import runge_kutta_step
+from cpfls_cli.export.course import Course, fly_body
+from cpfls_cli.export.simulators.ardupilot import STEP_S, fly_ardupilot
+from cpfls_cli.export.simulators.sdf import ENTRIES, SHORTEST_S, apart
+from cpfls_cli.export.simulators.urdf import fly_urdf
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.rotors import RotorResponse
+
+_ARRAYS = "SCIPY_ARRAY_API"
+_RPM = 30 / np.pi
+_INTEGRATOR = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
+
+
+def fly_mjcf(text: str, course: Course) -> State:
+    """Fly an exported vehicle in MuJoCo."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.timestep = course.period
+    data = mujoco.MjData(model)
+    rotor, power = (model.numeric(f"ctrl_{name}").data.astype(int) for name in ("rotor", "power"))
+    response = RotorResponse(lag_s=float(model.numeric("rotor_lag_s").data[0]))
+    before = np.stack([course.lagged(response, k) for k in (1, 2)])[np.maximum(power, 1) - 1, :, rotor].T
+    start, commands = course.start, course.commands
+    states = _room(len(commands), course.horizon)
+    for run, command in enumerate(commands):
+        mujoco.mj_resetData(model, data)
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, start.rotation[run].ravel())
+        data.qpos[:] = *start.position[run], *quaternion
+        data.qvel[:] = *start.velocity[run], *start.rate[run]
+        data.act[:] = before[run, power > 0] if model.na else []
+        controls = command[:, rotor] ** power
+        for step, control in enumerate(controls, 1):
+            data.ctrl[:] = control
+            mujoco.mj_step(model, data)
+            if step % course.finer == 0:
+                at = run, step // course.finer - 1
+                states.position[at], states.velocity[at], states.rate[at] = data.qpos[:3], data.qvel[:3], data.qvel[3:]
+                mujoco.mju_quat2Mat(turned := np.empty(9), data.qpos[3:7])
+                states.rotation[at] = turned.reshape(3, 3)
+    return states
+
+
+def _room(runs: int, horizon: int) -> State:
+    vector = runs, horizon, 3
+    return State(np.empty(vector), np.empty(vector), np.empty((*vector, 3)), np.empty(vector))
+
+
+def fly_sdf(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the published equations of the plugin."""
+    model = ElementTree.fromstring(text).find("model")
+    assert model is not None
+    mass, inertia, hubs = _whole_body(model)
+    motors = [{child.tag: child.text or "" for child in plugin} for plugin in model.iter("plugin")]
+
+    def column(name: str) -> Array:
+        return np.array([float(motor[name]) for motor in motors])
+
+    thrust, drag, rolling = (
+        column(name) for name in ("motorConstant", "rotorDragCoefficient", "rollingMomentCoefficient")
+    )
+    yaw = -np.array([1.0 if motor["turningDirection"] == "ccw" else -1.0 for motor in motors]) * column(
+        "momentConstant"
+    )
+    lag = float(column("timeConstantUp")[0])
+
+    def wrench(speed: Array, air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
+        across = (air[:, None] + rotations.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
+        up = [0.0, 0.0, 1.0]
+        force = -drag[:, None] * across + (thrust * speed**2)[..., None] * up
+        torque = rotations.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * up
+        return torque.sum(axis=1), force.sum(axis=1)
+
+    # Without a lag the filter is at the command at once.
+    return fly_body(course, mass, inertia, wrench, 0.0 if lag <= SHORTEST_S else lag)
+
+
+def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:
+    """Read mass, inertia about the centre of mass and places of the rotors from links."""
+    masses, centres, own, hubs = [], [], [], []
+    for link in model.iter("link"):
+        place = np.array([float(word) for word in link.findtext("pose", "").split()[:3]])
+        inner = np.array([float(word) for word in link.findtext("inertial/pose", "").split()[:3]])
+        masses.append(float(link.findtext("inertial/mass", "")))
+        centres.append(place + inner)
+        own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in ENTRIES]))
+        if link.get("name") != "base_link":
+            hubs.append(place)
+    mass = float(sum(masses))
+    centre = np.average(centres, axis=0, weights=masses)
+    parts = zip(masses, centres, own, strict=True)
+    inertia = sum(tensor + weight * apart(place - centre) for weight, place, tensor in parts)
+    return mass, np.asarray(inertia), np.array(hubs) - centre
+
+
+def fly_crazyflow(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the function of drone-models, by Runge-Kutta of order 4."""
+    from scipy.spatial.transform import Rotation
+
+    dynamics = _dynamics()
+    (section,) = tomllib.loads(text).values()
+    unused = {"thrust_min", "thrust_max"}
+    given = {name: np.asarray(value) for name, value in section.items() if name not in unused}
+    given |= {"J_inv": np.linalg.inv(given["J"])}
+    rate = given["rotor_dyn_coef"][0]
+    before = course.lagged(RotorResponse(lag_s=1.0 / rate if rate else 0.0))
+    start, runs = course.start, len(course.starts)
+    now = np.hstack([*(part.reshape(runs, -1) for part in start), _RPM * before])
+
+    def parts(state: Array) -> list[Array]:
+        position, velocity, rotation, turning, speed = np.split(state, [3, 6, 15, 18], axis=-1)
+        return [position, velocity, _turned(rotation.reshape(*rotation.shape[:-1], 3, 3)), turning, speed]
+
+    def slope(state: Array, command: Array) -> Array:
+        position, velocity, rotation, turning, speed = parts(state)
+        quaternion, speed = Rotation.from_matrix(rotation).as_quat(), speed if rate else command
+        moved, _, faster, spun, wound = dynamics(position, quaternion, velocity, turning, command, speed, **given)
+        turned = state[:, 6:15].reshape(runs, 3, 3) @ rotations.cross(np.eye(3), turning[:, None])
+        return np.hstack([moved, faster, turned.reshape(runs, 9), spun, wound if rate else 0 * speed])
+
+    rows = []
+    for index, command in enumerate(_RPM * course.commands.swapaxes(0, 1), 1):
+        now = runge_kutta_step(slope, now, (command, command, command), course.period)
+        now[:, 6:15] = parts(now)[2].reshape(runs, 9)
+        if index % course.finer == 0:
+            rows.append(now)
+    return State(*parts(np.stack(rows, axis=1))[:4])
+
+
+def _dynamics() -> Any:
+    """Load the function, which refuses a SciPy that was loaded for NumPy alone; it gets nothing else here."""
+    before = os.environ.get(_ARRAYS)
+    os.environ[_ARRAYS] = "1"
+    try:
+        from drone_models.first_principles import dynamics
+    finally:
+        os.environ.pop(_ARRAYS)
+        os.environ.update({_ARRAYS: before} if before else {})
+    return dynamics
+
+
+def _turned(matrix: Array) -> Array:
+    """Give the nearest rotations to matrices, shape (run, 3, 3)."""
+    first, _, last = np.linalg.svd(matrix)
+    return np.asarray(first @ last)
+
+
+def fly_rotorpy(text: str, course: Course) -> State:
+    """Fly an exported vehicle in RotorPy."""
+    from rotorpy.vehicles.multirotor import Multirotor
+    from scipy.spatial.transform import Rotation
+
+    module = executed(text)
+    parameters = module["quad_params"]
+    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=dict(_INTEGRATOR))
+    lags, start = module["ROTORS_LAG"], course.start
+    before = course.lagged(RotorResponse(lag_s=parameters["tau_m"]))
+    rows = []
+    for run, commands in enumerate(course.commands):
+        now = flown.initial_state | {
+            "x": start.position[run],
+            "v": start.velocity[run],
+            "q": Rotation.from_matrix(start.rotation[run]).as_quat(),
+            "w": start.rate[run],
+            "rotor_speeds": before[run],
+        }
+        for step, speed in enumerate(commands, 1):
+            now["rotor_speeds"] = now["rotor_speeds"] if lags else speed
+            now = flown.step(now, {"cmd_motor_speeds": speed}, course.period)
+            if step % course.finer == 0:
+                rows.append([now["x"], now["v"], Rotation.from_quat(now["q"]).as_matrix(), now["w"]])
+    shape = len(course.starts), course.horizon
+    return State(*(np.array(part).reshape(*shape, *part[0].shape) for part in zip(*rows, strict=True)))
+
+
+def fly_casadi(text: str, course: Course) -> State:
+    """Fly an exported vehicle in CasADi."""
+    module, flight = executed(text), course.flight
+    period = flight.motion.period
+    made = module["functions"](period, flight.hold == "previous")
+    parameters = np.array(module["PARAMETERS"])
+    terms = []
+    for speed in (flight.speed[part] for part in flight.stretches):
+        memory = module["rotors_begin"](module["casadi"].DM(speed[0]), period)
+        for now, following in zip(speed, [*speed[1:], speed[-1]], strict=True):
+            memory, row = made["rotors"](memory, now, following, parameters)
+            terms.append(np.array(row).ravel())
+    step = made["step"].map(len(course.starts))
+    columns = [np.repeat(parameters[:, None], len(course.starts), axis=1)]
+    return _run(course, np.array(terms), lambda state, rotor: np.array(step(state.T, rotor.T, *columns)).T)
+
+
+def fly_jax(text: str, course: Course) -> State:
+    """Fly an exported vehicle in JAX."""
+    import jax
+
+    with jax.enable_x64(True):
+        module, flight = executed(text), course.flight
+        period, held = flight.motion.period, flight.hold == "previous"
+
+        def along(memory: Any, pair: Any) -> Any:
+            return module["rotors_step"](memory, *pair, period, held)
+
+        parts = []
+        for speed in (flight.speed[part] for part in flight.stretches):
+            following = np.concatenate([speed[1:], speed[-1:]])
+            begun = module["rotors_begin"](jax.numpy.array(speed[0]), period)
+            parts.append(np.array(jax.lax.scan(along, begun, (speed, following))[1]))
+        step = jax.jit(jax.vmap(lambda state, rotor: module["step"](state, rotor, period)))
+        return _run(course, np.concatenate(parts), lambda state, rotor: np.array(step(state, rotor)))
+
+
+def _run(course: Course, terms: Array, step: Callable[[Array, Array], Array]) -> State:
+    """Take all runs through all steps, with states as rows of 18."""
+    start = course.start
+    state = np.hstack([part.reshape(len(course.starts), -1) for part in start])
+    path = np.empty((course.horizon, *state.shape))
+    for k in range(course.horizon):
+        state = path[k] = step(state, terms[course.starts + k])
+    path = path.swapaxes(0, 1)
+    rotation = path[:, :, 6:15].reshape(*path.shape[:2], 3, 3)
+    return State(path[:, :, :3], path[:, :, 3:6], rotation, path[:, :, 15:])
+
+
+def executed(text: str) -> dict[str, Any]:
+    """Run exported Python, and give what it names."""
+    module: dict[str, Any] = {"__name__": "exported"}
+    exec(compile(text, "exported", "exec"), module)
+    return module
+
+
+class Flying(NamedTuple):
+    """How a target is flown.
+
+    Attributes
+    ----------
+    fly : callable
+        States at the samples behind each start, shape (run, horizon, ...).
+    package : str
+        That flies it; empty where this program does.
+    step_s : float
+        Longest step that it is flown with; infinite where it takes the flight's own.
+    levels : int
+        Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
+        takes the very steps of a playback.
+    """
+
+    fly: Callable[[str, Course], State]
+    package: str = ""
+    step_s: float = np.inf
+    levels: int = 4
+
+
+FLYING = {
+    "mjcf": Flying(fly_mjcf, "mujoco", 1e-3),
+    "sdf": Flying(fly_sdf, step_s=1e-3),
+    "px4": Flying(fly_sdf, step_s=1e-3),
+    "crazyflow": Flying(fly_crazyflow, "drone_models", 2.5e-3),
+    "urdf": Flying(fly_urdf, step_s=1e-3),
+    "ardupilot": Flying(fly_ardupilot, step_s=STEP_S),
+    "rotorpy": Flying(fly_rotorpy, "rotorpy"),
+    "casadi": Flying(fly_casadi, "casadi", levels=0),
+    "jax": Flying(fly_jax, "jax", levels=0),
+}
+"""By the word of ``--format``."""
