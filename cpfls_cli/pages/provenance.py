@@ -108,5 +108,5 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
 
 def _word(wanted: Any) -> str:
     kind = getattr(wanted.FORMAT, "kind", "")
-    name = getattr(wanted.FORMAT, "name", wanted.FORMAT)
-    return str(name).removeprefix("cpfls/") if kind in ("", "identified") else str(kind)
+    name = str(getattr(wanted.FORMAT, "name", wanted.FORMAT)).removeprefix("cpfls/")
+    return "model" if wanted is IdentifiedModel else str(kind or name)
