@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
-from cpfls_cli.artifacts.job import check_outputs, header_of
+from cpfls_cli.artifacts.job import Job, check_outputs, header_of
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
 from cpfls_cli.search.checkpoint import KeptFile, differences, keys_of
-
-if TYPE_CHECKING:
-    from cpfls_cli.stage import Run
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
 """Sections of the config that the search depends on."""
@@ -61,16 +58,15 @@ def kept_of(record: VehicleCheckpointRecord) -> Kept:
 
 
 def begin_vehicle_search(
-    run: Run, inputs: Mapping[str, Path], *, resume: bool
+    job: Job, files: Mapping[str, InputFile], *, resume: bool
 ) -> tuple[VehicleCheckpoint, Kept | None]:
-    """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
+    """Check checkpoint and output of a search for the structure of a vehicle before anything is computed.
 
     The solutions that are kept tell where to go on; None to start.
     """
-    files = run.take(inputs)
-    checkpoint = VehicleCheckpoint.beside(run.output, header_of(run.study, files))
+    checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
     kept = checkpoint.read() if resume else None
     if kept is None:
-        checkpoint.require_permission(force=run.force)
-    check_outputs(run, run.output, replaceable=resume and checkpoint.output_may_be_replaced())
+        checkpoint.require_permission(force=job.force)
+    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
     return checkpoint, kept

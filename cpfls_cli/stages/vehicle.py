@@ -285,7 +285,7 @@ def vehicle(
     """Find a vehicle in flights, and judge it on those held out."""
     others = held_out or []
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
-    checkpoint, kept = begin_vehicle_search(run, learned | unseen, resume=resume)
+    checkpoint, kept = begin_vehicle_search(run, run.take(learned | unseen), resume=resume)
     refuse_seen(*([run.files[role] for role in roles] for roles in (learned, unseen)))
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:

@@ -27,7 +27,10 @@ def with_parts(given, values):
         else:
             given = changed(given, path, value)
     kinds = {own.name: own.inner for own in described_fields(type(given)) if own.about is None}
-    made = {name: None if any(each is None for each in part.values()) else kinds[name](**part) for name, part in by_part.items()}
+    made = {
+        name: None if any(each is None for each in part.values()) else kinds[name](**part)
+        for name, part in by_part.items()
+    }
     return replace(given, **made)
 
 

@@ -125,7 +125,7 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
     for name, own, words, missing in (
         ("loop", replace(vehicle, loop=loop), "the flights show the loop", "cpfls trajectory"),
         ("playback", vehicle, "not judged", "one that is kept aside"),
-        ("wide", replace(found_vehicle(), numbers=wide), "not determined: ", "cpfls trajectory"),
+        ("wide", replace(found_vehicle(), numbers=wide), "not identified: ", "cpfls trajectory"),
     ):
         path = tmp_path / f"{name}.h5"
         write_vehicle(path, own, STUDY)

@@ -10,10 +10,10 @@ import pytest
 from cpfls_cli import store
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.prediction import AlongFlight
@@ -414,7 +414,7 @@ def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
 def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     cpfls, refuse, config, written, noisy, vehicle, tmp_path
 ):
-    history = ObserverGroup(past=0.5, rate=np.full(6, 20.0), memory=np.full(6, 0.2))
+    history = Observer(past_s=0.5, rate=np.full(6, 20.0), memory_s=np.full(6, 0.2))
     model, told = written("remembers.h5", history=history), []
     for options in ((), ("--history", "0.5")):
         output = tmp_path / f"{len(told)}.h5"
