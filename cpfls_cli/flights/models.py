@@ -24,8 +24,10 @@ from cpfls_cli.playback.settings import VEHICLE
 
 def identified_in(path: Path) -> IdentifiedModel:
     """Read an identified model."""
-    with about(path, SettingError):
+    try:
         made = store.read(path, IdentifiedModel)[0]
+    except SettingError as error:
+        raise InputError(f"{path}: model/fuzzy/structure: {error}") from None
     require_whole(path, made.functions)
     return made
 

@@ -7,7 +7,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.identification.identify import TRAINING, Identification
+from cpfls_cli.identification.identify import TRAINING as TRAINING
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.result import about, result
 
 AXES = ("roll", "pitch", "yaw")
@@ -21,7 +22,7 @@ Winner = Literal["model", "rigid-body", "tie"]
 # A mean squared error that is smaller by less than a hundredth, or beside that of no torque at all, decides nothing.
 _TIE, _ROUNDING = 0.01, 1e-12
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
-_EULER = {"frame": "Euler angles (intrinsic ZYX)", "brief": False}
+_EULER = "Euler angles (intrinsic ZYX)"
 
 
 @result
@@ -32,19 +33,26 @@ class Judged:
     parts: tuple[str, ...] = about("training, held-out rest, other flights", "part")
     samples: IntArray = about("samples judged", "part")
     outside: IntArray = about("of them outside the attitudes that training visited", "part")
-    mse: Array = about("mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", **_EULER)
-    max_error: Array = about("largest torque error", "judged_model", "part", "axis", unit="N m", **_EULER)
-    relative_error: Array = about(
-        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, **_EULER
+    mse: Array = about(
+        "mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", frame=_EULER, brief=False
     )
-    r2: Array = about("share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, **_EULER)
+    max_error: Array = about(
+        "largest torque error", "judged_model", "part", "axis", unit="N m", frame=_EULER, brief=False
+    )
+    relative_error: Array = about(
+        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+    )
+    r2: Array = about(
+        "share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+    )
     vaf: Array = about(
         "the same without the mean of the error: variance accounted for",
         "judged_model",
         "part",
         "axis",
         gaps=True,
-        **_EULER,
+        frame=_EULER,
+        brief=False,
     )
     r2_body: Array = about(
         "the same for body torque, not near a pitch of +-90 deg",
