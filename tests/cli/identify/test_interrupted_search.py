@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.search.resumable import Watch
+from cpfls_cli.store import read
 
 NOTE = "cpfls: note: "
 
@@ -42,8 +42,7 @@ def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
     assert result.stderr.splitlines()[-1] == (
         f"{NOTE}{output}: is incomplete, because the search was interrupted; the same command with --resume goes on"
     )
-    assert check_artifact(read_artifact(output)) == []
-    assert stored(output, "stop_reason") == b"interrupted"
+    assert read(output, IdentifiedModel)[0].stopped == "interrupted"
     monkeypatch.undo()
     result = cpfls(*words, "-o", output, "--resume")
     assert result.exit_code == 0, result.stderr
