@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -248,6 +248,8 @@ class Stage:
         Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
     overrides : callable or None
         Gives overrides of the config that its options stand for.
+    together : callable
+        Gives the sources of a report that show its results: several may be shown as one.
     """
 
     function: Callable[..., Any]
@@ -262,6 +264,7 @@ class Stage:
     several: bool
     resumes: bool
     overrides: Callable[..., list[str]] | None
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -500,6 +503,7 @@ def stage(
     several: bool = False,
     resumes: bool = False,
     overrides: Callable[..., list[str]] | None = None,
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
@@ -515,6 +519,7 @@ def stage(
         several,
         resumes,
         overrides,
+        together,
     )
 
 

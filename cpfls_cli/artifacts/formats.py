@@ -12,9 +12,7 @@ from typing import Any
 from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
-    ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
-    ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     # Reading a record waits for no numerics; `artifacts/rebuilt.py` makes a model of it again.
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.playback.model import ModelEffect, VehicleModel
-    from cpfls_cli.regressor.structure import ModelStructure
 
 USUAL = "usual"
 """What a command is between samples, where the model does not say: as a flight is usually taken."""
@@ -223,18 +222,11 @@ class InertiaFunctionsGroup:
             partition=tuple(names),
             breakpoints=np.concatenate(model.partitions),
             coefficients=model.coefficients,
-            parameter=tuple(_parameter_names(structure)),
+            parameter=tuple(structure.parameter_names),
             rigid_body=model.rigid_body,
             input_range=np.array([[r.minimum, r.maximum] for r in model.ranges]),
             visited=model.visited,
         )
-
-
-def _parameter_names(structure: ModelStructure) -> Iterator[str]:
-    for block in structure.blocks:
-        for rule in range(block.rules):
-            for feature in range(block.features):
-                yield f"{block.function.name} rule {rule + 1} c{feature}"
 
 
 @record

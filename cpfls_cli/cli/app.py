@@ -12,7 +12,6 @@ import typer
 
 from cpfls_cli.arguments import (
     ArtifactsArgument,
-    ChooseOnOption,
     DiagnosisArgument,
     ExportAnywayOption,
     ExportedArgument,
@@ -20,14 +19,6 @@ from cpfls_cli.arguments import (
     FileArgument,
     LogsArgument,
     ModelOption,
-    ResumeOption,
-    ResumeSweepOption,
-    SchedulerOption,
-    SweepTimeLimitOption,
-    TimeLimitOption,
-    TrainingArgument,
-    ValidateOption,
-    WorkersOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -134,58 +125,6 @@ def init(
         return command.run(job, logs, stated)
 
     _run_without_config("init", output, common, call)
-
-
-@_command()
-def identify(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    selection: Annotated[
-        Path | None,
-        typer.Option(
-            "--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."
-        ),
-    ] = None,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeOption = False,
-    time_limit: TimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify a model from one or more flights and judge it beside its baselines."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, selection, validate or [], options, choose_on or [])
-
-    _run("identify", config, output, common, call)
-
-
-@_command()
-def sweep(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeSweepOption = False,
-    time_limit: SweepTimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify with several settings, and with several seeds each."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, validate or [], options, choose_on or [])
-
-    _run("sweep", config, output, common, call)
 
 
 @_command()
@@ -337,7 +276,7 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     """Load the study, run one command, given as its module, with a progress bar, and print what it says."""
     with messages_for_errors():
         narration = _narration(title, common)
-        study = common.study(config, sweep=title == "sweep")
+        study = common.study(config)
         narration.reads(config)
 
         def with_numbers(command: Any, job: Job) -> Outcome:

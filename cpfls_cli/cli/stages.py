@@ -131,7 +131,7 @@ def run_of(
     from cpfls_cli.config.load import validate
     from cpfls_cli.stage import Run
 
-    study = common.study(config) if config else validate({}, "default")
+    study = common.study(config, sweep=own.name == "sweep") if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
     if config:

@@ -24,7 +24,6 @@ _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
-    "cpfls/sweep": "sweep",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 

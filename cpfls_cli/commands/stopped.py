@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.errors import ComputationError, CpflsError, StoppedError
 from cpfls_cli.identification.search import StopReason, is_end
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}
 _REMEDY = "the same command with --resume goes on"
 _FROM_SIGNAL = 128
-
-
-def stopped(
-    outcome: Outcome, reason: StopReason, signal: int | None, output: Path, *, unjudged: str | None = None
-) -> Outcome:
-    """Add to what is said of a result what `stop_note` says, and its exit code."""
-    note, code = stop_note(reason, signal, output, unjudged=unjudged)
-    return outcome if note is None else replace(outcome, blocks=(*outcome.blocks, note), exit_code=code)
 
 
 def stop_note(

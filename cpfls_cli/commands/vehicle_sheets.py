@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.spec import Header, InputFile, rows_of
 from cpfls_cli.artifacts.store import read_header
@@ -62,20 +62,20 @@ def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin | Header) -
         "",
         verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
         stopped=record.stopped or None,
-        cautions=() if isinstance(record, IdentifiedRecord) else (*origin.cautions, *against(record)),
-        evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
+        cautions=() if isinstance(record, IdentifiedModel) else (*origin.cautions, *against(record)),
+        evidence=identified_evidence(record) if isinstance(record, IdentifiedModel) else {},
         impossible=impossible_in_words(record),
     )
 
 
 def _require_usable(functions: InertiaFunctions, path: Path) -> None:
     """Refuse what no other program could evaluate."""
-    where = f"{path}: vehicle/inertia_functions"
+    where = f"{path}: model/fuzzy"
     if functions.visited.shape != (CELLS, CELLS):
         raise InputError(f"{where}/visited: is {functions.visited.shape}, not {(CELLS, CELLS)}; identify it again")
     for partition, peaks in zip(functions.structure.partitions, functions.partitions, strict=True):
         if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
-            raise InputError(f"{where}/breakpoints: those of {partition.name} make no partition; identify it again")
+            raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
 
 
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:
@@ -85,8 +85,8 @@ def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:
     held = tuple(each for each in model.effects if each.name not in beside)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)
-    if isinstance(record, IdentifiedRecord):
-        return replace(sheet, warnings=tuple(identified_warnings(record, path)))
+    if isinstance(record, IdentifiedModel):
+        return replace(sheet, warnings=tuple(identified_warnings(record, origin.config, path)))
     outside = tuple(_missing(record, (*model.filters, *model.along)))
     floor = tuple(record.gap.floor.tolist()) if isinstance(record, ExtendedRecord) else sheet.floor
     return replace(sheet, outside=outside, wind=model.wind, floor=floor)

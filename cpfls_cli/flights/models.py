@@ -8,22 +8,34 @@ from pathlib import Path
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel, require_whole
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import AnyModel, ModelRecord
-from cpfls_cli.artifacts.store import format_name, holds, read_record
+from cpfls_cli.artifacts.store import format_name, read_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
-from cpfls_cli.errors import InputError, about
+from cpfls_cli.errors import InputError, SettingError, about
 from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
 
+
+def identified_in(path: Path) -> IdentifiedModel:
+    """Read an identified model."""
+    try:
+        made = store.read(path, IdentifiedModel)[0]
+    except SettingError as error:
+        raise InputError(f"{path}: model/fuzzy/structure: {error}") from None
+    require_whole(path, made.functions)
+    return made
+
+
 _READ: Mapping[str, Callable[[Path], AnyModel]] = {
     ModelRecord.FORMAT.name: lambda path: read_record(path, ModelRecord),
     Vehicle.FORMAT: lambda path: store.read(path, Vehicle)[0],
+    IdentifiedModel.FORMAT: identified_in,
 }
 """What reads a model, by the format of its file."""
 MAKERS = "`cpfls identify`, `cpfls extend`, `cpfls gap` or `cpfls vehicle`"
@@ -41,7 +53,7 @@ def is_found(path: Path) -> bool:
 
 def is_identified(path: Path) -> bool:
     """Tell whether a file is an identified model."""
-    return path.is_file() and holds(path, IdentifiedRecord)
+    return path.is_file() and format_name(path) == IdentifiedModel.FORMAT
 
 
 def any_model(path: Path) -> AnyModel:
@@ -123,9 +135,9 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
         return rigid
     if is_found(path):
         return read_model(path, study)
-    record = read_record(path, IdentifiedRecord)
+    record = identified_in(path)
     require_vehicle_of(path, study)
-    return replace(rigid, fuzzy=modelled(path, record).fuzzy)
+    return replace(rigid, fuzzy=record.functions)
 
 
 def modelled(path: Path, record: AnyModel) -> VehicleModel:

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.parameters import FOUND_AS, name_of
 from cpfls_cli.artifacts.vehicle_model import Vehicle
@@ -16,34 +16,26 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
-from cpfls_cli.report.content import Block, Box, Heading, Text, impossible, in_short
+from cpfls_cli.report.content import Block, Box, Heading, Text, impossible
 from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.words import joined
 
 
 class _Kind(NamedTuple):
-    """How the page of a model that is no result yet goes on: what it is, what its trust rests on, what was found.
+    """Words on a model that was not found as a whole vehicle: what it is, what its trust rests on.
 
     Attributes
     ----------
     title, grounds : callable
         Of a record: what the model is, and the sentences behind the word of trust.
-    details : callable
-        Of a source: what stands below the box.
     worth, cautions : callable
         Of a record: what it is worth that is used elsewhere, and what speaks against that.
     """
 
     title: Callable[[Any], str]
     grounds: Callable[[Any], Iterator[str]]
-    details: Callable[[Source[Any]], Iterator[Block]]
     worth: Callable[[Any], Iterator[str]]
     cautions: Callable[[Any], Iterator[str]]
-
-
-_PAGES = {"identified": "identification", "extended": "extended"}
-"""Modules of `pages` by the kind of a model; one is loaded when a model of its kind is met."""
-_REASONS = 3
 
 
 def _effect_name(name: str) -> str:
@@ -66,17 +58,14 @@ WORDS: Mapping[str, Any] = {
 
 
 def _kind_of(record: Any) -> _Kind:
-    own = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
-    return _Kind(own.title, own.grounds, own.details, own.worth, own.cautions)
+    own = import_module(f"cpfls_cli.pages.{'identification' if isinstance(record, IdentifiedModel) else 'extended'}")
+    return _Kind(own.title, own.grounds, own.worth, own.cautions)
 
 
 def answer(model: Source[Any]) -> Iterator[Block]:
-    """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
-    box = trust_box(model)
-    # The reasons of a verdict are many.
-    judged = isinstance(model.record, IdentifiedRecord) and model.record.validated
-    yield from in_short(box, _REASONS, "every reason of the verdict") if judged else [box]
-    yield from _kind_of(model.record).details(model)
+    """Say of a model that is no result yet how far to trust it and why, and what was found."""
+    yield trust_box(model)
+    yield from import_module("cpfls_cli.pages.extended").details(model)
 
 
 def trust_box(model: Source[Any]) -> Box:

@@ -17,7 +17,6 @@ from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_sect
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
@@ -57,7 +56,8 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
-        return [stage_named(name).section(source, number) for number, source in enumerate(own, start=1)]
+        shown = stage_named(name).together(own) if own else ()
+        return [stage_named(name).section(source, number) for number, source in enumerate(shown, start=1)]
 
     return sections
 
@@ -89,7 +89,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
         holds=lambda record: record.uncertainty or record.curves,
     ),
     _of_each("steps", "Prediction by horizon", _MODELS, steps_blocks, holds=attrgetter("steps")),
-    _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
+    _of_stage("sweep"),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_stage("predict"),

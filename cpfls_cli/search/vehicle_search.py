@@ -10,12 +10,11 @@ import numpy as np
 
 from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
 from cpfls_cli.artifacts.job import Job, check_outputs, header_of
-from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import format_name, write_record
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
-from cpfls_cli.search.checkpoint import KeptFile, Written, differences, keys_of
-from cpfls_cli.store import read
+from cpfls_cli.search.checkpoint import KeptFile, differences, keys_of
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
 """Sections of the config that the search depends on."""
@@ -27,14 +26,7 @@ class VehicleCheckpoint(KeptFile):
 
     WORK: ClassVar = "search"
     SUFFIX: ClassVar = ".checkpoint"
-
-    def _written(self) -> Written | None:
-        """Read the output; None where there is none, or another file."""
-        if not self.output.is_file() or format_name(self.output) != Vehicle.FORMAT:
-            return None
-        written, origin = read(self.output, Vehicle)
-        seed = 0 if origin.seed is None else origin.seed
-        return Written(written.complete, Header(origin.version, seed, origin.config, origin.inputs, origin.cautions))
+    OUTPUT: ClassVar = Vehicle
 
     def write(self, judged: Sequence[Judged]) -> None:
         """Replace what was there by these structures, or leave it as it was."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
@@ -57,7 +57,7 @@ def test_an_effect_that_nobody_knows_is_refused(tmp_path):
         modelled(tmp_path / "v.h5", vehicle_of(unknown))
 
 
-@pytest.mark.parametrize("kind", [IdentifiedRecord, Vehicle])
+@pytest.mark.parametrize("kind", [IdentifiedModel, Vehicle])
 def test_every_model_answers_the_same_questions(kind):
     assert issubclass(kind, AnyModel)
 
