@@ -35,7 +35,8 @@ def formats() -> list[Stage]:
     """List the stages whose results have a format of their own; what fills a folder with those of others has none."""
     files = sorted((Path(__file__).parents[1] / "stages").glob("*.py"))
     stages = [loaded(file.stem) for file in files if "@stage(" in file.read_text(encoding="utf-8")]
-    return sorted((own for own in stages if hasattr(own.kind, "FORMAT")), key=short)
+    # Several stages may make one format.
+    return sorted({own.kind.FORMAT: own for own in stages if hasattr(own.kind, "FORMAT")}.values(), key=short)
 
 
 def rows(own: Stage) -> list[list[str]]:
@@ -54,8 +55,9 @@ def rows(own: Stage) -> list[list[str]]:
 
 
 def origin(own: Stage) -> str:
-    """Say which command writes a format."""
-    return f"Made by `cpfls {_maker(own)}`: {description(own)}."
+    """Say which commands write a format."""
+    makers = " or ".join(f"`cpfls {each}`" for each in _makers(own))
+    return f"Made by {makers}: {description(own)}."
 
 
 def short(own: Stage) -> str:
@@ -69,12 +71,12 @@ def description(own: Stage) -> str:
     return first[0].lower() + first[1:]
 
 
-def _maker(own: Stage) -> str:
-    return str(getattr(own.kind, "MADE_BY", own.name))
+def _makers(own: Stage) -> list[str]:
+    return str(getattr(own.kind, "MADE_BY", own.name)).split(" or ")
 
 
 def _head(own: Stage) -> dict[str, Any]:
-    return {"format": own.kind.FORMAT, "description": description(own), "commands": [_maker(own)]}
+    return {"format": own.kind.FORMAT, "description": description(own), "commands": _makers(own)}
 
 
 def _entries(own: Stage) -> list[tuple[str, dict[str, Any]]]:
