@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -27,8 +28,7 @@ from cpfls_cli.artifacts.output import (
     write_files,
     write_text,
 )
-from cpfls_cli.artifacts.spec import Header, InputFile, Record
-from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
@@ -127,6 +127,12 @@ class Run(Job):
         Other files that are written with the result.
     said : list of Text
         Of this run alone: its file says none of it again.
+    until_written : ExitStack
+        Contexts that last until the result is written, or it is sure that it will not be.
+    afterwards : list of callable
+        What is done when the result is written.
+    data : callable
+        Gives the config as plain data, with what the command line changes of it.
     """
 
     writes: bool = True
@@ -139,6 +145,9 @@ class Run(Job):
     last_words: str = ""
     texts: dict[Path, str] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
+    until_written: ExitStack = field(default_factory=ExitStack)
+    afterwards: list[Callable[[], object]] = field(default_factory=list)
+    data: Callable[[], dict[str, Any]] = dict
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -195,6 +204,18 @@ class Run(Job):
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
 
+def _would(run: Run, stage: Stage) -> Outcome:
+    """Say of a dry run that it could go on."""
+    where = f"{run.output}: would be {'filled' if stage.folder or stage.fills else 'written'}; "
+    named = {"output": str(run.output)} if run.writes else {}
+    config = "the config and " if run.with_config else ""
+    cautions = run.cautions_of(*(stage.fills.parts if stage.fills else ()))
+    return Outcome(
+        {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
+        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *caution_texts(cautions)),
+    )
+
+
 @dataclass(frozen=True)
 class Stage:
     """A function with everything that makes it a command.
@@ -222,8 +243,12 @@ class Stage:
         Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
+    resumes : bool
+        Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
     overrides : callable or None
         Gives overrides of the config that its options stand for.
+    together : callable
+        Gives the sources of a report that show its results: several may be shown as one.
     """
 
     function: Callable[..., Any]
@@ -236,7 +261,9 @@ class Stage:
     study: bool | Callable[[Mapping[str, Any]], bool]
     output: Any
     several: bool
+    resumes: bool
     overrides: Callable[..., list[str]] | None
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -274,14 +301,14 @@ class Stage:
         """Give the verdict on a result, where its template begins with one, for the summary of a report."""
         return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
 
-    def section(self, about: Source, number: int) -> Section:
+    def section(self, about: Source, number: int, *, drawn: bool = True) -> Section:
         """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
 
-        That stands in the summary.
+        That is in the summary. Figures are left out where another section has them.
         """
         pictures = {
             name: picture
-            for name, draw in self.figures.items()
+            for name, draw in (self.figures.items() if drawn else ())
             if (picture := picture_of(draw, f"{self.name}-{number}-{name}", about.record)) is not None
         }
         anchor = self.name if number == 1 else f"{self.name}-{number}"
@@ -291,36 +318,31 @@ class Stage:
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
-        if run.writes:
+        if run.writes and not self.resumes:
             self._check(run, run.output)
-        found = self.function(run, **given)
-        if found is None:
-            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
-            where = where if run.writes else ""
-            named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if run.with_config else ""
-            cautions = run.cautions_of(*(self.fills.parts if self.fills else ()))
-            return Outcome(
-                {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
-                (Text(f"{where}{config}all inputs are good"), *caution_texts(cautions)),
-            )
-        if isinstance(found, Outcome):
-            return found
-        streamed = isinstance(found, Parts)
-        if isinstance(found, Parts):
-            # What there is to say is known behind the last part.
-            store.write_parts(run.output, found, found.rows, run.origin(self.name))
-            found = found.last
-        results = dict(found) if self.folder else {"": found}
-        if self.fills and run.writes:
-            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
-        several = len(results) > 1
-        texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
-        texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        if run.writes and not streamed:
-            self._write(run, run.output, results)
-        else:
-            write_files(run.texts)
+        with run.until_written:
+            found = self.function(run, **given)
+            if found is None:
+                return _would(run, self)
+            if isinstance(found, Outcome):
+                return found
+            streamed = isinstance(found, Parts)
+            if isinstance(found, Parts):
+                # What there is to say is known behind the last part.
+                store.write_parts(run.output, found, found.rows, run.origin(self.name))
+                found = found.last
+            results = dict(found) if self.folder else {"": found}
+            if self.fills and run.writes:
+                run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
+            several = len(results) > 1
+            texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
+            texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+            if run.writes and not streamed:
+                self._write(run, run.output, results)
+            else:
+                write_files(run.texts)
+        for act in run.afterwards:
+            act()
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -408,14 +430,13 @@ class Stage:
         results = {name: getattr(given, name) if fills.parts else given for name in parts}
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
-            if not isinstance(each, Record):
-                store.require_sound(output / f"{name}.h5", each)
+            store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, self._names(fills)) as folder:
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)
                 made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
-                _write_any(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
             cautions = run.cautions_of(*parts)
             summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -448,18 +469,19 @@ class Stage:
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
 
 
-def _write_any(path: Path, given: Any, origin: store.Origin) -> None:
-    """Write a result, or a record that is none yet."""
-    if not isinstance(given, Record):
-        store.write(path, given, origin)
-        return
-    header = Header(origin.version, origin.seed or 0, origin.config, origin.inputs, origin.cautions)
-    write_record(path, given.with_header(header))
-
-
 def loaded(module: str) -> Stage:
     """Load the stage of a module of `stages`."""
     return next(each for each in vars(import_module(f"cpfls_cli.stages.{module}")).values() if isinstance(each, Stage))
+
+
+def stage_that_made(path: Path) -> Stage:
+    """Load the stage that made a file."""
+    return stage_named(store.read_origin(path).stage)
+
+
+def kind_of(path: Path) -> Any:
+    """Give the class of the result in a file."""
+    return stage_that_made(path).kind
 
 
 def stage_named(name: str) -> Stage:
@@ -478,7 +500,9 @@ def stage(
     study: bool | Callable[[Mapping[str, Any]], bool] = False,
     output: Any = None,
     several: bool = False,
+    resumes: bool = False,
     overrides: Callable[..., list[str]] | None = None,
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
@@ -492,7 +516,9 @@ def stage(
         study,
         output,
         several,
+        resumes,
         overrides,
+        together,
     )
 
 

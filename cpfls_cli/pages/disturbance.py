@@ -2,33 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
-from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.playback.gusts import GustAxis
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-
-
-def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
-    """Say how large the gusts of the flights are and how long they last, as far as that is known."""
-    if record.disturbance is None:
-        if (record.loop.shown or record.loop.misses) and record.instruments is None:
-            yield Text(
-                "Gusts: their sizes are not known, because the body is not: what its torque leaves unexplained says "
-                "nothing about them."
-            )
-        return
-    axes = list(record.disturbance.axes(record.vehicle.inertia, record.vehicle.mass))
-    yield Text(gust_words(axes, record.disturbance.told_by))
-    if record.vehicle.gusts is not None:
-        yield gust_table(f"vehicle-gusts-{index}", axes, record.disturbance)
 
 
 def still_air_text() -> Text:
@@ -75,22 +54,3 @@ def _unit(axis: GustAxis) -> str:
 
 def _where(axis: GustAxis) -> str:
     return f"about {axis.name}" if axis.turns else f"along {axis.name}"
-
-
-def gust_table(name: str, axes: Sequence[GustAxis], found: DisturbanceGroup) -> Table:
-    """Tabulate gusts by axis, in units of torque and force."""
-    rows = [
-        [
-            _where(axis),
-            "N m" if axis.turns else "N",
-            *(number(float(column[place]), 3) for column in (found.size, found.low, found.high)),
-            *(number(value, 3) for value in (axis.memory, axis.memory_low, axis.memory_high)),
-        ]
-        for place, axis in enumerate(axes)
-    ]
-    caption = (
-        "Gusts by body axis as Gauss-Markov processes, with 95 % intervals: standard deviation, and the time in which "
-        "a gust falls to 37 %."
-    )
-    header = ("Gusts", "Unit", "Size", "From", "To", "Lasting, s", "From", "To")
-    return Table(name, caption, header, rows, frozenset({0, 1}))

@@ -1,18 +1,16 @@
 """Models in Python: what the commands write, and steps as the exports take them."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.store import file_sha256, read_record, write_record
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders import vehicle_models
 from tests.builders.exported_vehicles import flat, on_numpy
+from tests.builders.identified_models import write_changed
 from tests.builders.playback_flights import STATED
 
 PERIOD = 0.01
@@ -23,7 +21,7 @@ HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 fo
 def whole(tmp_path_factory):
     """A vehicle with every part that a model can have."""
     path = tmp_path_factory.mktemp("library") / "vehicle.h5"
-    write_record(path, vehicle_models.record_of(vehicle_models.whole()))
+    vehicle_models.write_vehicle(path, vehicle_models.vehicle_of(vehicle_models.whole()))
     return cpfls_cli.load_model(path)
 
 
@@ -36,17 +34,17 @@ def speeds():
 def test_a_prediction_and_a_replay_are_what_the_commands_write(cpfls, pipeline, study, tmp_path):
     model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
     model.predict(flight).write(tmp_path / "prediction.h5")
-    assert file_sha256(tmp_path / "prediction.h5") == file_sha256(pipeline.prediction)
+    assert (tmp_path / "prediction.h5").read_bytes() == pipeline.prediction.read_bytes()
     options = ("--horizon", "0.3", "--every", "40", "--hold", "previous")
     cpfls("replay", study, pipeline.model, pipeline.flight, "-o", tmp_path / "command.h5", *options)
     replay = model.replay(flight, horizon_s=0.3, every=40, hold="previous")
     replay.write(tmp_path / "replay.h5")
-    assert file_sha256(tmp_path / "replay.h5") == file_sha256(tmp_path / "command.h5")
+    assert (tmp_path / "replay.h5").read_bytes() == (tmp_path / "command.h5").read_bytes()
 
 
 def test_what_a_command_notes_is_a_warning_of_the_caller(cpfls, pipeline, study, tmp_path):
     unjudged = tmp_path / "unjudged.h5"
-    write_record(unjudged, replace(read_record(pipeline.model, IdentifiedRecord), verdict=None))
+    write_changed(pipeline.model, unjudged, verdict=None)
     noted = cpfls("predict", study, unjudged, pipeline.flight, "-o", tmp_path / "p.h5").stderr
     model = cpfls_cli.load_model(unjudged)
     with pytest.warns(UserWarning, match="has no verdict") as warned:
@@ -140,8 +138,8 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
     with pytest.raises(InputError, match="at least one flight"):
         whole.replay()
     partial = tmp_path / "partial.h5"
-    write_record(
-        partial, vehicle_models.record_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
+    vehicle_models.write_vehicle(
+        partial, vehicle_models.vehicle_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
     )
     with pytest.raises(InputError, match="holds wind, which depends on more than the state"):
         cpfls_cli.load_model(partial).step(whole.state(), [HOVER] * 4, PERIOD)
