@@ -159,9 +159,8 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
             enough = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
             named = replace(named, group=replace(named.group, columns=enough or named.group.columns))
             time, values = log.values(named.group.columns)
-        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
-            continue
-        if float(np.ptp(values, axis=0).max()) > 0:
+        enough_rows = len(time) >= _FEWEST_SAMPLES and log.rate_hz(named.group.columns) >= _SLOWEST_HZ
+        if enough_rows and float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)
     for found in kept.values():
         # Columns that the same kind of log is known for, and that come several times as often, go first.
@@ -173,11 +172,9 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
 
 def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
     """Refuse a log whose rotors are all logged and never change: it is of a vehicle on the ground."""
-    if any(name in candidates for name in ROTORS):
-        return
-    dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
-    if dead is not None:
-        raise InputError(f"no flight in it: the rotors ({dead.group.pattern}) never change")
+    for own in () if candidates.keys() & {*ROTORS} else named:
+        if own.signal in ROTORS and len(log.values(own.group.columns[:1])[0]):
+            raise InputError(f"no flight in it: the rotors ({own.group.pattern}) never change")
 
 
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
