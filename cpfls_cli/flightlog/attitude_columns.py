@@ -389,18 +389,17 @@ def doubt_reading(seen: Seen, verdict: TakenReading) -> None:
             if (order, sign) == best.maps[name] or name in doubted:
                 continue
             doubted.add(name)
-            for signal in _SIGNALS_OF[name]:
-                if signal in seen.guesses:
-                    columns = [seen.candidates[signal][0].group.columns[index] for index in order]
-                    signs = f", sign: {[int(own) for own in sign]}" if min(sign) < 0 else ""
-                    text = f"columns: [{', '.join(columns)}]{signs}"
-                    seen.doubt(signal, Rival(text, f"the log agrees as well with other columns turned; {_DECIDES}"))
+            signs = f", sign: {[int(own) for own in sign]}" if min(sign) < 0 else ""
+            for signal in (own for own in _SIGNALS_OF[name] if own in seen.guesses):
+                columns = [seen.candidates[signal][0].group.columns[index] for index in order]
+                text = f"columns: [{', '.join(columns)}]{signs}"
+                seen.doubt(signal, Rival(text, f"the log agrees as well with other columns turned; {_DECIDES}"))
         if other.body != best.body and "body_frame" not in doubted:
             doubted.add("body_frame")
             for key, readings in (("body_frame", (other.body, best.body)), ("world_frame", (other.world, best.world))):
                 choice, reason = seen.choices[key], f"the log agrees as well; {_DECIDES}"
                 # The accelerometer may have chosen the other reading, and then this one is the rival.
-                rivals = [Rival(f"{key}: {value}", reason) for value in readings if value != choice.value][:1]
+                more = [Rival(f"{key}: {value}", reason) for value in readings if value != choice.value][:1]
                 known = [rival.text for rival in choice.rivals]
-                rivals = [*choice.rivals, *(rival for rival in rivals if rival.text not in known)]
+                rivals = (*choice.rivals, *(rival for rival in more if rival.text not in known))
                 seen.choose(key, choice.value, choice.reason, "guess" if rivals else choice.sure, *rivals)

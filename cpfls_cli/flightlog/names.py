@@ -189,31 +189,28 @@ def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
     return enough and group.kind in meaning.kinds.split()
 
 
-def _by_words(group: ColumnGroup) -> Iterator[Named]:
-    """List what the words of a name and a unit in it suggest; words that speak of no measurement rule it out."""
-    words = group.words
-    rank = _BY_WORDS + len(words) + 10 * sum(word in vocabulary.SECOND_HAND for word in words)
-    rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
-    squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
-    for meaning, stated in _possible(group, words, NOT_MEASURED):
-        signal = meaning.signal
-        if not (squared and signal in ROTORS) and _means(meaning, group, words):
-            fast = any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
-            usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
-            yield Named(signal, group, rank, *(stated or (usual, 1.0)))
-
-
-def _possible(
-    group: ColumnGroup, words: tuple[str, ...], never: frozenset[str]
-) -> Iterator[tuple[Meaning, tuple[UnitName, float] | None]]:
-    """List the meanings that suit a group and its unit, and the unit; those that words rule out are left out."""
-    for meaning in MEANINGS:
-        stated, ending = _stated_unit(group, meaning.signal), group.ending
+def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
+    """List what the words of a name and a unit in it suggest: measurements, or what is wished where a word says so."""
+    words = tuple(word for word in group.words if not (wished and word in WISHED))
+    rank = _BY_WORDS + len(words)
+    if not wished:
+        rank += 10 * sum(word in vocabulary.SECOND_HAND for word in words)
+        rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
+    before, _, after = group.pattern.partition("*")
+    pqr = wished and group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
+    squared = bool(re.search(r"[a-z]2($|_)", f"{before}{after}")) or bool({"squared", "sq"} & {*words})
+    for meaning in () if wished and words == group.words else MEANINGS:
+        signal, stated, ending = meaning.signal, _stated_unit(group, meaning.signal), group.ending
         # A name that ends in a unit, and in none of the signal, is of something else.
         other = bool(ending) and stated is None and (len(ending.strip("_ ")) > 1 or ending == "_m")
-        ruled_out = (never - vocabulary.ALLOWED.get(meaning.signal, frozenset())) & {*words}
-        if _suits(meaning, group) and not other and not ruled_out:
-            yield meaning, stated
+        allowed = vocabulary.ALLOWED.get(signal, frozenset()) | (WISHED if wished else frozenset())
+        named = _SETPOINT_OF.get(signal) if wished else None if squared and signal in ROTORS else signal
+        if named is None or other or not _suits(meaning, group) or (NOT_MEASURED - allowed) & {*words}:
+            continue
+        if signal == "body_rate" if pqr else _means(meaning, group, words):
+            fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
+            usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
+            yield Named(named, group, rank, *(stated or (usual, 1.0)))
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -227,19 +224,8 @@ def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
     # Three components of a quaternion follow an attitude too, at half of its size.
     of_quaternions = {column for group in groups if group.kind == "wxyz" for column in group.columns}
     own = (group for group in groups if group.kind == "wxyz" or not of_quaternions & {*group.columns})
-    found = (named for group in own for named in _wished(group))
+    found = (named for group in own for named in _by_words(group, wished=True))
     return tuple(sorted(found, key=lambda named: named.rank))
-
-
-def _wished(group: ColumnGroup) -> Iterator[Named]:
-    words = tuple(word for word in group.words if word not in WISHED)
-    before, _, after = group.pattern.partition("*")
-    pqr = group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
-    for meaning, stated in _possible(group, words, NOT_MEASURED - WISHED) if len(words) < len(group.words) else ():
-        signal = meaning.signal
-        if signal in _SETPOINT_OF and (signal == "body_rate" if pqr else _means(meaning, group, words)):
-            usual: UnitName | None = "1" if signal == "quaternion" else None
-            yield Named(_SETPOINT_OF[signal], group, _BY_WORDS + len(words), *(stated or (usual, 1.0)))
 
 
 def _stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:

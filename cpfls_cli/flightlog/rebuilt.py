@@ -24,7 +24,7 @@ from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
 from cpfls_cli.flightlog.recognised import Guess, LogTable, holding_values
-from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors, too_slow, too_slow_beside
+from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors, left_for_commands, too_slow
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
@@ -175,7 +175,7 @@ def with_rebuilt(
     columns, left_out = SignalMap(columns=rebuilt.columns, unit="1"), (*rotors.left_out, kept)
     command = replace(logged, columns=columns, reason=rebuilt.sentence, rate_hz=rebuilt.rate_hz)
     if speed is not None and speed.rate_hz * FASTER < command.rate_hz:
-        left_out, speed = (*left_out, too_slow_beside(speed)), None
+        left_out, speed = (*left_out, left_for_commands(speed)), None
     slow = (each for own in (speed, command) if own for each in too_slow(own, system, parameters))
     found = rotors._replace(speed=speed, command=command, left_out=left_out, warnings=(rebuilt.sentence, *slow))
     return log.with_topic(REBUILT, rebuilt.topic), found, rebuilt

@@ -79,7 +79,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     if speed is not None and command is not None:
         columns, counts = command.columns.columns, [len(own.columns.columns) for own in (speed, command)]
         if speed.rate_hz * FASTER < command.rate_hz:
-            left_out.append(f"{too_slow_beside(speed)}; the commands come at {command.rate_hz:.3g} Hz")
+            left_out.append(f"{left_for_commands(speed)}; the commands come at {command.rate_hz:.3g} Hz")
             speed = None
         elif counts[0] != counts[1]:
             left_out.append(f"{columns[0]} and the columns with it: {counts[1]} commands, {counts[0]} rotors")
@@ -92,7 +92,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
 
 
-def too_slow_beside(speed: Guess) -> str:
+def left_for_commands(speed: Guess) -> str:
     """Say which measured speeds are left out for commands that come more often."""
     return f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz"
 
@@ -364,7 +364,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     own = next((own for own in RANGES if low >= own.low and own.high_from < high <= own.high), None)
     if own is None:
         return None
-    clear = own.tells == "always" or (own.tells == "of commands" and bool(words & ASKED))
+    clear = own.clear == "always" or (own.clear == "of commands" and bool(words & ASKED))
     others = [Rival(*rival) for rival in own.rivals]
     if not (clear or named.unit == "us" or "pwm" in words):
         others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]

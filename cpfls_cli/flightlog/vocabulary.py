@@ -293,8 +293,8 @@ class Range(NamedTuple):
     scale: float
     offset: float
     words: str
-    # Whether the range alone tells it: of commands it does where the name is that of one.
-    tells: Literal["always", "of commands", "never"]
+    # Whether the range alone shows it: of commands it does where the name is that of one.
+    clear: Literal["always", "of commands", "never"]
     rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, beside speeds, and where they hold.
 
 
