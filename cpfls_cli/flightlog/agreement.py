@@ -142,7 +142,7 @@ class LeanFit(NamedTuple):
     # By (order, sign); Share of the acceleration that the lean explains, if these columns of the position with these
     # signs are the first two axes of the attitude's world, and the thrust points along the body's third axis.
     shares: Mapping[tuple[tuple[int, int], tuple[float, float]], float]
-    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
+    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that is not clear.
     rises: float
     gain: float  # Acceleration over what the lean makes of gravity, 1 where the units agree.
 

@@ -218,7 +218,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     layout, explained, by_axes = _chosen(shares, ("X", "plus"))
     if not by_axes:
         layout, explained, by_axes = _chosen(shares, ("X",))
-    # Columns that are of other moments than those beside them, or of something else than these rotors, may explain a
+    # Columns that are of other moments than those next to them, or of something else than these rotors, may explain a
     # part of the motion in some layout; but then single ones push the wrong way.
     alike = layout.weights * weights
     least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)

@@ -318,7 +318,7 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
         before, at, after = reason.partition("; in ")
         reason = f"{before}{share}{at}{after}"
     elif best.lean is None and sure == "data":
-        # A range tells the unit, and nothing here the axes.
+        # A range shows the unit, and nothing here the axes.
         sure = "named"
     seen.take(named, unit, reason, sure, order=best.attitude.order, sign=best.attitude.sign, rivals=rivals)
     return verdict

@@ -109,7 +109,7 @@ def as_mapped(values: Array, columns: ColumnMap) -> Array:
     """Give columns of a log as a map makes them: shape (sample, column) to (sample, axis or rotor), in its unit."""
     sign = np.ones(len(columns.columns)) if columns.sign is None else np.array(columns.sign)
     with np.errstate(over="ignore"):
-        # What overflows is told as a value that no flight has.
+        # What overflows is reported as a value that no flight has.
         scaled: Array = sign * (columns.scale * values + columns.offset)
     if columns.mixer is None:
         return scaled

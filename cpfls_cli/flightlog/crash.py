@@ -25,7 +25,7 @@ _OVER_S, _OVER = 3.0, 0.2
 # Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 # below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
-# Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
+# Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
 # After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies.

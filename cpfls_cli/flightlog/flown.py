@@ -36,7 +36,7 @@ _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
-_FEWEST_ROWS = 10  # Of which it can be told.
+_FEWEST_ROWS = 10  # Of which it can be seen.
 SHORTEST_FLIGHT_S = 2.0  # Below which nothing is a flight.
 
 
@@ -51,7 +51,7 @@ class FlownPart:
 
     # Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
     span_s: tuple[float, float] | None
-    reasons: tuple[str, ...]  # What was cut, where, and how that was told; what else flies and is left out.
+    reasons: tuple[str, ...]  # What was cut, where, and how that is known; what else flies and is left out.
     flies: bool = True  # False where nothing in it flies.
     stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
     ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
@@ -156,7 +156,7 @@ def _no_flight(why: str) -> FlownPart:
 
 
 def _active(signs: Signs) -> tuple[BoolArray | None, str]:
-    """Mark the samples in which the vehicle flies, and say how that is told."""
+    """Mark the samples in which the vehicle flies, and say how that is known."""
     level, height, rate, period = signs.level, signs.height, signs.turning, signs.period
     if level is not None:
         largest = float(np.quantile(level, 0.98))
@@ -165,11 +165,11 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
             by_hand = ", and it is turned by hand" if moved else ""
             return None, f"no flight in it: the rotors stand still throughout{by_hand}"
         turning = _carried(signs, largest)
-        told = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
-        told += "" if rate is None else ", with hardly any rotation"
+        how = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
+        how += "" if rate is None else ", with hardly any rotation"
         if height is None or not turning.any() or turning.all():
-            return turning, told
-        return _off_the_ground(turning, height, period), told + ", or it is on the ground"
+            return turning, how
+        return _off_the_ground(turning, height, period), how + ", or it is on the ground"
     if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
         ground = float(np.quantile(height, 0.02))
         above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
@@ -306,7 +306,7 @@ def _dead_rates(signs: Signs) -> bool:
     return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
-def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
+def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
     ends = [crash.ended_early(signs, rests, part) for part in stretches]
     cut = []
@@ -324,10 +324,10 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     reasons = []
     early = [(index, each) for index, each in enumerate(ends) if each is not None]
     if first > 0 and not any(index < chosen for index, _ in early):
-        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), told)}")
+        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), how)}")
     if after < len(time) and ends[chosen] is None:
         last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), told)}")
+        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), how)}")
     others = [
         f"{time[a]:.1f} to {time[b - 1] if own is None else time[own.first - 1]:.1f} s"
         for (a, b), own in zip(stretches, ends, strict=True)
@@ -345,10 +345,10 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
 
 
-def _how(signs: Signs, part: slice, told: str) -> str:
+def _how(signs: Signs, part: slice, how: str) -> str:
     if signs.level is None:
-        return told
+        return how
     if float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
-        return told
+        return how
     by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
     return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")

@@ -25,7 +25,7 @@ _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3  # Above the 32 kHz at which the fastest gyroscopes are read.
-_FEWEST_SAMPLES = 10  # Of which a flight can be told.
+_FEWEST_SAMPLES = 10  # Of which a flight can be made.
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
 # Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
 _POOR_R2 = 0.5
@@ -125,7 +125,7 @@ def read_signals(
     )
     converted = conversion.to_program_frames(on_clock, settings)
     if "attitude" in setpoints and "attitude" in converted:
-        # A full turn beside the vehicle's own is the same.
+        # A full turn away from the vehicle's own is the same.
         setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
     return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 

@@ -25,14 +25,14 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 _TOLERANCE, _TEN = 1.4, 10.0
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
-# Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2.
+# Sizes of an acceleration that holds no gravity, over that over ground in m/s^2.
 _OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
 # Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
 _BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
-# a gyroscope beside motion capture it is 0.1 to 0.4.
+# a gyroscope with motion capture it is 0.1 to 0.4.
 _FAST_HZ, _DERIVED = 10.0, 0.8
-# What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former.
+# What is left of a velocity in body axes, as a share of what is left in those of the world, that shows the former.
 _CLOSER = 0.4
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6

@@ -36,7 +36,7 @@ class ColumnGroup:
     """Columns whose names differ in an axis or a number alone."""
 
     pattern: str  # The name with ``*`` in place of the axis or the number.
-    kind: Kind  # What tells the columns apart.
+    kind: Kind  # In what the columns differ.
     columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
 
     @cached_property
@@ -302,7 +302,7 @@ def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
 def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
     """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names, on a clock, s.
 
-    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity tells the
+    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity shows the
     accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
     are rotors. Without an attitude nothing is found.
     """

@@ -109,7 +109,7 @@ def propose(
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
-        # One crop suits no two logs, and what flies in a log is told by its rotors alone.
+        # One crop suits no two logs, and what flies in a log is known by its rotors alone.
         raise InputError(
             f"{winged.name}: flies on the wing for a part, which is cut in seconds: run cpfls init for it alone"
         )
@@ -377,7 +377,7 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
 
 
 def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
-    """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
+    """Take the rotors that parameters state, else those that the motion shows, and hold the one against the other."""
     with about(logs[0].name, InputError):
         own = (stated_airframe(one.parameters, one.recognition.rotors) for one in logs)
         stated = next((found for found in own if found is not None), None)

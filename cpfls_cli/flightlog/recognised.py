@@ -28,7 +28,7 @@ _TIME_NAMES: Final = re.compile(r"t(_s)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|s
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
-_SLOWEST_HZ = 0.5  # Below which a signal tells nothing of a flight.
+_SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
@@ -363,7 +363,7 @@ class Seen:
         self.warnings.append(f"{named.group.pattern} is said to be in {named.unit}; {by} {unit}")
 
     def warn_of_mirrored(self, named: Named, order: Sequence[int], sign: Sequence[float], whose: str) -> None:
-        """Warn of axes that are left-handed beside those of all others."""
+        """Warn of axes that are left-handed, unlike those of all others."""
         if handed(order, sign) > 0:
             return
         columns = [named.group.columns[index] for index, own in zip(order, sign, strict=True) if own < 0]

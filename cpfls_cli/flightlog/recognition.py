@@ -170,7 +170,7 @@ def _live_part(
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
-    """Gather what tells flight by the names of columns, before axes and frames are known."""
+    """Gather what shows flight by the names of columns, before axes and frames are known."""
     first = {name: found[0] for name, found in candidates.items() if found}
     values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
     height = rate = None
@@ -247,7 +247,7 @@ def _take_frames(seen: Seen, reading: Reading | None) -> None:
 
 
 def _take_wrench(seen: Seen) -> None:
-    """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
+    """Take torque and thrust where the log has no rotors; with rotors they are what a controller asked for."""
     torque, thrust, rate = seen.first("body_torque"), seen.first("thrust"), seen.guesses.get("body_rate")
     if torque is None:
         return

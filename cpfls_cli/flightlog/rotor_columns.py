@@ -220,7 +220,7 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
 
 
 def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:
-    """List outputs that swing far and not with the rest, which lifts: surfaces beside motors, where nothing says so."""
+    """List outputs that swing far and not with the rest, which lifts: surfaces among motors, where nothing says so."""
     rows = max(1, round(_SWING_S / float(np.median(np.diff(time)))))
     if len(kept) <= _FEWEST_BESIDE or len(time) < _FEWEST_SAMPLES + rows:
         return []

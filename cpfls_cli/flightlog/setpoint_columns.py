@@ -22,7 +22,7 @@ _FEWEST_SAMPLES = 20
 _FEWEST_COMPARED = 100  # Of the one clock, a second of flight.
 # Correlations from which on what is measured follows what is asked for, and runs against it.
 _FOLLOWS, _OPPOSES = 0.6, -0.8
-_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift.
+_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays shows nothing of a drift.
 _LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)  # By which a vehicle follows, s.
 _MOTION_HZ = 5.0  # Below which a vehicle follows anything; above there is the noise of sensors.
 _HELD_S = 0.1

@@ -225,10 +225,10 @@ class Meaning(NamedTuple):
 
     signal: SignalName
     words: str  # One of them has to stand in the name.
-    kinds: str  # How its columns are told apart, and how many there are; of rotors at least.
+    kinds: str  # In what its columns differ, and how many there are; of rotors at least.
     number: int
     last: int = 0  # Only so many words at the end of the name count; 0: all of them.
-    never: str = ""  # Words that rule it out, beside those of `NOT_MEASURED`.
+    never: str = ""  # Words that rule it out, with those of `NOT_MEASURED`.
 
 
 # Words of a name that mean together what neither does, as a pattern, and the one word that means it.
@@ -273,9 +273,9 @@ _DEGREES = 180 / pi
 _ANGLES: Final[tuple[tuple[UnitName, float], ...]] = (("rad", 1.0), ("deg", 1 / _DEGREES))
 # Size that speaks for a unit, the unit, and the factor that makes it of what is logged.
 Row = tuple[float, UnitName, float]
-# Sizes of a gyroscope beside the attitude's derivative.
+# Sizes of a gyroscope over that of the attitude's derivative.
 RATES: Final[tuple[Row, ...]] = ((1.0, "rad/s", 1.0), (_DEGREES, "deg/s", 1.0), (1000.0, "rad/s", 1e-3))
-# Sizes of an acceleration over ground, in m or mm, beside that which gravity and a lean in rad make.
+# Sizes of an acceleration over ground, in m or mm, over that which gravity and a lean in rad make.
 ANGLES: Final[tuple[Row, ...]] = tuple((mm * one, unit, 1.0) for unit, one in _ANGLES for mm in (1.0, 1000.0))
 # Sizes of an accelerometer at hover.
 SENSED: Final[tuple[Row, ...]] = (
@@ -295,7 +295,7 @@ class Range(NamedTuple):
     words: str
     # Whether the range alone shows it: of commands it does where the name is that of one.
     clear: Literal["always", "of commands", "never"]
-    rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, beside speeds, and where they hold.
+    rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, but for speeds, and where they hold.
 
 
 _OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "if the range is 1075 to 1950, as in older PX4")

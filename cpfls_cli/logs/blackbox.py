@@ -150,7 +150,7 @@ def _fields(header: Mapping[str, str]) -> Fields:
 
 
 def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
-    """Name the columns, and give those whose unit the header tells in that unit."""
+    """Name the columns, and give those whose unit the header states in that unit."""
     names = header["Field I name"].split(",")
     # A small step back is that of a damaged frame.
     stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < -ROLLOVER // 2)
@@ -175,7 +175,7 @@ def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str
 
 
 def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
-    """List beginnings of names, factors and units, as far as the header tells them."""
+    """List beginnings of names, factors and units, as far as the header states them."""
     (gyro,) = struct.unpack(">f", int(header.get("gyro_scale", "0x0"), 16).to_bytes(4, "big"))
     system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
     version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))

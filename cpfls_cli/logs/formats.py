@@ -84,7 +84,7 @@ class LogFormat(NamedTuple):
     # Modules of the optional package that the reader needs, and the extra of this program that installs it.
     packages: tuple[str, ...] = ()
     extra: str = ""
-    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
+    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader distinguishes them.
     shared: bool = False
 
     @property
