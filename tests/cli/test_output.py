@@ -96,21 +96,6 @@ def test_output_larger_than_the_system_allows(pipeline, study, tmp_path, command
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("command", ["trajectory", "simulate", "reduce", "identify", "predict"])
-def test_dry_run_writes_nothing(cpfls, pipeline, study, tmp_path, command):
-    words = {
-        "trajectory": (),
-        "simulate": (pipeline.trajectory,),
-        "reduce": (pipeline.flight,),
-        "identify": (pipeline.flight, "--selection", pipeline.selection),
-        "predict": (pipeline.model, pipeline.flight),
-    }[command]
-    result = cpfls(command, study, *words, "-o", tmp_path / "out.h5", "--dry-run")
-    assert result.exit_code == 0
-    assert result.stdout == f"{tmp_path / 'out.h5'}: would be written; the config and all inputs are good\n"
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
     words = ("-o", tmp_path / "out.h5", "--dry-run")
     assert "unknown key" in refuse("trajectory", study, *words, "--set", "vehicle.mass=1")[0]

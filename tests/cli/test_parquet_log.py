@@ -120,18 +120,6 @@ def test_columns_that_hold_no_numbers_are_named(wrong, write):
     assert line.startswith("LOG: column 'yaw' holds list<")
 
 
-def test_missing_columns_are_named_with_the_nearest(wrong, write):
-    log = write(
-        {"t": TIME, "Roll": COLUMNS["roll"]} | {name: COLUMNS[name] for name in ("pitch", "yaw", "mx", "my", "mz")}
-    )
-    assert wrong(log) == ["LOG: import.signals.attitude.columns: the log has no column 'roll' (nearest: Roll)"]
-
-
-def test_no_rows(wrong, write):
-    log = write({name: np.empty(0) for name in ("t", *COLUMNS)})
-    assert wrong(log) == ["LOG: holds column names but no samples"]
-
-
 @pytest.mark.parametrize("content", [b"hello", b"PAR1" + bytes(100) + b"PAR1"])
 def test_what_is_no_parquet(wrong, tmp_path, content):
     path = tmp_path / "log.parquet"
@@ -199,14 +187,6 @@ def test_a_broken_page(wrong, write):
     log.write_bytes(content)
     (line,) = wrong(log)
     assert line.startswith("LOG: cannot be read as Parquet: ")
-
-
-@pytest.mark.parametrize("ending", [".txt", ".tsv", ".csv.zip", ".gz", ""])
-def test_other_endings_are_told_which_there_are(wrong, tmp_path, ending):
-    path = tmp_path / f"log{ending}"
-    path.write_text("t,roll\n0,1\n")
-    (line,) = wrong(path)
-    assert line.startswith("LOG: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, ")
 
 
 def test_without_the_package(wrong, write, monkeypatch):

@@ -192,13 +192,6 @@ def test_what_is_refused(refuse, folder, tmp_path):
     assert "light.csv" in message
 
 
-def test_a_dry_run_writes_nothing(cpfls, folder, tmp_path):
-    output, table = tmp_path / "r.h5", tmp_path / "r.csv"
-    words = ("response", folder / "study.yaml", folder / "light.csv", "-o", output, "--csv", table, "--dry-run")
-    assert cpfls(*words).exit_code == 0
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
     config = tmp_path / "open.yaml"
     config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))

@@ -185,9 +185,3 @@ def test_what_is_refused(cpfls, logs, told, tmp_path, words, message):  # noqa: 
     result = cpfls("trend", logs / "study.yaml", *given, "-o", tmp_path / "trend")
     assert result.exit_code == 2
     assert message in result.stderr
-
-
-def test_a_folder_of_others_is_not_filled(refuse, logs, tmp_path):
-    (tmp_path / "own.txt").write_text("mine")
-    (message,) = refuse("trend", logs / "study.yaml", logs / "logs" / "log1.csv", "-o", tmp_path)
-    assert "exists already and is not empty" in message

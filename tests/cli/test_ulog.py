@@ -8,8 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.config.load import load_study
-from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders import ulogs
 from tests.builders.studies import VEHICLE
@@ -251,12 +249,6 @@ def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_pa
     for axis, (own, sign) in enumerate(zip(middle, (1, -1, -1), strict=True)):
         assert sign * own[axis] > 0
         np.testing.assert_allclose(np.delete(own, axis), 0.0, atol=1e-9)
-
-
-def test_the_gap_workflow_takes_it_as_well(config, write):
-    flights = read_flights([write(ulog())], load_study(config))
-    assert [recording.name for recording in flights.recordings] == ["log.ulg"]
-    assert len(flights.recordings[0].signals.time) == pytest.approx(500, abs=10)
 
 
 def of_version(version, removed=()):

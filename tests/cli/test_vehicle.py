@@ -158,12 +158,6 @@ def test_a_replay_is_shown_also_of_the_flight_held_out(cpfls, config, flights, f
     assert "The windows in which the body rate is farthest off" in text
 
 
-def test_dry_run_writes_nothing(cpfls, config, flights, tmp_path):
-    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--dry-run")
-    assert result.exit_code == 0
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.fixture
 def interrupt_at(monkeypatch):
     """Send this very process an interrupt when so many structures were judged."""
@@ -278,12 +272,6 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
         (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
         assert message.startswith(f"{output}.checkpoint: belongs to another search: ")
         assert named in message
-    checkpoint = tmp_path / "v.h5.checkpoint"
-    content = bytearray(checkpoint.read_bytes())
-    content[len(content) // 2] ^= 1
-    checkpoint.write_bytes(content)
-    (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
-    assert "damaged: its content does not match the checksum at its end" in message
 
 
 @pytest.fixture
@@ -293,13 +281,6 @@ def refused(refuse, config, tmp_path):
         return message
 
     return call
-
-
-def test_an_existing_file_is_kept(refuse, config, flights, tmp_path):
-    (tmp_path / "v.h5").write_text("mine")
-    assert refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5") == [
-        f"{tmp_path / 'v.h5'}: exists already; --force replaces it"
-    ]
 
 
 def test_an_unknown_block_is_refused(refused, flights):

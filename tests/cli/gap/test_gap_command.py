@@ -204,9 +204,3 @@ def test_playback_is_that_of_the_command_for_it(cpfls, gap_config, found, shifte
     for name, again in {"after": "model", "before": "stated", "rate-fades": "rate-fades"}.items():
         # The extended model is refitted once more.
         assert ours[name]["body_rate"]["mae"] == pytest.approx(played[again]["body_rate"]["mae"], rel=1e-3), name
-
-
-def test_dry_run_writes_nothing(cpfls, gap_config, shifted, tmp_path):
-    result = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "--dry-run")
-    assert result.exit_code == 0
-    assert list(tmp_path.iterdir()) == []

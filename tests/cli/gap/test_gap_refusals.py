@@ -20,11 +20,6 @@ def write(path, data, header):
     return path
 
 
-def test_missing_flight(refuse, gap_config, tmp_path):
-    (message,) = refuse("gap", gap_config, tmp_path / "none.csv", "-o", tmp_path / "x")
-    assert message == f"{tmp_path / 'none.csv'}: no such file"
-
-
 def test_folder_that_is_not_empty(refuse, gap_config, shifted, tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("mine")
@@ -71,14 +66,6 @@ def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
     assert "gap.window_s = 0.4" in message
 
 
-def test_flights_of_different_rates(refuse, gap_config, shifted, tmp_path):
-    data, header = column(shifted[0])
-    slow = write(tmp_path / "slow.csv", data[::2], header)
-    (message,) = refuse("gap", gap_config, shifted[1], slow, "-o", tmp_path / "x")
-    assert message.startswith("slow.csv: sampled at 50 Hz, flight_2.csv at 100 Hz")
-    assert "import.rate_hz" in message
-
-
 def test_log_without_actuation(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0], "om1", "om2", "om3", "om4")
     still = write(tmp_path / "still.csv", data, header)
@@ -121,11 +108,6 @@ def test_model_of_another_vehicle(refuse, pipeline, gap_config, shifted, tmp_pat
     )
     (message,) = refuse(*words)
     assert f"{pipeline.model}: was made with another vehicle" in message
-
-
-def test_artifact_of_another_stage(refuse, pipeline, gap_config, tmp_path):
-    (message,) = refuse("diagnose", gap_config, pipeline.flight, "-o", tmp_path / "x.h5")
-    assert "is a cpfls/flight; this command needs a cpfls/disagreement" in message
 
 
 def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, tmp_path):

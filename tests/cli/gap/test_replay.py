@@ -246,12 +246,6 @@ def test_a_single_horizon(replayed, with_attitude):
     assert len(answer["horizon_s"]) == 1
 
 
-def test_dry_run_writes_nothing(cpfls, gap_config, with_attitude, tmp_path):
-    output = tmp_path / "replay.h5"
-    assert cpfls("replay", gap_config, "vehicle", with_attitude[0], "-o", output, "--dry-run").exit_code == 0
-    assert not output.exists()
-
-
 @pytest.fixture
 def refused(refuse, gap_config, tmp_path):
     def call(model, *flights, options=()):
@@ -290,17 +284,6 @@ def test_a_model_of_another_vehicle_is_refused(refused, extended, shifted):
     )
 
 
-def test_a_flight_of_another_vehicle_is_refused(cpfls, refused, gap_config, shifted, tmp_path):
-    flight = imported(cpfls, gap_config, shifted[0], tmp_path / "flight.h5")
-    message = refused("vehicle", flight, options=("--set", "vehicle.mass_kg=5.5"))
-    assert message.startswith(f"{flight}: was made with another vehicle")
-
-
-def test_what_is_no_model_is_refused(cpfls, refused, gap_config, shifted, tmp_path):
-    flight = imported(cpfls, gap_config, shifted[0], tmp_path / "flight.h5")
-    assert "is a cpfls/flight; this command needs a cpfls/model" in refused(flight, shifted[0])
-
-
 def test_an_identified_model_needs_the_attitude(refused, pipeline, shifted):
     message = refused(pipeline.model, shifted[0], options=("--set", "vehicle.rotor_speed_max_rad_s=1000.0"))
     assert message == "flight_1.csv: lacks the attitude, which the model needs: its inertia depends on it"
@@ -313,7 +296,3 @@ def test_flights_of_different_rates_are_refused(refused, shifted, tmp_path):
     message = refused("vehicle", shifted[1], log)
     assert message.startswith("slow.csv: sampled at 50 Hz, flight_2.csv at 100 Hz")
     assert "--set import.rate_hz=50 for logs" in message
-
-
-def test_a_missing_model_is_refused(refused, shifted, tmp_path):
-    assert refused(tmp_path / "none.h5", shifted[0]) == f"{tmp_path / 'none.h5'}: no such file"

@@ -125,9 +125,3 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
     assert first["mse"]["mean"] == first["mse"]["smallest"]
     assert first["mse"]["variance"] is None
     assert sweep_in(tmp_path / "sweep.h5").without_model == 1
-
-
-def test_dry_run_writes_nothing(cpfls, words, tmp_path):
-    result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--dry-run")
-    assert result.exit_code == 0
-    assert list(tmp_path.iterdir()) == []
