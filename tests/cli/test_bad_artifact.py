@@ -214,7 +214,7 @@ def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline,
 def test_selection_from_another_flight(refuse, cpfls, pipeline, study, tmp_path):
     other = tmp_path / "other.h5"
     noisy = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", study, pipeline.trajectory, "-o", other, *noisy).exit_code == 0
+    cpfls.done("simulate", study, pipeline.trajectory, "-o", other, *noisy)
     words = ("identify", study, other, "--selection", pipeline.selection, "-o", tmp_path / "out.h5")
     (line,) = refuse(*words)
     assert line.startswith(

@@ -160,9 +160,9 @@ def test_artifact_report_and_info_say_the_same(cpfls, changed, folder):
     made = folder / "out" / "changed.h5"
     found, _ = read(made, Changed)
     assert (found.changed, found.since) == (True, "weak1.csv")
-    assert cpfls("check", made).exit_code == 0
+    cpfls.done("check", made)
     assert first in cpfls("info", made).stdout
     assert first.partition(": ")[2].partition(";")[0] in (folder / "out" / "report.html").read_text()
     page = folder / "page.md"
-    assert cpfls("report", folder / "study.yaml", made, "-o", page, "--force").exit_code == 0
+    cpfls.done("report", folder / "study.yaml", made, "-o", page, "--force")
     assert all(name in page.read_text() for name in ("weak1.csv", "weak2.csv", "before1.csv", "before5.csv"))

@@ -48,9 +48,7 @@ def described_as(name, paths):
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_check_finds_nothing_in_what_the_program_writes(cpfls, pipeline, stage):
-    result = cpfls("check", pipeline.paths[stage], "--json")
-    assert result.exit_code == 0
-    summary = json.loads(result.stdout)
+    summary = cpfls.told("check", pipeline.paths[stage])
     assert (summary["format"], summary["good"], summary["findings"]) == (format_of(stage), True, [])
 
 
@@ -73,8 +71,7 @@ def test_info_tells_origin_and_content(cpfls, pipeline, stage):
 def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     """Nothing is computed again to read it."""
     _, commands = stages(study, study.parent)
-    answered = cpfls(*commands[stage], "-o", tmp_path / f"{stage}.h5", "-v")
-    assert answered.exit_code == 0, answered.output
+    answered = cpfls.done(*commands[stage], "-o", tmp_path / f"{stage}.h5", "-v")
     lines = answered.stdout.partition("next:")[0].splitlines()
     assert len(lines) > 1
     told = cpfls("info", tmp_path / f"{stage}.h5", "-v").stdout.splitlines()

@@ -15,7 +15,7 @@ def test_existing_output_needs_force(cpfls, refuse, study, tmp_path):
     output.write_text("precious")
     assert refuse("trajectory", study, "-o", output) == [f"{output}: exists already; --force replaces it"]
     assert refuse("trajectory", study, "-o", output, "--dry-run") == [f"{output}: exists already; --force replaces it"]
-    assert cpfls("trajectory", study, "-o", output, "--force").exit_code == 0
+    cpfls.done("trajectory", study, "-o", output, "--force")
     assert output.read_bytes().startswith(b"\x89HDF")
     assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
 
@@ -129,7 +129,7 @@ def test_what_a_killed_command_left_half_written_goes(cpfls, study, tmp_path):
     folder = tmp_path / ".trajectory.h5.ab_12xyy.part"
     folder.mkdir()
     (folder / "half").write_text("half")
-    assert cpfls("trajectory", study, "-o", tmp_path / "trajectory.h5").exit_code == 0
+    cpfls.done("trajectory", study, "-o", tmp_path / "trajectory.h5")
     assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
@@ -139,7 +139,7 @@ def test_a_file_of_the_user_with_the_name_of_the_lock_is_left_alone(cpfls, study
     (precious if linked else lock).write_text("precious")
     if linked:
         lock.symlink_to(precious)
-    assert cpfls("trajectory", study, "-o", tmp_path / "trajectory.h5").exit_code == 0
+    cpfls.done("trajectory", study, "-o", tmp_path / "trajectory.h5")
     assert lock.read_text() == "precious"
 
 
@@ -158,7 +158,7 @@ def test_a_replaced_file_keeps_its_permissions(cpfls, study, tmp_path):
     output = tmp_path / "trajectory.h5"
     output.write_text("private")
     output.chmod(0o600)
-    assert cpfls("trajectory", study, "-o", output, "--force").exit_code == 0
+    cpfls.done("trajectory", study, "-o", output, "--force")
     assert output.stat().st_mode & 0o777 == 0o600
 
 
@@ -166,6 +166,6 @@ def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
     flight = tmp_path / os.fsdecode(b"fl\xffight.h5")
     flight.write_bytes(pipeline.flight.read_bytes())
     output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
-    assert cpfls("reduce", study, flight, "-o", output).exit_code == 0
+    cpfls.done("reduce", study, flight, "-o", output)
     assert json.loads(cpfls("info", output, "--json").stdout)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
-    assert cpfls("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html")).exit_code == 0
+    cpfls.done("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html"))

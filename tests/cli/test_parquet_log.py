@@ -41,8 +41,7 @@ def write(tmp_path):
 def flown(cpfls, log_study, write, tmp_path):
     def call(columns, *words, **options):
         flight = tmp_path / "flight.h5"
-        result = cpfls("import", log_study, write(columns, **options), "-o", flight, "--json", *words)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("import", log_study, write(columns, **options), "-o", flight, "--json", *words)
         with h5py.File(flight) as file:
             return json.loads(result.stdout), {name: file[name][()] for name in ("time", "attitude", "body_torque")}
 
@@ -105,8 +104,7 @@ def test_null_stamps_are_dropped(flown):
 def test_a_dot_in_a_name_is_part_of_it(cpfls, log_study, write, tmp_path):
     log = write({"t": TIME, "a.roll": COLUMNS["roll"], "a.other": COLUMNS["my"]} | COLUMNS)
     log_study.write_text(log_study.read_text().replace("[roll,", "[a.roll,"))
-    result = cpfls("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
 
 
 def test_columns_that_hold_no_numbers_are_named(wrong, write):

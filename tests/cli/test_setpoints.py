@@ -49,8 +49,7 @@ def flown(tmp_path):
 def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
     config, log, columns = flown
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", config, log, "-o", flight)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("import", config, log, "-o", flight)
     words = " ".join(result.stdout.split())
     assert "Setpoints attitude, thrust (at 160 of 300 samples)" in words
     with h5py.File(flight) as file:
@@ -68,7 +67,7 @@ def test_readers_of_flights_give_what_is_known_throughout(cpfls, flown, tmp_path
     path = log
     if imported:
         path = tmp_path / "flight.h5"
-        assert cpfls("import", config, log, "-o", path).exit_code == 0
+        cpfls.done("import", config, log, "-o", path)
     study = load_study(config)
     (played,) = flights_to_play([path], study)
     recording = read_flights([path], study).recordings[0]
@@ -83,7 +82,7 @@ def test_a_flight_without_them_has_none(cpfls, flown, tmp_path):
     flight = tmp_path / "flight.h5"
     without = [line for line in config.read_text().splitlines() if "setpoint_" not in line]
     config.write_text("\n".join(without))
-    assert cpfls("import", config, log, "-o", flight).exit_code == 0
+    cpfls.done("import", config, log, "-o", flight)
     (played,) = flights_to_play([flight], load_study(config))
     assert played.playback.setpoints == {}
 
@@ -105,8 +104,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
     }
     log, config, made = tmp_path / "log.ulg", tmp_path / "study.yaml", tmp_path / "flight.h5"
     log.write_bytes(ulog_of_flight(own, asked=asked))
-    said = cpfls("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
-    assert said.exit_code == 0, said.stderr
+    cpfls.done("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
     assert "the attitude follows it" in " ".join(config.read_text().replace("#", "").split())
     signals = yaml.safe_load(config.read_text())["import"]["signals"]
     assert signals["setpoint_thrust"] == {
@@ -115,9 +113,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
         "sign": [-1],
         "required": False,
     }
-    result = cpfls("import", config, log, "-o", made, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
+    summary = cpfls.told("import", config, log, "-o", made)
     samples = summary["samples"]
     assert summary["setpoints"] == {"position": samples, "attitude": samples, "thrust": samples}
     with h5py.File(made) as file:

@@ -112,7 +112,7 @@ def test_what_the_folder_holds(cpfls, told):
     assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
     summary = json.loads((told.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
-    assert cpfls("check", told.out / "trend.h5").exit_code == 0
+    cpfls.done("check", told.out / "trend.h5")
     assert "Since log11.csv" in cpfls("info", told.out / "trend.h5").stdout
 
 

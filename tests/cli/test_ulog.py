@@ -83,8 +83,7 @@ def write(tmp_path):
 def flown(cpfls, config, write, tmp_path):
     def call(content, *words):
         flight = tmp_path / "flight.h5"
-        result = cpfls("import", config, write(content), "-o", flight, "--json", "-v", *words)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("import", config, write(content), "-o", flight, "--json", "-v", *words)
         with h5py.File(flight) as file:
             signals = {name: file[name][()] for name in ("time", "attitude", "body_rate", "body_torque")}
         return json.loads(result.stdout), signals, result.stderr
@@ -239,8 +238,7 @@ def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_pa
         sent.append((stamp, 2, control))
     log, flight = write(ulog(sorted(sent, key=lambda row: row[:2]), fields)), tmp_path / "flight.h5"
     words = ["--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
-    result = cpfls("import", EXAMPLE, log, "-o", flight, *words)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("import", EXAMPLE, log, "-o", flight, *words)
     with h5py.File(flight) as file:
         torque = file["body_torque"][()]
         assert "position" not in file
@@ -307,8 +305,7 @@ VERSIONS = {
 def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version):
     flight = tmp_path / "flight.h5"
     words = ["-v", "--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
-    result = cpfls("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
     told = " ".join(result.stderr.split())
     for signal, column in zip(("body_rate", "rotor_command"), VERSIONS[version], strict=True):
         assert (f"{signal} is taken from {column}" in told) == (column is not None)
