@@ -197,7 +197,7 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
     header = read(compared, Disagreement)[1]
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
-    told = json.loads(cpfls("info", compared, "--json").stdout)
+    told = cpfls.told("info", compared)
     assert told["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     with undrawn():

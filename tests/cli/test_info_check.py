@@ -55,7 +55,7 @@ def test_check_finds_nothing_in_what_the_program_writes(cpfls, pipeline, stage):
 @pytest.mark.parametrize("stage", STAGES)
 def test_info_tells_origin_and_content(cpfls, pipeline, stage):
     path = pipeline.paths[stage]
-    summary = json.loads(cpfls("info", path, "--json").stdout)
+    summary = cpfls.told("info", path)
     assert (summary["format"], summary["seed"]) == (format_of(stage), 1)
     assert summary["cpfls_version"] == cpfls_cli.__version__
     lines = cpfls("info", path, "-v").stdout
@@ -93,7 +93,7 @@ def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     ],
 )
 def test_inputs_are_named_by_role_and_hash(cpfls, pipeline, stage, roles):
-    inputs = json.loads(cpfls("info", pipeline.paths[stage], "--json").stdout)["inputs"]
+    inputs = cpfls.told("info", pipeline.paths[stage])["inputs"]
     assert inputs == {
         role: {
             "name": f"{source}.h5",

@@ -1,6 +1,5 @@
 """`cpfls look` on logs of each autopilot, from the command line to what a person reads."""
 
-import json
 import re
 
 import numpy as np
@@ -128,7 +127,7 @@ def test_where_all_are_refused_nothing_is_written(refuse, logs, tmp_path):
 
 def test_page_and_json_have_the_answer(cpfls, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = json.loads(cpfls("look", logs / "px4 log.ulg", "-o", "out", "--json").stdout)
+    told = cpfls.told("look", logs / "px4 log.ulg", "-o", "out")
     assert [own["question"] for own in told["answers"]][-1] == "inertia, drag, what a model misses"
     assert told["next_steps"][-1]["command"].startswith("cpfls init 'px4 log.ulg' ")
     shown = (tmp_path / "out" / "px4 log.html").read_text()

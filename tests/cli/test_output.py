@@ -1,6 +1,5 @@
 """Where results go: nothing is replaced, half written or written in a dry run unless it was asked for."""
 
-import json
 import os
 import subprocess
 import sys
@@ -167,5 +166,5 @@ def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
     flight.write_bytes(pipeline.flight.read_bytes())
     output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
     cpfls.done("reduce", study, flight, "-o", output)
-    assert json.loads(cpfls("info", output, "--json").stdout)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
+    assert cpfls.told("info", output)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
     cpfls.done("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html"))

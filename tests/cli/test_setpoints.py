@@ -1,7 +1,5 @@
 """What was asked of an autopilot, from the log to the flight, its page and its playback."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -57,7 +55,7 @@ def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
         assert "setpoint_position" not in file
         assert np.isnan(file["setpoint_thrust"][:140]).all()
         assert len(file["time"]) == SAMPLES
-    summary = json.loads(cpfls("import", config, log, "-o", flight, "--force", "--json").stdout)
+    summary = cpfls.told("import", config, log, "-o", flight, "--force")
     assert summary["setpoints"] == {"attitude": 300, "thrust": 160}
 
 

@@ -256,7 +256,7 @@ def looked(cpfls, tmp_path, monkeypatch):
 
 
 def test_info_check_and_report_know_results(cpfls, looked):
-    told = json.loads(cpfls("info", looked, "--json").stdout)
+    told = cpfls.told("info", looked)
     assert (told["format"], told["result"]["name"]) == ("cpfls/look", "log.csv")
     said = cpfls("info", looked, "-v").stdout
     assert "log.csv (sha256 " in said

@@ -167,7 +167,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     assert f"what was read is kept in {tmp_path / 'trend' / 'flights'}" in stopped.stderr
     monkeypatch.setattr(command, "kept_numbers", kept_numbers)
     with undrawn():
-        assert json.loads(cpfls(*words, "-o", tmp_path / "trend", "--json").stdout)["new"] == 3
+        assert cpfls.told(*words, "-o", tmp_path / "trend")["new"] == 3
 
 
 @pytest.mark.parametrize(

@@ -371,7 +371,7 @@ def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehic
 
 
 def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
-    told = json.loads(cpfls("info", gusty, "--json").stdout)["gusts"]
+    told = cpfls.told("info", gusty)["gusts"]
     assert told["torque_n_m"] == [0.02, 0.03, 0.01]
     assert told["force_memory_s"] == [1.0, 1.0, 1.0]
     cpfls.done("export", gusty, "-o", folder / "gusty.json")

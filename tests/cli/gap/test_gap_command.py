@@ -116,7 +116,7 @@ def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
 
 @pytest.mark.usefixtures("undrawn")
 def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
-    summary = json.loads(cpfls("gap", gap_config, shifted[0], "-o", tmp_path / "x", "--json").stdout)
+    summary = cpfls.told("gap", gap_config, shifted[0], "-o", tmp_path / "x")
     assert summary["split"].endswith("flight_1.csv (last third)")
     with h5py.File(tmp_path / "x" / "diagnosis.h5") as file:
         assert len(file["recorded/flight-1/time"]) == 1600
