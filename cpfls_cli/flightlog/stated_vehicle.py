@@ -237,7 +237,7 @@ def _nearly(first: str, other: str) -> bool:
 
 
 FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 50 ms.
-# Below which they are logged too slowly for what they drive to be distinguished from what drives them: two samples in the 50 ms
+# Below which they are logged too slowly for cause and effect to be distinguished: two samples in the 50 ms
 # within which they follow, and a half.
 SLOW_HZ = 25.0
 _DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
