@@ -113,9 +113,9 @@ def cut_offs(signals: Mapping[str, Array], rate_hz: float, slow: tuple[SlowSigna
     """Find the cut-off, Hz, of the low-pass filter that a signal, uniform in time, went through before it was logged.
 
     Its spectrum falls off a cliff there: within an octave by 30 dB more than its trend of the octave before. A filter
-    of low order falls too gently to be seen against motion, and one below 8 Hz from motion that ends there. It is where
-    the amplitude is halved, median over the columns that show it; left out are signals where most columns do not, and
-    `slow` ones: straight lines between updates have a spectrum of their own.
+    of low order falls too gently to be distinguished from motion, and one below 8 Hz looks like motion that ends. The
+    cut-off is where the amplitude is halved, median over the columns that show it; left out are signals where most
+    columns do not, and `slow` ones: straight lines between updates have a spectrum of their own.
     """
     left_out = _NOT_JUDGED | {signal.name for signal in slow}
     found = {}
