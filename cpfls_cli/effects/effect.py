@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.effects.hooks import Actuation, CarriedBody, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
+from cpfls_cli.effects.hooks import Actuation, Body, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 Kind = Literal["wrench", "actuator", "sensor", "parameter"]
@@ -180,9 +181,13 @@ class Effect:
         Whether the columns have a lever for the forces of all other effects.
     actuation : Actuation or None
         For effects between command and rotors: how they are simulated.
-    carried : callable or None
-        For effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of the
-        columns.
+    acts : callable or None
+        ``acts(see, p) -> Wrench`` at an instant, of its numbers by name: what is simulated. None for what changes only
+        the log or the actuators, or has a state of its own.
+    air : callable or None
+        ``air(values)``: velocity of the air that all effects meet, m/s, world frame.
+    carried : Body or None
+        For effects with a state of their own, in place of `acts`.
     log : SensorLog or None
         For effects on the log: how they are simulated.
     test : SensorTest or None
@@ -222,7 +227,9 @@ class Effect:
     order: int = 1000
     of_all_forces: bool = False
     actuation: Actuation | None = None
-    carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
+    acts: Callable[[Instant, Numbers], Wrench] | None = None
+    air: Callable[[Mapping[str, float]], tuple[float, float, float]] | None = None
+    carried: Body | None = None
     log: SensorLog | None = None
     test: SensorTest | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None

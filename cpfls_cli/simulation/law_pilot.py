@@ -13,7 +13,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.law import Controller, Law, attitude_error
 from cpfls_cli.autopilots.motors import Motors
-from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE
+from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE
+from cpfls_cli.vehicle.stepping import Flat
 
 
 @dataclass(frozen=True)
@@ -58,36 +59,36 @@ class LawPilot:
         From steps of the integration done so far and the state to what is asked.
     every : int
         Steps of the integration for one of the law.
-    held : array, shape (2, rotor)
-        Commanded speeds in rad/s, and demanded squared speeds in rad^2/s^2, until the next step of the law.
+    held : tuple of float
+        Commanded speeds in rad/s, then demanded squared speeds in rad^2/s^2, until the next step of the law.
     injected : array, shape (step, 3), or None
         Added to the commands about the body axes, shares of the full ones, to measure the loop.
     """
 
     controller: Controller
     motors: Motors
-    asked: Callable[[int, Array], Asked]
+    asked: Callable[[int, Flat], Asked]
     every: int
-    held: Array
-    coming: Array
+    held: Flat
+    coming: Flat
     noise: GyroscopeNoise | None = None
     injected: Array | None = None
     saturated: BoolArray | None = None
 
-    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:  # noqa: ARG002
+    def command(self, number: int, start: Flat) -> Flat:
         """Command a step: what the law computed a step of its own ago."""
         if number % self.every == 0:
             self.held = self.coming
-            self.coming = self._computed(number, start)
-        return self.held[0], self.held[1]
+            self.coming = tuple(self._computed(number, start).ravel().tolist())
+        return self.held
 
-    def _computed(self, number: int, state: Array) -> Array:
-        asked, gyroscope = self.asked(number, state), state[BODY_RATE]
+    def _computed(self, number: int, state: Flat) -> Array:
+        asked, gyroscope = self.asked(number, state), np.array(state[BODY_RATE])
         if self.noise is not None:
             gyroscope = gyroscope + self.noise.std * self.noise.rng.standard_normal(3)
         rate = asked.body_rate
         if asked.attitude is not None:
-            rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
+            rotation = rotations.rotation_matrix(np.array([state[ATTITUDE]]))[0]
             rate = rate + self.controller.asked_rate(attitude_error(rotation, asked.attitude), gyroscope)
         turning = self.controller.command(rate, gyroscope, self.saturated)
         if self.injected is not None:
@@ -102,7 +103,7 @@ class LawPilot:
 def law_pilot(
     law: Law,
     motors: Motors,
-    asked: Callable[[int, Array], Asked],
+    asked: Callable[[int, Flat], Asked],
     step: float,
     speed: Array,
     noise: GyroscopeNoise | None = None,
@@ -118,7 +119,7 @@ def law_pilot(
         Of the rotors until the first command acts.
     """
     every = max(round(law.period / step), 1)
-    held = np.array([speed, speed**2])
+    held = (*speed.tolist(), *(speed**2).tolist())
     return LawPilot(Controller(law, every * step), motors, asked, every, held, held, noise, injected)
 
 

@@ -10,6 +10,9 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, a_few_percent
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.values import cross as cross_product
+from cpfls_cli.vehicle.values import scaled
 
 _AXES = np.eye(3)[None]
 
@@ -18,6 +21,10 @@ def _levers(signals: Signals, axes: int) -> Columns:
     direct = np.zeros((len(signals), 6, axes))
     direct[:, :3] = -cross(_AXES[:, :axes], signals.force[:, None]).swapaxes(1, 2)
     return Columns(direct)
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(scaled(-1, cross_product(tuple(p[f"c_{axis}"] for axis in "xyz"), see.force)))
 
 
 _EFFECT = Effect(
@@ -42,6 +49,7 @@ _EFFECT = Effect(
     columns=lambda signals, _shape: _levers(signals, 2),
     of_all_forces=True,
     accounts=a_few_percent,
+    acts=_acts,
 )
 
 # Height alone is the moment of a flapping disc; beside the other two it is the third number of one cause.

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(at_hubs=(0, 0, -p["k_z"] * (see.rotor_speed * see.hub_velocity[2])))
+
 
 EFFECT = Effect(
     name="inflow",
@@ -31,4 +37,5 @@ EFFECT = Effect(
     },
     source="RotorPy multirotor.py (k_z of the rotor drag matrix); PX4 data-driven-dynamics rotor_model.py",
     columns=lambda signals, _: thrust_column(signals, -signals.speed * signals.hub_velocity[..., 2]),
+    acts=_acts,
 )

@@ -8,9 +8,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.catalogue.vertical_descent import induced_velocity
+from cpfls_cli.effects.catalogue.vertical_descent import induced, induced_velocity
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -31,6 +32,16 @@ def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
     """Tell whether the lost lift can have the moment: it acts within the arms."""
     largest = scales.arm(vehicle) * max(float((linear + 2 * error)[0]), 0.0)
     return np.array([True, *(np.abs(linear[1:]) - 2 * error[1:] <= largest)])
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    x, y, _ = see.air_velocity
+    square, rotors = x**2 + y**2, len(see.vehicle.rotors)
+    down = see.functions.total(induced(see)) / rotors
+    whole = see.functions.sqrt(square + down**2)
+    share = see.functions.sqrt(square) / whole
+    moment = (p["c_M"] + p["c_B"] * share) * see.thrust / whole
+    return Wrench((moment * y, -moment * x, 0), (0, 0, -p["c_F"] * see.thrust * share))
 
 
 EFFECT = Effect(
@@ -59,4 +70,5 @@ EFFECT = Effect(
     source="skewed wake of momentum theory (Leishman, Principles of Helicopter Aerodynamics, section 3.5)",
     columns=_columns,
     lever=_lever,
+    acts=_acts,
 )

@@ -11,7 +11,10 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Columns, Effect, of_axes
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import cross as cross_product
+from cpfls_cli.vehicle.values import dot, scaled
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
@@ -36,6 +39,14 @@ def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
     return possible
 
 
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    drag = scaled(-see.functions.sqrt(dot(see.air_velocity, see.air_velocity)), see.air_velocity)
+    lever = tuple(p[f"cr_{axis}"] for axis in "xyz")
+    return Wrench(
+        cross_product(lever, drag), tuple(p[f"c_{axis}"] * each for axis, each in zip("xyz", drag, strict=True))
+    )
+
+
 EFFECT = Effect(
     name="parasitic_drag",
     order=90,
@@ -55,4 +66,5 @@ EFFECT = Effect(
     source="RotorPy multirotor.py (c_Dx, c_Dy, c_Dz); AirSim (drag of each face)",
     columns=_columns,
     lever=_lever,
+    acts=_acts,
 )

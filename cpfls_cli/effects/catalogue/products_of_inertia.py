@@ -10,6 +10,8 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric, symmetric_columns
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.values import apply, cross, scaled
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
@@ -17,6 +19,12 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     none = np.zeros_like(turned)
     gyroscopic = np.cross(signals.body_rate[:, :, None], turned, axis=1)
     return Columns(np.concatenate([-gyroscopic, none], axis=1), np.concatenate([-turned, none], axis=1))
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    xy, xz, yz = (p[name] for name in INERTIA_PARAMETERS[3:])
+    turned = scaled(-1, apply(((0, xy, xz), (xy, 0, yz), (xz, yz, 0)), see.body_rate))
+    return Wrench(cross(see.body_rate, turned), momentum=turned)
 
 
 EFFECT = Effect(
@@ -41,4 +49,5 @@ EFFECT = Effect(
     columns=_columns,
     rate_derivative=True,
     in_vehicle=lambda parts, _, linear: parts._replace(inertia=parts.inertia + symmetric([0.0, 0.0, 0.0, *linear])),
+    acts=_acts,
 )

@@ -6,6 +6,13 @@ import numpy as np
 
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect, of_axes, torque_by_axis
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    braked = ((p[f"d_{axis}"], rate) for axis, rate in zip("xyz", see.body_rate, strict=True))
+    return Wrench(tuple(-damping * see.functions.absolute(rate) * rate for damping, rate in braked))
+
 
 EFFECT = Effect(
     name="quadratic_damping",
@@ -23,4 +30,5 @@ EFFECT = Effect(
     },
     source="OS4 dinamica.m (friction torque of the body); flat-plate estimate",
     columns=lambda signals, _: torque_by_axis(-(np.abs(signals.body_rate) * signals.body_rate)),
+    acts=_acts,
 )

@@ -9,12 +9,17 @@ import numpy as np
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     momentum = np.zeros((len(signals), 6, 1))
     momentum[:, 2, 0] = -(signals.speed @ signals.spins)
     return Columns(np.zeros_like(momentum), momentum)
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(momentum=(0, 0, -p["J_r"] * see.functions.total(see.spins * see.rotor_speed)))
 
 
 EFFECT = Effect(
@@ -34,4 +39,5 @@ EFFECT = Effect(
     },
     source="Bouabdallah 2007, OS4 (inertial counter torque)",
     columns=_columns,
+    acts=_acts,
 )

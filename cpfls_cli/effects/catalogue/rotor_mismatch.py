@@ -9,7 +9,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench, wrench
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import times
 
 # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
 _SAME_PLACE = 1e-6
@@ -122,6 +124,17 @@ def _accounts(_number: str, values: Mapping[str, float]) -> float:
     return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
 
 
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    functions, drag = see.functions, see.rotor_drag
+    differences = [p["difference_1"], p["difference_2"]]
+    gain = functions.rotors(sum(map(times, differences, mode)) for mode in gain_modes(see.vehicle).tolist())
+    # A propeller that pulls less drags less.
+    yaw = functions.total(drag * (p["drag_imbalance"] - see.spins * gain))
+    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
+    lift = p["lift_imbalance"] * functions.total(see.spins * see.rotor_thrust)
+    return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
+
+
 EFFECT = Effect(
     name="rotor_mismatch",
     order=200,
@@ -160,4 +173,5 @@ EFFECT = Effect(
     columns=_columns,
     describe=_describe,
     accounts=_accounts,
+    acts=_acts,
 )

@@ -10,7 +10,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, a_few_percent, thrust_wrench
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import Value
 
 # kg/m^3, at sea level and 15 degrees.
 _AIR_DENSITY = 1.225
@@ -109,6 +111,26 @@ def _describe(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     return f"Strongest in the state called {descent_state(ratio)}: {size} at {ratio:g} times the induced velocity."
 
 
+def induced(see: Instant) -> Value:
+    """Compute what `induced_velocity` does, by rotor."""
+    thrust = scales.hover_speed(see.vehicle) ** 2 * see.thrust_factors
+    return see.functions.sqrt(thrust / (2 * _AIR_DENSITY * np.pi * see.radii**2))
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    functions, still = see.functions, 1 / induced(see)
+    x, y, z = (each * still for each in see.hub_velocity)
+    ratio, gains = -z, [0, *(p[_name(knot)] for knot in _KNOTS[1:])]
+    gain = gains[-1]
+    for first in range(len(_KNOTS) - 2, -1, -1):
+        slope = (gains[first + 1] - gains[first]) / (_KNOTS[first + 1] - _KNOTS[first])
+        line = gains[first] + slope * (ratio - _KNOTS[first])
+        gain = functions.where(ratio < _KNOTS[first + 1], line, gain)
+    gain = functions.where(ratio > 0.0, gain, 0.0)
+    gate = functions.exp(-(p["sideways"] ** -2) * (x**2 + y**2))
+    return Wrench(at_hubs=(0, 0, see.rotor_thrust * gate * gain))
+
+
 EFFECT = Effect(
     name="vertical_descent",
     order=110,
@@ -132,4 +154,5 @@ EFFECT = Effect(
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
     describe=_describe,
+    acts=_acts,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.catalogue.rotor_drag import EFFECT as ROTOR_DRAG
-from cpfls_cli.effects.catalogue.rotor_drag import IN_PLANE, drag
+from cpfls_cli.effects.catalogue.rotor_drag import IN_PLANE, drag, drag_at_hubs
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, hub_wrench, stack
 from cpfls_cli.effects.hooks import PhysicalNumbers, VehicleParts
 from cpfls_cli.effects.signals import Signals
@@ -78,6 +78,8 @@ _EXACT = replace(
     shapes=tuple(Shape(each.name, each.unit, (each.low, 0.0, each.high), each.meaning) for each in _WIND),
     columns=lambda signals, shape: drag(_blowing(signals, shape), shape),
     physical=None,
+    acts=drag_at_hubs,
+    air=lambda values: (values["W_x"], values["W_y"], 0.0),
     apply=_blowing,
     in_vehicle=_in_vehicle,
 )

@@ -1,0 +1,253 @@
+"""Symbols that record what is computed with them, and write it as a function of plain Python.
+
+What is computed twice is computed once, what no result needs is left out, and numbers that are known are folded in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+from cpfls_cli.vehicle.values import Each, Value, plus
+
+_LONGEST = 160
+"""Characters of an expression, beyond which it gets a line of its own."""
+_OPERATORS = ("+", "-", "*", "/", "<", ">", "**")
+_FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "sin": math.sin,
+    "cos": math.cos,
+    "atan2": math.atan2,
+    "floor": math.floor,
+    "abs": abs,
+}
+
+
+class Graph:
+    """Operations in the order in which they were made, each with its arguments by their places."""
+
+    def __init__(self) -> None:
+        self.nodes: list[tuple[Any, ...]] = []
+        self._places: dict[tuple[Any, ...], int] = {}
+
+    def node(self, *operation: Any) -> Symbol:
+        """Record an operation, or find it."""
+        place = self._places.setdefault(operation, len(self.nodes))
+        if place == len(self.nodes):
+            self.nodes.append(operation)
+        return Symbol(self, place)
+
+    def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
+        """Make arguments of the function that is traced."""
+        return tuple(self.node("input", f"{name}{index}") for index in range(count))
+
+
+class Symbol:
+    """A number that is not known yet."""
+
+    __slots__ = ("graph", "place")
+    __array_ufunc__ = None
+
+    def __init__(self, graph: Graph, place: int) -> None:
+        self.graph, self.place = graph, place
+
+    def made(self, name: str, *arguments: Value) -> Symbol:
+        """Record an operation on numbers."""
+        places = (x.place if isinstance(x, Symbol) else self.graph.node("number", float(x)).place for x in arguments)
+        return self.graph.node(name, *places)
+
+    def _by(self, name: str, a: Value, b: Value) -> Value:
+        other = a if b is self else b
+        if isinstance(other, Each):
+            return NotImplemented
+        if isinstance(other, (int, float)):
+            if (name in "+-" and other == 0 and b is other) or (name in "*/" and other == 1 and b is other):
+                return self
+            if (name == "+" and other == 0) or (name == "*" and other == 1):
+                return self
+            if other == 0 and (name == "*" or (name == "/" and a is other)):
+                return 0
+        return self.made(name, a, b)
+
+    def __add__(self, other: Value) -> Value:
+        return self._by("+", self, other)
+
+    def __radd__(self, other: Value) -> Value:
+        return self._by("+", other, self)
+
+    def __sub__(self, other: Value) -> Value:
+        return self._by("-", self, other)
+
+    def __rsub__(self, other: Value) -> Value:
+        return self._by("-", other, self)
+
+    def __mul__(self, other: Value) -> Value:
+        return self._by("*", self, other)
+
+    def __rmul__(self, other: Value) -> Value:
+        return self._by("*", other, self)
+
+    def __truediv__(self, other: Value) -> Value:
+        return self._by("/", self, other)
+
+    def __rtruediv__(self, other: Value) -> Value:
+        return self._by("/", other, self)
+
+    def __lt__(self, other: Value) -> Value:
+        return self._by("<", self, other)
+
+    def __gt__(self, other: Value) -> Value:
+        return self._by(">", self, other)
+
+    def __neg__(self) -> Symbol:
+        return self.made("negative", self)
+
+    def __pow__(self, power: float) -> Value:
+        if power in (2, 3):
+            return self * self if power == 2 else self * self * self
+        return self.made("**", self, power)
+
+
+class SymbolFunctions:
+    """Functions of symbols; of floats they give floats."""
+
+    def sqrt(self, x: Value) -> Value:
+        """Take the square root."""
+        return _called("sqrt", x)
+
+    def exp(self, x: Value) -> Value:
+        """Take the exponential function."""
+        return _called("exp", x)
+
+    def sin(self, x: Value) -> Value:
+        """Take the sine."""
+        return _called("sin", x)
+
+    def cos(self, x: Value) -> Value:
+        """Take the cosine."""
+        return _called("cos", x)
+
+    def arctan2(self, y: Value, x: Value) -> Value:
+        """Give the angle of a direction, rad."""
+        return _called("atan2", y, x)
+
+    def floor(self, x: Value) -> Value:
+        """Round down."""
+        return _called("floor", x)
+
+    def absolute(self, x: Value) -> Value:
+        """Leave out the sign."""
+        return _called("abs", x)
+
+    def where(self, condition: Value, yes: Value, no: Value) -> Value:
+        """Choose by a comparison."""
+        if isinstance(condition, Each):
+            ends = [one.values if isinstance(one, Each) else (one,) * len(condition.values) for one in (yes, no)]
+            return Each(map(self.where, condition.values, *ends))
+        if not isinstance(condition, Symbol):
+            return yes if condition else no
+        if isinstance(yes, Each) or isinstance(no, Each):
+            count = len(yes.values if isinstance(yes, Each) else no.values)
+            return self.where(Each((condition,) * count), yes, no)
+        return condition.made("where", condition, yes, no)
+
+    def largest(self, a: Value, b: Value) -> Value:
+        """Give the larger of two."""
+        return self.where(a > b, a, b)
+
+    def smallest(self, a: Value, b: Value) -> Value:
+        """Give the smaller of two."""
+        return self.where(a < b, a, b)
+
+    def rotors(self, values: Iterable[Value]) -> Each:
+        """Make one value for each rotor."""
+        return Each(values)
+
+    def total(self, x: Value) -> Value:
+        """Sum over the rotors."""
+        return plus(*x.values) if isinstance(x, Each) else x
+
+
+SYMBOLS = SymbolFunctions()
+
+
+def _called(name: str, *arguments: Value) -> Value:
+    if isinstance(arguments[0], Each):
+        return Each(_called(name, one, *arguments[1:]) for one in arguments[0])
+    for argument in arguments:
+        if isinstance(argument, Symbol):
+            return argument.made(name, *arguments)
+    return _FUNCTIONS[name](*arguments)
+
+
+def traced(
+    graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]
+) -> Callable[..., Any]:
+    """Make a function of what was recorded.
+
+    Parameters
+    ----------
+    arguments : mapping of str to sequence of Symbol
+        Inputs by the name of the argument that holds them as a tuple.
+    results : sequence of sequence of value
+        What it gives: a tuple of tuples.
+    """
+    return _compiled(python_source(graph, arguments, results))
+
+
+@lru_cache(maxsize=32)
+def _compiled(source: str) -> Callable[..., Any]:
+    names: dict[str, Any] = dict(_FUNCTIONS)
+    exec(compile(source, "<traced>", "exec"), names)
+    return names["step"]  # type: ignore[no-any-return]
+
+
+def python_source(graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]) -> str:
+    """Write what `traced` makes as text: a function called ``step``."""
+    uses = _uses(graph, [x.place for group in results for x in group if isinstance(x, Symbol)])
+    text: dict[int, str] = {}
+    lines = []
+    for place, (name, *inner) in enumerate(graph.nodes):
+        if not uses[place]:
+            continue
+        if name in ("input", "number"):
+            text[place] = inner[0] if name == "input" else f"({inner[0]!r})"
+            continue
+        text[place] = _expression(name, [text[each] for each in inner])
+        if uses[place] > 1 or len(text[place]) > _LONGEST:
+            lines.append(f"t{place} = {text[place]}")
+            text[place] = f"t{place}"
+    named = {name: [graph.nodes[x.place][1] for x in group] for name, group in arguments.items()}
+    unpacked = [f"{', '.join(names)}, = {name}" for name, names in named.items() if names]
+    groups = (_tuple(text[x.place] if isinstance(x, Symbol) else repr(float(x)) for x in group) for group in results)
+    body = "\n    ".join([*unpacked, *lines, f"return {_tuple(groups)}"])
+    return f"def step({', '.join(arguments)}):\n    {body}\n"
+
+
+def _expression(name: str, arguments: Sequence[str]) -> str:
+    if name in _OPERATORS:
+        return f"({arguments[0]} {name} {arguments[1]})"
+    if name == "negative":
+        return f"(-{arguments[0]})"
+    if name == "where":
+        return f"({arguments[1]} if {arguments[0]} else {arguments[2]})"
+    return f"{name}({', '.join(arguments)})"
+
+
+def _tuple(items: Iterable[str]) -> str:
+    return f"({''.join(f'{item}, ' for item in items)})"
+
+
+def _uses(graph: Graph, results: Sequence[int]) -> list[int]:
+    """Count how often each operation is needed for the results."""
+    uses = [0] * len(graph.nodes)
+    waiting = [*results]
+    while waiting:
+        place = waiting.pop()
+        uses[place] += 1
+        if uses[place] == 1 and graph.nodes[place][0] not in ("input", "number"):
+            waiting.extend(graph.nodes[place][1:])
+    return uses

@@ -1,0 +1,182 @@
+"""Numbers that the vehicle is written in: floats and the symbols of `tracing`, alone, as vectors, and one a rotor.
+
+Vectors are tuples of components. What is always 0 is a plain 0, takes no part in sums and products, and costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Protocol
+
+Value = Any
+"""A float, a `tracing.Symbol`, or `Each`."""
+Vector = tuple[Value, ...]
+"""Components along x, y, z, or as many as a state has."""
+
+ZERO: Vector = (0, 0, 0)
+
+
+class Functions(Protocol):
+    """Functions of one kind of numbers."""
+
+    def sqrt(self, x: Value) -> Value:
+        """Take the square root."""
+        ...
+
+    def exp(self, x: Value) -> Value:
+        """Take the exponential function."""
+        ...
+
+    def sin(self, x: Value) -> Value:
+        """Take the sine."""
+        ...
+
+    def cos(self, x: Value) -> Value:
+        """Take the cosine."""
+        ...
+
+    def arctan2(self, y: Value, x: Value) -> Value:
+        """Give the angle of a direction, rad."""
+        ...
+
+    def floor(self, x: Value) -> Value:
+        """Round down."""
+        ...
+
+    def absolute(self, x: Value) -> Value:
+        """Leave out the sign."""
+        ...
+
+    def where(self, condition: Value, yes: Value, no: Value) -> Value:
+        """Choose by a comparison."""
+        ...
+
+    def largest(self, a: Value, b: Value) -> Value:
+        """Give the larger of two."""
+        ...
+
+    def smallest(self, a: Value, b: Value) -> Value:
+        """Give the smaller of two."""
+        ...
+
+    def rotors(self, values: Iterable[Value]) -> Value:
+        """Make one value for each rotor."""
+        ...
+
+    def total(self, x: Value) -> Value:
+        """Sum over the rotors."""
+        ...
+
+
+class Each:
+    """One value for each rotor."""
+
+    __slots__ = ("values",)
+    __array_ufunc__ = None
+
+    def __init__(self, values: Iterable[Value]) -> None:
+        self.values = tuple(values)
+
+    def __iter__(self) -> Iterator[Value]:
+        return iter(self.values)
+
+    def by(self, other: Value, operation: Callable[[Value, Value], Value]) -> Each:
+        """Apply an operation with one value, or with that of each rotor."""
+        others = other.values if isinstance(other, Each) else (other,) * len(self.values)
+        return Each(map(operation, self.values, others))
+
+    def __add__(self, other: Value) -> Each:
+        return self.by(other, plus)
+
+    def __sub__(self, other: Value) -> Each:
+        return self.by(other, minus)
+
+    def __rsub__(self, other: Value) -> Each:
+        return self.by(other, lambda a, b: minus(b, a))
+
+    def __mul__(self, other: Value) -> Each:
+        return self.by(other, times)
+
+    def __truediv__(self, other: Value) -> Each:
+        return self.by(other, lambda a, b: 0 if zero(a) else a / b)
+
+    def __rtruediv__(self, other: Value) -> Each:
+        return self.by(other, lambda a, b: 0 if zero(b) else b / a)
+
+    def __neg__(self) -> Each:
+        return Each(minus(0, x) for x in self.values)
+
+    def __pow__(self, power: float) -> Each:
+        return Each(0 if zero(x) else x**power for x in self.values)
+
+    def __gt__(self, other: Value) -> Each:
+        return self.by(other, lambda a, b: a > b)
+
+    def __lt__(self, other: Value) -> Each:
+        return self.by(other, lambda a, b: a < b)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def zero(x: Value) -> bool:
+    """Say whether a number is always 0."""
+    return isinstance(x, (int, float)) and x == 0
+
+
+def plus(*terms: Value) -> Value:
+    """Add numbers."""
+    total: Value = 0
+    for term in terms:
+        if not zero(term):
+            total = term if zero(total) else total + term
+    return total
+
+
+def minus(a: Value, b: Value) -> Value:
+    """Subtract the second number."""
+    return a if zero(b) else -b if zero(a) else a - b
+
+
+def times(a: Value, b: Value) -> Value:
+    """Multiply two numbers."""
+    return 0 if zero(a) or zero(b) else a * b
+
+
+def add(*vectors: Iterable[Value]) -> Vector:
+    """Add vectors."""
+    return tuple(plus(*terms) for terms in zip(*vectors, strict=True))
+
+
+def subtract(a: Iterable[Value], b: Iterable[Value]) -> Vector:
+    """Subtract the second vector."""
+    return tuple(map(minus, a, b))
+
+
+def scaled(factor: Value, vector: Iterable[Value]) -> Vector:
+    """Multiply a vector with a number."""
+    return tuple(times(factor, x) for x in vector)
+
+
+def dot(a: Iterable[Value], b: Iterable[Value]) -> Value:
+    """Multiply two vectors to a number."""
+    return plus(*map(times, a, b))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Multiply two vectors to the one across."""
+    (x, y, z), (p, q, r) = a, b
+    return (
+        minus(times(y, r), times(z, q)),
+        minus(times(z, p), times(x, r)),
+        minus(times(x, q), times(y, p)),
+    )
+
+
+def apply(rows: Iterable[Vector], vector: Vector) -> Vector:
+    """Multiply a matrix, given by rows, with a vector."""
+    return tuple(dot(row, vector) for row in rows)
+
+
+def transposed(rows: Iterable[Vector]) -> tuple[Vector, ...]:
+    """Exchange rows and columns."""
+    return tuple(zip(*rows, strict=True))
