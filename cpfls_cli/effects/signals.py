@@ -24,10 +24,6 @@ _OF_MOTION = (
     *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
 )
 """Cached properties that no rotor speed changes."""
-_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")
-"""Cached properties that no motion changes."""
-_OF_FORCE = ("force", "available", "of_motion", "made")
-"""What is kept of a flight and may hang on the force that is felt."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -275,28 +271,6 @@ class Signals:
         changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
         changed.__dict__["of_motion"] = self.of_motion
         return changed
-
-
-_FIELDS = tuple(each.name for each in fields(Signals))
-
-
-def at_another_instant(signals: Signals, channels: Mapping[str, Array]) -> Signals:
-    """Exchange channels of one instant; what follows from the vehicle alone is kept.
-
-    A simulation does so at each of its steps, where `replace` takes as long as all that is computed.
-    """
-    changed = object.__new__(Signals)
-    changed.__dict__.update({name: getattr(signals, name) for name in (*_FIELDS, *_OF_VEHICLE)}, **channels)
-    return changed
-
-
-def feeling(signals: Signals, specific_force: Array) -> Signals:
-    """Exchange the specific force, shape (time, 3), m/s^2, and keep all that does not follow from it."""
-    changed = object.__new__(Signals)
-    changed.__dict__.update(signals.__dict__, specific_force=specific_force)
-    for name in _OF_FORCE:
-        changed.__dict__.pop(name, None)
-    return changed
 
 
 def stretch_of(signals: Signals, part: slice) -> Signals:
