@@ -42,7 +42,7 @@ from cpfls_cli.vehicle.motion import (
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
 from cpfls_cli.vehicle.tracing import SYMBOLS, Symbol
-from cpfls_cli.vehicle.values import Each, Vector, add, scaled
+from cpfls_cli.vehicle.values import Each, Value, Vector, add, scaled
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.lack import DrawnLack
@@ -118,22 +118,29 @@ def between(middles: Array) -> Array:
 
 
 class Pilot(Protocol):
-    """What commands the rotors, step by step from outside of what is traced."""
+    """What commands the rotors: numbers that it gives to each step, and what the traced step makes of them."""
 
-    def command(self, number: int, start: Flat) -> Flat:
-        """Command a step.
+    def size(self, rotors: int) -> int:
+        """Count the numbers."""
+        ...
+
+    def given(self, number: int, start: Flat) -> Flat:
+        """Give the numbers of a step, by the steps done so far and the state at its start."""
+        ...
+
+    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
+        """Command the rotors.
 
         Parameters
         ----------
-        number : int
-            Steps done so far.
-        start : tuple of float
-            The state at the start of the step.
+        middle : vector
+            The state in the middle of the step.
 
         Returns
         -------
-        tuple of float
-            Commanded speed of each rotor, rad/s; then squared speeds asked for, possible or not, rad^2/s^2.
+        command : value by rotor, rad/s
+        demand : value by rotor, rad^2/s^2
+            Squared speeds asked for, possible or not.
         """
         ...
 
@@ -152,10 +159,18 @@ class PlanPilot:
     mixer: Mixer
     plan: list[Flat]
 
-    def mixed(self, planned: Vector, state: Vector) -> tuple[Each, Each]:
-        """Give commanded speeds and demanded squared speeds in a state."""
-        rotation = rotation_rows(state[ATTITUDE], SYMBOLS)
-        return self.mixer.mixed(self.autopilot.wrench(Planned.of(planned), state, rotation))
+    def size(self, _rotors: int) -> int:
+        """Count the numbers of a planned motion."""
+        return PLANNED
+
+    def given(self, number: int, _start: Flat) -> Flat:
+        """Give the planned motion."""
+        return self.plan[number + 1]
+
+    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
+        """Command the rotors."""
+        rotation = rotation_rows(middle[ATTITUDE], SYMBOLS)
+        return self.mixer.mixed(self.autopilot.wrench(Planned.of(given), middle, rotation))
 
 
 @dataclass
@@ -168,7 +183,6 @@ class Loop:
 
     Attributes
     ----------
-    pilot : PlanPilot or Pilot
     model : VehicleModel or None
     state, change : array, shape (state,)
         At the start, and its derivative.
@@ -178,7 +192,7 @@ class Loop:
         What acts beside it and the model lacks.
     """
 
-    pilot: PlanPilot | Pilot
+    pilot: Pilot
     actuators: Actuators
     vehicle: Vehicle
     model: VehicleModel | None
@@ -194,9 +208,8 @@ class Loop:
         pilot, push, lacking, step = self.pilot, self.push, self.lacking, self.clock.step
         columns = [each for each in (push, None if lacking is None else lacking.unit) if each is not None]
         rows = np.hstack(columns).tolist() if columns else [()] * self.clock.steps
-        plan, command = (pilot.plan, None) if isinstance(pilot, PlanPilot) else (None, pilot.command)
         sizes = {
-            "piloted": PLANNED if command is None else 2 * rotors,
+            "piloted": pilot.size(rotors),
             "push": 0 if push is None else 6,
             "unit": 0 if lacking is None else 6,
             "turning": 0 if turning is None else TURNING_NUMBERS,
@@ -205,7 +218,7 @@ class Loop:
 
         def given(number: int, machine: Machine) -> Flat:
             state = machine.kept[:states]
-            piloted = plan[number + 1] if plan is not None else command(number, state)
+            piloted = pilot.given(number, state)
             if turning is None:
                 return (*piloted, *rows[number])
             middle = [x + 0.5 * step * rate for x, rate in zip(state, machine.kept[states:], strict=False)]
@@ -223,11 +236,7 @@ class Loop:
         """Take a step: derivative; command, lagged command, logged speeds, voltage and demand in its middle."""
         state, change = memory.recall(self.state.tolist()), memory.recall(self.change.tolist())
         middle = add(state.values, scaled(0.5 * memory.step, change.values))
-        pilot, piloted = self.pilot, given["piloted"]
-        if isinstance(pilot, PlanPilot):
-            command, demand = pilot.mixed(piloted, middle)
-        else:
-            command, demand = Each(piloted[: len(piloted) // 2]), Each(piloted[len(piloted) // 2 :])
+        command, demand = self.pilot.commanded(given["piloted"], middle)
         rotors = self.actuators.rotors(command, memory)
         instant = self.vehicle.instant(middle, rotors.speed, rotors.acceleration, rotors.slow)
         push = given["push"] or None
@@ -316,8 +325,8 @@ def fly(
     state = np.zeros(VEHICLE_STATES)
     state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
     state[ATTITUDE], state[BODY_RATE] = attitude[0], rotations.body_rate(attitude, rate)[0]
-    speed = np.array(planned_pilot.mixed(planned_pilot.plan[0], tuple(state.tolist()))[0].values)
-    pilot: PlanPilot | Pilot = planned_pilot
+    speed = np.array([*planned_pilot.commanded(planned_pilot.plan[0], tuple(state.tolist()))[0]])
+    pilot: Pilot = planned_pilot
     if settings.law is not None:
         motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
         asked = _along_path(planned_pilot, motors, vehicle)
@@ -400,15 +409,13 @@ def fly_setpoints(
 
 
 def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
-    targets = None if setpoints.attitude is None else rotations.rotation_matrix(setpoints.attitude)
-    rates = np.zeros((len(setpoints.thrust), 3)) if setpoints.body_rate is None else setpoints.body_rate
-
-    def asked(number: int, _state: Flat) -> Asked:
-        sample = min(number // parts, len(rates) - 1)
-        target = None if targets is None else targets[sample]
-        return Asked(target, rates[sample], float(setpoints.thrust[sample]))
-
-    return asked
+    count = len(setpoints.thrust)
+    targets: list[Flat | None] = [None] * count
+    if setpoints.attitude is not None:
+        targets = [tuple(row) for row in rotations.rotation_matrix(setpoints.attitude).reshape(-1, 9).tolist()]
+    rates = np.zeros((count, 3)) if setpoints.body_rate is None else setpoints.body_rate
+    samples = list(map(Asked, targets, map(tuple, rates.tolist()), setpoints.thrust.tolist()))
+    return lambda number, _state: samples[min(number // parts, count - 1)]
 
 
 def _along_path(pilot: PlanPilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Flat], Asked]:
@@ -418,14 +425,15 @@ def _along_path(pilot: PlanPilot, motors: Motors, vehicle: VehicleSettings) -> C
     def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
         planned, state = Planned.of(given[:PLANNED]), given[PLANNED:]
         thrust = pilot.autopilot.wrench(planned, state, rotation_rows(state[ATTITUDE], SYMBOLS))[0]
-        return (thrust, *(x for row in pilot.autopilot.target(planned, state) for x in row))
+        speed = SYMBOLS.sqrt(SYMBOLS.largest(thrust, 0.0) * (1 / lift))
+        share = motors.curve.thrust(speed * (1 / motors.speed_max), SYMBOLS)
+        return (share, *(x for row in pilot.autopilot.target(planned, state) for x in row))
 
     machine = Machine.of(build, PLANNED + VEHICLE_STATES)
 
     def asked(number: int, state: Flat) -> Asked:
-        thrust, *target = machine.advance((*pilot.plan[number], *state[:VEHICLE_STATES]))
-        share = motors.share_of(float(np.sqrt(max(thrust, 0.0) / lift)))
-        return Asked(np.array(target).reshape(3, 3), np.zeros(3), share)
+        share, *target = machine.advance((*pilot.plan[number], *state[:VEHICLE_STATES]))
+        return Asked(tuple(target), (0.0, 0.0, 0.0), share)
 
     return asked
 
@@ -487,7 +495,7 @@ def asked(
 
 
 def _loop(
-    pilot: PlanPilot | Pilot,
+    pilot: Pilot,
     state: Array,
     speed: Array,
     vehicle: VehicleSettings,

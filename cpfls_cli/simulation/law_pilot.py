@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.law import Controller, Law, attitude_error
 from cpfls_cli.autopilots.motors import Motors
-from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE
-from cpfls_cli.vehicle.stepping import Flat
+from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, rotation_rows
+from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import Each, Value, Vector
 
 
 @dataclass(frozen=True)
@@ -36,16 +37,16 @@ class Asked(NamedTuple):
 
     Attributes
     ----------
-    attitude : array, shape (3, 3), or None
-        Body to world; None where rates are asked for.
-    body_rate : array, shape (3,), rad/s, body frame
+    attitude : nine floats, or None
+        Body to world, row by row; None where rates are asked for.
+    body_rate : three floats, rad/s, body frame
         Added to what the attitude asks for.
     thrust : float
         Share of the full thrust, in the units of the law.
     """
 
-    attitude: Array | None
-    body_rate: Array
+    attitude: Flat | None
+    body_rate: Flat
     thrust: float
 
 
@@ -75,29 +76,49 @@ class LawPilot:
     injected: Array | None = None
     saturated: BoolArray | None = None
 
-    def command(self, number: int, start: Flat) -> Flat:
-        """Command a step: what the law computed a step of its own ago."""
+    def size(self, rotors: int) -> int:
+        """Count commands and demands."""
+        return 2 * rotors
+
+    def commanded(self, given: Vector, _middle: Vector) -> tuple[Value, Value]:
+        """Command what was computed."""
+        rotors = len(given) // 2
+        return Each(given[:rotors]), Each(given[rotors:])
+
+    def given(self, number: int, start: Flat) -> Flat:
+        """Give what the law computed a step of its own ago."""
         if number % self.every == 0:
             self.held = self.coming
-            self.coming = tuple(self._computed(number, start).ravel().tolist())
+            self.coming = self._computed(number, start)
         return self.held
 
-    def _computed(self, number: int, state: Flat) -> Array:
-        asked, gyroscope = self.asked(number, state), np.array(state[BODY_RATE])
+    def _computed(self, number: int, state: Flat) -> Flat:
+        asked, gyroscope = self.asked(number, state), state[BODY_RATE]
         if self.noise is not None:
-            gyroscope = gyroscope + self.noise.std * self.noise.rng.standard_normal(3)
+            drawn = self.noise.rng.standard_normal(3).tolist()
+            gyroscope = tuple(rate + self.noise.std * each for rate, each in zip(gyroscope, drawn, strict=True))
         rate = asked.body_rate
         if asked.attitude is not None:
-            rotation = rotations.rotation_matrix(np.array([state[ATTITUDE]]))[0]
-            rate = rate + self.controller.asked_rate(attitude_error(rotation, asked.attitude), gyroscope)
+            error = _ATTITUDE_ERROR.advance((*state[ATTITUDE], *asked.attitude))
+            turned = self.controller.asked_rate(error, gyroscope)
+            rate = tuple(own + each for own, each in zip(rate, turned, strict=True))
         turning = self.controller.command(rate, gyroscope, self.saturated)
         if self.injected is not None:
-            turning = turning + self.injected[min(number, len(self.injected) - 1)]
-        mixed = self.motors.speeds(asked.thrust, turning)
+            added = self.injected[min(number, len(self.injected) - 1)].tolist()
+            turning = tuple(own + each for own, each in zip(turning, added, strict=True))
+        mixed = self.motors.speeds(asked.thrust, np.array(turning))
         self.saturated = mixed.saturated
         possible = (mixed.wanted >= 0) & (mixed.wanted <= 1)
         demand = np.where(possible, mixed.speed**2, mixed.wanted * self.motors.speed_max**2)
-        return np.array([mixed.speed, demand])
+        return (*mixed.speed.tolist(), *demand.tolist())
+
+
+def _error_of(_memory: Memory, given: Vector) -> Vector:
+    rotation = rotation_rows(given[:3], SYMBOLS)
+    return attitude_error(rotation, (given[3:6], given[6:9], given[9:]))
+
+
+_ATTITUDE_ERROR = Machine.of(_error_of, 12)
 
 
 def law_pilot(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, Symbol, traced
-from cpfls_cli.vehicle.values import Each, Functions, Value, plus
+from cpfls_cli.vehicle.values import Each, Functions, Value, plus, times
 
 Flat = tuple[float, ...]
 
@@ -97,24 +97,25 @@ class Memory:
         kept.keep(wanted + exp(-1 / ratio) * behind)
         return wanted + exp(-0.5 / ratio) * behind
 
+    def passed(self, section: SecondOrder, now: Value, settled: Value) -> Value:
+        """Filter a value that had settled before the first step."""
+        (a0, a1, a2), (_, b1, b2) = section.over.tolist(), section.under.tolist()
+        kept = self.recall((0.0, 0.0))
+        later = times(a2 - b2 * section.level, settled)
+        sooner = plus(times(a1 - b1 * section.level, settled), later)
+        one, two = (
+            self.functions.where(self.first, begin, each)
+            for begin, each in zip((sooner, later), kept.values, strict=True)
+        )
+        out = plus(times(a0, now), one)
+        kept.keep((plus(times(a1, now), times(-b1, out), two), plus(times(a2, now), times(-b2, out))))
+        return out
+
     def filtered(self, section: SecondOrder, rotors: RotorMotion) -> RotorMotion:
         """Filter rotors, which were settled before the first step."""
-        (a0, a1, a2), (_, b1, b2) = section.over.tolist(), section.under.tolist()
-
-        def passed(now: Value, settled: Value) -> Value:
-            kept = self.recall((0.0, 0.0))
-            later = (a2 - b2 * section.level) * settled
-            sooner = (a1 - b1 * section.level) * settled + later
-            one, two = (
-                self.functions.where(self.first, begin, each)
-                for begin, each in zip((sooner, later), kept.values, strict=True)
-            )
-            out = a0 * now + one
-            kept.keep((a1 * now - b1 * out + two, a2 * now - b2 * out))
-            return out
-
         return RotorMotion(
-            Each(passed(each, each) for each in rotors.speed), Each(passed(each, 0.0) for each in rotors.acceleration)
+            Each(self.passed(section, each, each) for each in rotors.speed),
+            Each(self.passed(section, each, 0.0) for each in rotors.acceleration),
         )
 
     def delayed(self, rotors: RotorMotion, steps: float) -> RotorMotion:

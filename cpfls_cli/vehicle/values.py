@@ -1,4 +1,4 @@
-"""Numbers that the vehicle is written in: floats and the symbols of `tracing`, alone, as vectors, and one a rotor.
+"""Numbers that the vehicle is written in: floats, arrays, the symbols of `tracing`; vectors of them, and one a rotor.
 
 Vectors are tuples of components. What is always 0 is a plain 0, takes no part in sums and products, and costs nothing.
 """
@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
 
+import numpy as np
+
 Value = Any
-"""A float, a `tracing.Symbol`, or `Each`."""
+"""A float, an array, a `tracing.Symbol`, or `Each`."""
 Vector = tuple[Value, ...]
 """Components along x, y, z, or as many as a state has."""
 
@@ -66,6 +68,26 @@ class Functions(Protocol):
     def total(self, x: Value) -> Value:
         """Sum over the rotors."""
         ...
+
+
+class ArrayFunctions:
+    """Functions of arrays, whose first axis is that of the rotors where there is one value for each of them."""
+
+    sqrt, exp, sin, cos, arctan2, floor, absolute = (
+        staticmethod(each) for each in (np.sqrt, np.exp, np.sin, np.cos, np.arctan2, np.floor, np.abs)
+    )
+    where, largest, smallest = (staticmethod(each) for each in (np.where, np.maximum, np.minimum))
+
+    def rotors(self, values: Iterable[Value]) -> Value:
+        """Make one value for each rotor, to go with arrays over time."""
+        return np.array([*values], dtype=float)[:, None]
+
+    def total(self, x: Value) -> Value:
+        """Sum over the rotors."""
+        return x if zero(x) else x.sum(axis=0)
+
+
+ARRAYS = ArrayFunctions()
 
 
 class Each:
