@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple
 
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.simulation.actuators import Mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.motion import ATTITUDE, rotation_rows
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Flat
 from cpfls_cli.vehicle.tracing import SYMBOLS
 from cpfls_cli.vehicle.values import (
     Functions,
@@ -42,6 +51,27 @@ class Planned(NamedTuple):
     def of(cls, numbers: Vector) -> Planned:
         """Arrange `PLANNED` numbers."""
         return cls(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9:12], numbers[12:15], numbers[15])
+
+
+def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
+    """Interpolate a planned motion by cubic splines, as `Planned` arranges it.
+
+    Parameters
+    ----------
+    planned : mapping of str to array
+        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
+        (time, 3) each.
+    time : array, shape (time,), s
+    at : array, shape (step,), s
+        Times asked for.
+    """
+    from scipy.interpolate import CubicSpline
+
+    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
+    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
+    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
+    rates = rotations.body_rate(q, qd), rotations.body_acceleration(q, qd, qdd)
+    return list(map(tuple, np.column_stack([position, velocity, acceleration, *rates, q[:, 2]]).tolist()))
 
 
 class Autopilot:
@@ -117,3 +147,66 @@ def upright(pull: Vector, yaw: Value, functions: Functions = SYMBOLS) -> tuple[V
     forward = cross((minus(0, functions.sin(yaw)), functions.cos(yaw), 0), up)
     forward = scaled(1 / functions.sqrt(dot(forward, forward)), forward)
     return forward, cross(up, forward), up
+
+
+@dataclass(frozen=True)
+class PlanPilot:
+    """The autopilot that knows the vehicle, with its mixer; it answers at once, in the middle of each step.
+
+    Attributes
+    ----------
+    plan : list of tuple of float
+        At the start, then in the middle of each step.
+    """
+
+    autopilot: Autopilot
+    mixer: Mixer
+    plan: list[Flat]
+
+    def size(self, _rotors: int) -> int:
+        """Count the numbers of a planned motion."""
+        return PLANNED
+
+    def given(self, number: int, _start: Flat) -> Flat:
+        """Give the planned motion."""
+        return self.plan[number + 1]
+
+    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
+        """Command the rotors."""
+        rotation = rotation_rows(middle[ATTITUDE], SYMBOLS)
+        return self.mixer.mixed(self.autopilot.wrench(Planned.of(given), middle, rotation))
+
+
+def asked(
+    time: Array,
+    planned: Mapping[str, Array],
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    state: Array,
+) -> dict[str, Array]:
+    """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
+
+    Parameters
+    ----------
+    time, planned
+        As `fly` takes them.
+    state : array, shape (time, state)
+        Of the flight, at the samples of the plan.
+
+    Returns
+    -------
+    dict of str to array, shape (time, 3), m, m/s, rad
+        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
+        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
+    """
+    autopilot = Autopilot(vehicle, settings)
+    plan = [Planned.of(row) for row in plan_of(planned, time, time)]
+    flew = list(zip(plan, map(tuple, state.tolist()), strict=True))
+    targets = [autopilot.target(own, at) for own, at in flew]
+    flown = state[:, ATTITUDE]
+    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
+    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
+    if settings.law is not None:
+        thrust = (autopilot.wrench(own, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0] for own, at in flew)
+        found["thrust"] = np.array(list(thrust))
+    return found

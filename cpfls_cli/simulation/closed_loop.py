@@ -14,9 +14,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.actuators import Actuators, Mixer, actuators, mixer
-from cpfls_cli.simulation.autopilot import PLANNED, Autopilot, Planned
-from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, integration_rate, law_pilot
+from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
+from cpfls_cli.simulation.autopilot import Autopilot, PlanPilot, plan_of
+from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, along_path, integration_rate, law_pilot
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     TURNING_NUMBERS,
@@ -36,12 +36,11 @@ from cpfls_cli.vehicle.motion import (
     VELOCITY,
     Instant,
     Vehicle,
-    rotation_rows,
     wrench_by_part,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
-from cpfls_cli.vehicle.tracing import SYMBOLS, Symbol
+from cpfls_cli.vehicle.tracing import Symbol
 from cpfls_cli.vehicle.values import Each, Value, Vector, add, scaled
 
 if TYPE_CHECKING:
@@ -51,27 +50,6 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
 _REMEDY = "fly more gently, make the effects smaller, or change the frequencies of simulation.closed_loop"
-
-
-def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
-    """Interpolate a planned motion by cubic splines, as `Planned` arranges it.
-
-    Parameters
-    ----------
-    planned : mapping of str to array
-        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-        (time, 3) each.
-    time : array, shape (time,), s
-    at : array, shape (step,), s
-        Times asked for.
-    """
-    from scipy.interpolate import CubicSpline
-
-    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
-    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
-    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
-    rates = rotations.body_rate(q, qd), rotations.body_acceleration(q, qd, qdd)
-    return list(map(tuple, np.column_stack([position, velocity, acceleration, *rates, q[:, 2]]).tolist()))
 
 
 @dataclass(frozen=True)
@@ -143,34 +121,6 @@ class Pilot(Protocol):
             Squared speeds asked for, possible or not.
         """
         ...
-
-
-@dataclass(frozen=True)
-class PlanPilot:
-    """The autopilot that knows the vehicle, with its mixer; it answers at once, in the middle of each step.
-
-    Attributes
-    ----------
-    plan : list of tuple of float
-        At the start, then in the middle of each step.
-    """
-
-    autopilot: Autopilot
-    mixer: Mixer
-    plan: list[Flat]
-
-    def size(self, _rotors: int) -> int:
-        """Count the numbers of a planned motion."""
-        return PLANNED
-
-    def given(self, number: int, _start: Flat) -> Flat:
-        """Give the planned motion."""
-        return self.plan[number + 1]
-
-    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
-        """Command the rotors."""
-        rotation = rotation_rows(middle[ATTITUDE], SYMBOLS)
-        return self.mixer.mixed(self.autopilot.wrench(Planned.of(given), middle, rotation))
 
 
 @dataclass
@@ -329,7 +279,7 @@ def fly(
     pilot: Pilot = planned_pilot
     if settings.law is not None:
         motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
-        asked = _along_path(planned_pilot, motors, vehicle)
+        asked = along_path(planned_pilot, motors, vehicle)
         pilot = law_pilot(settings.law, motors, asked, clock.step, speed, noise)
     flight = _loop(pilot, state, speed, vehicle, settings, model, effects, clock, push)
 
@@ -418,26 +368,6 @@ def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
     return lambda number, _state: samples[min(number // parts, count - 1)]
 
 
-def _along_path(pilot: PlanPilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Flat], Asked]:
-    """Ask for attitude and thrust along a path, in the units of a law."""
-    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
-
-    def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
-        planned, state = Planned.of(given[:PLANNED]), given[PLANNED:]
-        thrust = pilot.autopilot.wrench(planned, state, rotation_rows(state[ATTITUDE], SYMBOLS))[0]
-        speed = SYMBOLS.sqrt(SYMBOLS.largest(thrust, 0.0) * (1 / lift))
-        share = motors.curve.thrust(speed * (1 / motors.speed_max), SYMBOLS)
-        return (share, *(x for row in pilot.autopilot.target(planned, state) for x in row))
-
-    machine = Machine.of(build, PLANNED + VEHICLE_STATES)
-
-    def asked(number: int, state: Flat) -> Asked:
-        share, *target = machine.advance((*pilot.plan[number], *state[:VEHICLE_STATES]))
-        return Asked(tuple(target), (0.0, 0.0, 0.0), share)
-
-    return asked
-
-
 def _flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]) -> SimulatedMotion:
     """Take all steps, and check the state at each sample."""
     clock, size = flight.clock, len(flight.state)
@@ -457,41 +387,6 @@ def _flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[
         check(len(states), (np.nan,) * size)
     progress(clock.steps, clock.steps)
     return _sampled(np.array(states), np.array(steps), clock.parts, len(flight.vehicle.settings.rotors))
-
-
-def asked(
-    time: Array,
-    planned: Mapping[str, Array],
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    state: Array,
-) -> dict[str, Array]:
-    """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
-
-    Parameters
-    ----------
-    time, planned
-        As `fly` takes them.
-    state : array, shape (time, state)
-        Of the flight, at the samples of the plan.
-
-    Returns
-    -------
-    dict of str to array, shape (time, 3), m, m/s, rad
-        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
-        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
-    """
-    autopilot = Autopilot(vehicle, settings)
-    plan = [Planned.of(row) for row in plan_of(planned, time, time)]
-    flew = list(zip(plan, map(tuple, state.tolist()), strict=True))
-    targets = [autopilot.target(own, at) for own, at in flew]
-    flown = state[:, ATTITUDE]
-    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
-    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
-    if settings.law is not None:
-        thrust = (autopilot.wrench(own, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0] for own, at in flew)
-        found["thrust"] = np.array(list(thrust))
-    return found
 
 
 def _loop(

@@ -12,9 +12,11 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.law import Controller, Law, attitude_error
 from cpfls_cli.autopilots.motors import Motors
-from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, rotation_rows
+from cpfls_cli.simulation.autopilot import PLANNED, Planned, PlanPilot
+from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, VEHICLE_STATES, rotation_rows
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
-from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.tracing import SYMBOLS, Symbol
 from cpfls_cli.vehicle.values import Each, Value, Vector
 
 
@@ -119,6 +121,26 @@ def _error_of(_memory: Memory, given: Vector) -> Vector:
 
 
 _ATTITUDE_ERROR = Machine.of(_error_of, 12)
+
+
+def along_path(pilot: PlanPilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Flat], Asked]:
+    """Ask for attitude and thrust along a path, in the units of a law."""
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
+
+    def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
+        planned, state = Planned.of(given[:PLANNED]), given[PLANNED:]
+        thrust = pilot.autopilot.wrench(planned, state, rotation_rows(state[ATTITUDE], SYMBOLS))[0]
+        speed = SYMBOLS.sqrt(SYMBOLS.largest(thrust, 0.0) * (1 / lift))
+        share = motors.curve.thrust(speed * (1 / motors.speed_max), SYMBOLS)
+        return (share, *(x for row in pilot.autopilot.target(planned, state) for x in row))
+
+    machine = Machine.of(build, PLANNED + VEHICLE_STATES)
+
+    def asked(number: int, state: Flat) -> Asked:
+        share, *target = machine.advance((*pilot.plan[number], *state[:VEHICLE_STATES]))
+        return Asked(tuple(target), (0.0, 0.0, 0.0), share)
+
+    return asked
 
 
 def law_pilot(

@@ -10,8 +10,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.table import learned_wrench
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects, in_table
-from cpfls_cli.vehicle.airflow import learned_wrench
 from cpfls_cli.vehicle.motion import (
     ATTITUDE,
     BODY_RATE,
@@ -68,11 +68,8 @@ def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
         if acting.of_all_forces and acting.name not in levers:
             acting = Acting(acting.name, _of_thrust(acting), acting.numbers)
         parts.append(acting)
-    if (learned := model.remainder) is not None:
-        rows = learned.rows.tolist()
-        parts.append(
-            Acting("remainder", learned_wrench(learned.breakpoints, learned.harmonic_order, rows, learned.coefficients))
-        )
+    if model.remainder is not None:
+        parts.append(Acting("remainder", learned_wrench(model.remainder)))
     return tuple(parts)
 
 
