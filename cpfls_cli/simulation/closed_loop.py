@@ -287,7 +287,7 @@ def fly(
         _refuse_lost(state, time, sample)
         _refuse_far(state, planned["position"][sample], time[sample], settings.deviation_max_m)
 
-    return _flown(flight, check, progress)
+    return flown(flight, check, progress)
 
 
 @dataclass(frozen=True)
@@ -355,7 +355,7 @@ def fly_setpoints(
     pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
     flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
     flight.lacking = lacking
-    return _flown(flight, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
+    return flown(flight, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
 
 
 def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
@@ -368,7 +368,7 @@ def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
     return lambda number, _state: samples[min(number // parts, count - 1)]
 
 
-def _flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]) -> SimulatedMotion:
+def flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]) -> SimulatedMotion:
     """Take all steps, and check the state at each sample."""
     clock, size = flight.clock, len(flight.state)
     machine, given = flight.machine()
