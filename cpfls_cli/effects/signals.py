@@ -11,8 +11,10 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.vehicle.motion import Instant
 from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import ARRAYS, Value
 
 _T = TypeVar("_T")
 
@@ -203,6 +205,11 @@ class Signals:
         return self.ground_velocity if self.wind is None else self.ground_velocity - self.wind @ self.rotation
 
     @cached_property
+    def instants(self) -> Instants:
+        """See what effects see, at all samples."""
+        return Instants(self)
+
+    @cached_property
     def of_motion(self) -> dict[Hashable, Array]:
         """Keep what effects derive from the motion alone, for the same flight with other rotor speeds."""
         return {}
@@ -271,6 +278,47 @@ class Signals:
         changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
         changed.__dict__["of_motion"] = self.of_motion
         return changed
+
+
+class _Taken:
+    """An attribute of `Instants` that follows from its signals, when it is asked for, and is kept."""
+
+    def __init__(self, make: Callable[[Signals], Value]) -> None:
+        self._make = make
+
+    def __set_name__(self, _owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, _owner: type) -> Any:
+        found = instance.__dict__[self._name] = self._make(instance.signals)
+        return found
+
+
+class Instants(Instant):
+    """What effects see at all samples of a flight, as far as it is known; arrays by rotor have the rotors first.
+
+    Thrust and torque of the rotors are as stated where their speeds are not known, with what is known beside them.
+    """
+
+    def __init__(self, signals: Signals) -> None:
+        self.__dict__.update(signals=signals, vehicle=signals.vehicle, functions=ARRAYS)
+
+    air_velocity: Any = _Taken(lambda signals: tuple(signals.air_velocity.T))
+    body_rate: Any = _Taken(lambda signals: tuple(signals.body_rate.T))
+    attitude: Any = _Taken(lambda signals: tuple(_known(signals.attitude).T))
+    rotation: Any = _Taken(lambda signals: tuple(map(tuple, np.moveaxis(signals.rotation, 0, 2))))
+    force: Any = _Taken(lambda signals: tuple(signals.force.T))
+    thrust: Any = _Taken(lambda signals: signals.wrench[:, 5])
+    rotor_torque: Any = _Taken(lambda signals: tuple(signals.wrench[:, :3].T))
+    rotor_speed: Any = _Taken(lambda signals: signals.speed.T)
+    rotor_thrust: Any = _Taken(lambda signals: signals.rotor_thrust.T)
+    hub_height: Any = _Taken(lambda signals: signals.hub_height.T)
+    hub_velocity: Any = _Taken(lambda signals: tuple(np.moveaxis(signals.hub_velocity, (0, 1, 2), (2, 1, 0))))
+
+
+def _known(values: Array | None) -> Array:
+    assert values is not None, "an effect that needs it declares so"
+    return values
 
 
 def stretch_of(signals: Signals, part: slice) -> Signals:

@@ -355,14 +355,18 @@ def total_wrench(acting: Iterable[Acting], instant: Instant) -> tuple[Vector, Ve
     """Sum torque and force of effects, N m and N, body frame, but for what momentum adds."""
     acting = tuple(acting)
     parts = [one.wrench(instant) for one in acting if not one.of_all_forces]
-    torque, force, at_hubs = (add(ZERO, *(part[place] for part in parts)) for place in range(3))
-    total = instant.functions.total
-    torque = add(torque, map(total, cross(instant.hubs, at_hubs)))
-    force = add(force, map(total, at_hubs))
+    torque, force = about_centre(instant, Wrench(*(add(ZERO, *(part[place] for part in parts)) for place in range(3))))
     # What has a lever for all forces comes last.
     felt = replace(instant, force=force)
     levers = [one.wrench(felt).torque for one in acting if one.of_all_forces]
     return add(torque, *levers), force
+
+
+def about_centre(instant: Instant, wrench: Wrench) -> tuple[Vector, Vector]:
+    """Sum a wrench with its forces at the hubs to torque and force, but for what momentum adds."""
+    total = instant.functions.total
+    torque = add(wrench.torque, map(total, cross(instant.hubs, wrench.at_hubs)))
+    return torque, add(wrench.force, map(total, wrench.at_hubs))
 
 
 def wrench_by_part(acting: Iterable[Acting], instant: Instant) -> dict[str, tuple[Vector, Vector]]:

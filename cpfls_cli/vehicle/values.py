@@ -5,7 +5,7 @@ Vectors are tuples of components. What is always 0 is a plain 0, takes no part i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -70,13 +70,57 @@ class Functions(Protocol):
         ...
 
 
+class Linear:
+    """What depends on unknown numbers linearly: what stands by each of them, by its place."""
+
+    __slots__ = ("by",)
+    __array_ufunc__ = None
+
+    def __init__(self, by: Mapping[int, Value]) -> None:
+        self.by = by
+
+    def each(self, change: Callable[[Value], Value]) -> Linear:
+        """Apply what is linear to all of them."""
+        return Linear({place: change(value) for place, value in self.by.items()})
+
+    def __add__(self, other: Value) -> Linear:
+        if zero(other):
+            return self
+        return Linear({place: plus(self.by.get(place, 0), other.by.get(place, 0)) for place in {**self.by, **other.by}})
+
+    def __sub__(self, other: Value) -> Linear:
+        return self.__add__(-other)
+
+    def __rsub__(self, other: Value) -> Linear:
+        return (-self).__add__(other)
+
+    def __mul__(self, other: Value) -> Linear:
+        return self.each(lambda value: times(value, other))
+
+    def __truediv__(self, other: Value) -> Linear:
+        return self.each(lambda value: value / other)
+
+    def __neg__(self) -> Linear:
+        return self.each(lambda value: -value)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
 class ArrayFunctions:
     """Functions of arrays, whose first axis is that of the rotors where there is one value for each of them."""
 
     sqrt, exp, sin, cos, arctan2, floor, absolute = (
         staticmethod(each) for each in (np.sqrt, np.exp, np.sin, np.cos, np.arctan2, np.floor, np.abs)
     )
-    where, largest, smallest = (staticmethod(each) for each in (np.where, np.maximum, np.minimum))
+    largest, smallest = (staticmethod(each) for each in (np.maximum, np.minimum))
+
+    def where(self, condition: Value, yes: Value, no: Value) -> Value:
+        """Choose by a comparison."""
+        if not (isinstance(yes, Linear) or isinstance(no, Linear)):
+            return np.where(condition, yes, no)
+        ends = [one if isinstance(one, Linear) else Linear({}) for one in (yes, no)]
+        places = {**ends[0].by, **ends[1].by}
+        return Linear({at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
 
     def rotors(self, values: Iterable[Value]) -> Value:
         """Make one value for each rotor, to go with arrays over time."""
@@ -84,7 +128,7 @@ class ArrayFunctions:
 
     def total(self, x: Value) -> Value:
         """Sum over the rotors."""
-        return x if zero(x) else x.sum(axis=0)
+        return x.each(self.total) if isinstance(x, Linear) else x if zero(x) else x.sum(axis=0)
 
 
 ARRAYS = ArrayFunctions()

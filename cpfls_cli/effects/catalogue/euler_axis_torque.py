@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from cpfls_cli import rotations
-from cpfls_cli.effects.effect import Columns, Effect, torque_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.values import subtract
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    assert signals.attitude is not None, "declared among the needs"
-    torque = signals.wrench[:, :3]
-    return torque_column(rotations.body_torque(signals.attitude, torque) - torque)
 
 
 def _acts(see: Instant, _p: Numbers) -> Wrench:
@@ -39,6 +29,5 @@ EFFECT = Effect(
         "products_of_inertia": "fly level: the wrong convention vanishes there",
     },
     source="definition of the generalised torque, tau = W^T M",
-    columns=_columns,
     acts=_acts,
 )

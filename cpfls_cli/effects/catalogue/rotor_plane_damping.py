@@ -2,26 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    total = signals.speed.sum(axis=1, keepdims=True)
-    damping = -total * signals.body_rate * [1.0, 1.0, 0.0]
-    # Thrust that leans with the disc; its lever about roll and pitch is part of the damping already.
-    p, q = signals.body_rate[:, 0], signals.body_rate[:, 1]
-    lean = np.column_stack([-q, p, np.zeros(len(signals))])
-    arms = signals.speed @ signals.hubs
-    yaw = np.zeros((len(signals), 3))
-    yaw[:, 2] = arms[:, 0] * p + arms[:, 1] * q
-    return Columns(stack(wrench(damping), wrench(yaw, total * lean)))
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:
@@ -61,6 +44,5 @@ EFFECT = Effect(
         "inflow": "climb and descend at constant attitude: only inflow changes the thrust",
     },
     source="Corke, Robotics Toolbox quadrotor_dynamics.m (a1s -= 16/(gamma |w|) q); NASA TP-1285",
-    columns=_columns,
     acts=_acts,
 )

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Columns, Effect, of_axes
+from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
@@ -30,6 +28,5 @@ EFFECT = Effect(
         "euler_axis_torque": "tilt: the wrong convention vanishes in level flight",
     },
     source="SkyFlow (thrust axis misalignment)",
-    columns=lambda signals, _: Columns(np.tile(np.eye(6)[:, :3], (len(signals), 1, 1))),
     acts=_acts,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
+from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
@@ -31,6 +31,5 @@ EFFECT = Effect(
         "inflow": "fly level and fast, without climbing",
     },
     source="RotorPy multirotor.py (k_h)",
-    columns=lambda signals, _: thrust_column(signals, (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)),
     acts=_acts,
 )
