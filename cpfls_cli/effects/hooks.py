@@ -16,7 +16,7 @@ from cpfls_cli.vehicle.stepping import Memory, RotorMotion
 from cpfls_cli.vehicle.values import Value, Vector
 
 Link = Callable[[RotorMotion, Mapping[str, float], Memory], RotorMotion]
-"""A link of the actuator chain, of its values; what it keeps from step to step stands in the memory."""
+"""A link of the actuator chain, of its values; it keeps in the memory what the next step needs."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -297,7 +297,7 @@ class _Taken:
 class Instants(Instant):
     """What effects see at all samples of a flight, as far as it is known; arrays by rotor have the rotors first.
 
-    Thrust and torque of the rotors are as stated where their speeds are not known, with what is known beside them.
+    Thrust and torque of the rotors are as stated where their speeds are not known, with what else is known.
     """
 
     def __init__(self, signals: Signals) -> None:

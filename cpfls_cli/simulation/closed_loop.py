@@ -139,7 +139,7 @@ class Loop:
     push : array, shape (step, 6), N m and N, body frame, or None
         Of gusts, in the middle of each step.
     lacking : DrawnLack or None
-        What acts beside it and the model lacks.
+        What the model lacks, drawn for the steps.
     """
 
     pilot: Pilot
@@ -190,7 +190,7 @@ class Loop:
         rotors = self.actuators.rotors(command, memory)
         instant = self.vehicle.instant(middle, rotors.speed, rotors.acceleration, rotors.slow)
         push = given["push"] or None
-        if self.lacking is not None and self.model is not None:
+        if self.lacking is not None:
             lacking = self.lacking.at(given["unit"], wrench_by_part(acting_of(self.lacking.model), _evenly(instant)))
             push = lacking if push is None else add(push, lacking)
         turning = given_turning(given["turning"]) if given["turning"] else None

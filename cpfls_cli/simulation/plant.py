@@ -38,7 +38,7 @@ TURNING_NUMBERS = 12
 
 
 def flown_vehicle(vehicle: VehicleSettings, model: VehicleModel | None, effects: SimulatedEffects) -> Vehicle:
-    """Set up a vehicle, or the model in its place, with effects beside those of the model."""
+    """Set up a vehicle, or the model in its place, with effects on top of those of the model."""
     flown = vehicle if model is None else model.vehicle
     own = (Acting("rotors", rotor_wrench),) if model is None else acting_of(model)
     winds = [one.effect.air(one.values) for one in effects.listed if one.effect.air is not None]

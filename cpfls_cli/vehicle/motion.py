@@ -327,7 +327,7 @@ class Vehicle:
         torque, force = total_wrench(self.acting, instant)
         if push is not None:
             torque, force = add(torque, push[:3]), add(force, push[3:])
-        # The momentum of rotors changes with their accelerations, that of the body stands in the inertia.
+        # The momentum of rotors changes with their accelerations, that of the body adds to the inertia.
         spun = Instant(self.settings, instant.rotor_acceleration, functions=instant.functions)
         torque = add(torque, self._momentum(spun))
         rate, settings = instant.body_rate, self.settings

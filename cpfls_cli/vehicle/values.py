@@ -71,7 +71,7 @@ class Functions(Protocol):
 
 
 class Linear:
-    """What depends on unknown numbers linearly: what stands by each of them, by its place."""
+    """What is linear in unknown numbers: the factor of each of them, by its place."""
 
     __slots__ = ("by",)
     __array_ufunc__ = None

@@ -109,7 +109,7 @@ def _acts(see: Instant, p: Numbers) -> Wrench:
     gain = first * p["difference_1"] + second * p["difference_2"]
     # A propeller that pulls less drags less.
     yaw = functions.total(drag * (p["drag_imbalance"] - see.spins * gain))
-    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
+    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force shows it.
     lift = p["lift_imbalance"] * functions.total(see.spins * see.rotor_thrust)
     return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
 

@@ -61,7 +61,7 @@ def test_what_is_known_is_folded_in_and_what_is_nothing_costs_nothing():
     assert all(map(zero, Each([x, 0]) * Each([0, x])))
 
 
-def test_a_step_keeps_what_it_is_told_to_keep():
+def test_a_step_keeps_values_for_the_next():
     def build(memory, given):
         kept = memory.recall((1.0, 1.0))
         older, newer = kept.values
