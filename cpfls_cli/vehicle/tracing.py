@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
-from cpfls_cli.vehicle.values import Each, Value, plus
+from cpfls_cli.vehicle.values import Each, Functions, Value, plus
 
 _LONGEST = 160
 """Characters of an expression, beyond which it gets a line of its own."""
@@ -111,69 +111,6 @@ class Symbol:
         return self.made("**", self, power)
 
 
-class SymbolFunctions:
-    """Functions of symbols; of floats they give floats."""
-
-    def sqrt(self, x: Value) -> Value:
-        """Take the square root."""
-        return _called("sqrt", x)
-
-    def exp(self, x: Value) -> Value:
-        """Take the exponential function."""
-        return _called("exp", x)
-
-    def sin(self, x: Value) -> Value:
-        """Take the sine."""
-        return _called("sin", x)
-
-    def cos(self, x: Value) -> Value:
-        """Take the cosine."""
-        return _called("cos", x)
-
-    def arctan2(self, y: Value, x: Value) -> Value:
-        """Give the angle of a direction, rad."""
-        return _called("atan2", y, x)
-
-    def floor(self, x: Value) -> Value:
-        """Round down."""
-        return _called("floor", x)
-
-    def absolute(self, x: Value) -> Value:
-        """Leave out the sign."""
-        return _called("abs", x)
-
-    def where(self, condition: Value, yes: Value, no: Value) -> Value:
-        """Choose by a comparison."""
-        if isinstance(condition, Each):
-            ends = [one.values if isinstance(one, Each) else (one,) * len(condition.values) for one in (yes, no)]
-            return Each(map(self.where, condition.values, *ends))
-        if not isinstance(condition, Symbol):
-            return yes if condition else no
-        if isinstance(yes, Each) or isinstance(no, Each):
-            count = len(yes.values if isinstance(yes, Each) else no.values)
-            return self.where(Each((condition,) * count), yes, no)
-        return condition.made("where", condition, yes, no)
-
-    def largest(self, a: Value, b: Value) -> Value:
-        """Give the larger of two."""
-        return self.where(a > b, a, b)
-
-    def smallest(self, a: Value, b: Value) -> Value:
-        """Give the smaller of two."""
-        return self.where(a < b, a, b)
-
-    def rotors(self, values: Iterable[Value]) -> Each:
-        """Make one value for each rotor."""
-        return Each(values)
-
-    def total(self, x: Value) -> Value:
-        """Sum over the rotors."""
-        return plus(*x.values) if isinstance(x, Each) else x
-
-
-SYMBOLS = SymbolFunctions()
-
-
 def _called(name: str, *arguments: Value) -> Value:
     if isinstance(arguments[0], Each):
         return Each(_called(name, one, *arguments[1:]) for one in arguments[0])
@@ -181,6 +118,39 @@ def _called(name: str, *arguments: Value) -> Value:
         if isinstance(argument, Symbol):
             return argument.made(name, *arguments)
     return _FUNCTIONS[name](*arguments)
+
+
+def _where(condition: Value, yes: Value, no: Value) -> Value:
+    if isinstance(condition, Each):
+        ends = [one.values if isinstance(one, Each) else (one,) * len(condition.values) for one in (yes, no)]
+        return Each(map(_where, condition.values, *ends))
+    if not isinstance(condition, Symbol):
+        return yes if condition else no
+    if isinstance(yes, Each) or isinstance(no, Each):
+        count = len(yes.values if isinstance(yes, Each) else no.values)
+        return _where(Each((condition,) * count), yes, no)
+    return condition.made("where", condition, yes, no)
+
+
+def _total(x: Value) -> Value:
+    return plus(*x.values) if isinstance(x, Each) else x
+
+
+SYMBOLS = Functions(
+    sqrt=partial(_called, "sqrt"),
+    exp=partial(_called, "exp"),
+    sin=partial(_called, "sin"),
+    cos=partial(_called, "cos"),
+    arctan2=partial(_called, "atan2"),
+    floor=partial(_called, "floor"),
+    absolute=partial(_called, "abs"),
+    where=_where,
+    largest=lambda a, b: _where(a > b, a, b),
+    smallest=lambda a, b: _where(a < b, a, b),
+    rotors=Each,
+    total=_total,
+)
+"""Functions of symbols; of floats they give floats."""
 
 
 def traced(

@@ -6,7 +6,7 @@ Vectors are tuples of components. What is always 0 is a plain 0, takes no part i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,56 +18,31 @@ Vector = tuple[Value, ...]
 ZERO: Vector = (0, 0, 0)
 
 
-class Functions(Protocol):
-    """Functions of one kind of numbers."""
+class Functions(NamedTuple):
+    """Functions of one kind of numbers.
 
-    def sqrt(self, x: Value) -> Value:
-        """Take the square root."""
-        ...
+    Attributes
+    ----------
+    where : callable
+        ``where(condition, yes, no)``.
+    rotors : callable
+        Makes one value for each rotor of an iterable of floats.
+    total : callable
+        Sums over the rotors.
+    """
 
-    def exp(self, x: Value) -> Value:
-        """Take the exponential function."""
-        ...
-
-    def sin(self, x: Value) -> Value:
-        """Take the sine."""
-        ...
-
-    def cos(self, x: Value) -> Value:
-        """Take the cosine."""
-        ...
-
-    def arctan2(self, y: Value, x: Value) -> Value:
-        """Give the angle of a direction, rad."""
-        ...
-
-    def floor(self, x: Value) -> Value:
-        """Round down."""
-        ...
-
-    def absolute(self, x: Value) -> Value:
-        """Leave out the sign."""
-        ...
-
-    def where(self, condition: Value, yes: Value, no: Value) -> Value:
-        """Choose by a comparison."""
-        ...
-
-    def largest(self, a: Value, b: Value) -> Value:
-        """Give the larger of two."""
-        ...
-
-    def smallest(self, a: Value, b: Value) -> Value:
-        """Give the smaller of two."""
-        ...
-
-    def rotors(self, values: Iterable[Value]) -> Value:
-        """Make one value for each rotor."""
-        ...
-
-    def total(self, x: Value) -> Value:
-        """Sum over the rotors."""
-        ...
+    sqrt: Callable[[Value], Value]
+    exp: Callable[[Value], Value]
+    sin: Callable[[Value], Value]
+    cos: Callable[[Value], Value]
+    arctan2: Callable[[Value, Value], Value]
+    floor: Callable[[Value], Value]
+    absolute: Callable[[Value], Value]
+    where: Callable[[Value, Value, Value], Value]
+    largest: Callable[[Value, Value], Value]
+    smallest: Callable[[Value, Value], Value]
+    rotors: Callable[[Iterable[Value]], Value]
+    total: Callable[[Value], Value]
 
 
 class Linear:
@@ -106,32 +81,27 @@ class Linear:
     __radd__, __rmul__ = __add__, __mul__
 
 
-class ArrayFunctions:
-    """Functions of arrays, whose first axis is that of the rotors where there is one value for each of them."""
-
-    sqrt, exp, sin, cos, arctan2, floor, absolute = (
-        staticmethod(each) for each in (np.sqrt, np.exp, np.sin, np.cos, np.arctan2, np.floor, np.abs)
-    )
-    largest, smallest = (staticmethod(each) for each in (np.maximum, np.minimum))
-
-    def where(self, condition: Value, yes: Value, no: Value) -> Value:
-        """Choose by a comparison."""
-        if not (isinstance(yes, Linear) or isinstance(no, Linear)):
-            return np.where(condition, yes, no)
-        ends = [one if isinstance(one, Linear) else Linear({}) for one in (yes, no)]
-        places = {**ends[0].by, **ends[1].by}
-        return Linear({at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
-
-    def rotors(self, values: Iterable[Value]) -> Value:
-        """Make one value for each rotor, to go with arrays over time."""
-        return np.array([*values], dtype=float)[:, None]
-
-    def total(self, x: Value) -> Value:
-        """Sum over the rotors."""
-        return x.each(self.total) if isinstance(x, Linear) else x if zero(x) else x.sum(axis=0)
+def _array_where(condition: Value, yes: Value, no: Value) -> Value:
+    if not (isinstance(yes, Linear) or isinstance(no, Linear)):
+        return np.where(condition, yes, no)
+    ends = [one if isinstance(one, Linear) else Linear({}) for one in (yes, no)]
+    places = {**ends[0].by, **ends[1].by}
+    return Linear({at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
 
 
-ARRAYS = ArrayFunctions()
+def _array_rotors(values: Iterable[Value]) -> Value:
+    return np.array([*values], dtype=float)[:, None]
+
+
+def _array_total(x: Value) -> Value:
+    return x.each(_array_total) if isinstance(x, Linear) else x if zero(x) else x.sum(axis=0)
+
+
+ARRAYS = Functions(
+    *(np.sqrt, np.exp, np.sin, np.cos, np.arctan2, np.floor, np.abs),
+    *(_array_where, np.maximum, np.minimum, _array_rotors, _array_total),
+)
+"""Functions of arrays over time, whose first axis is that of the rotors where there is one value for each of them."""
 
 
 class Each:
