@@ -170,7 +170,7 @@ def traced(
 
 @lru_cache(maxsize=32)
 def _compiled(source: str) -> Callable[..., Any]:
-    names: dict[str, Any] = dict(_FUNCTIONS)
+    names: dict[str, Any] = {**_FUNCTIONS, "inf": math.inf, "nan": math.nan}
     exec(compile(source, "<traced>", "exec"), names)
     return names["step"]  # type: ignore[no-any-return]
 
