@@ -15,7 +15,7 @@ from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import model_words, stopped_words, trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared, sentence
+from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared
 from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
@@ -33,8 +33,6 @@ MODELS = {
 }
 """The judged models in words."""
 
-_SPEAKS = {1: "For it", -1: "Against it"}
-_SIGNS = {1: "for", -1: "against"}
 _SCORES = (
     "Judged on",
     "Model",
@@ -61,52 +59,6 @@ _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("r2", "R²", r_squared),
     ("r2_body", "R² of body torque", r_squared),
 )
-
-
-def title(record: IdentifiedModel) -> str:
-    """Say what an identified model is."""
-    return f"an identified model {'on a rigid body' if record.on_rigid_body else 'without a rigid body'}."
-
-
-def grounds(record: IdentifiedModel) -> Iterator[str]:
-    """Say how far to trust an identified model, where, and why; or how to find out."""
-    if not record.validated:
-        yield (
-            "It holds only its scores: no bands, no residuals, no verdict. To add them, identify it again with "
-            "identification.validation.enabled: true: cpfls identify CONFIG FLIGHT... -o MODEL --set "
-            "identification.validation.enabled=true."
-        )
-        return
-    yield sentence(trust_words(record.trust).sentence)
-    if record.verdict is not None:
-        yield from [sentence(f"Region: {record.verdict.region}")] if record.verdict.region else []
-        for reason, speaks in record.verdict.reasons:
-            yield f"{_SPEAKS.get(speaks, 'To know')}: {sentence(reason)}"
-
-
-def worth(record: IdentifiedModel) -> Iterator[str]:
-    """Say what an identified model is worth that is used elsewhere."""
-    verdict, judged = record.verdict, record.judged
-    if verdict is None:
-        yield "Verdict: none; the model holds no validation."
-    else:
-        yield f"Verdict: {verdict.label}. {verdict.region or ''}".rstrip()
-        for reason, speaks in verdict.reasons:
-            yield f"- {_SIGNS.get(speaks, 'note')}: {reason}"
-    for part in judged.parts if MODEL in judged.models else ():
-        worst, r2 = judged.worst(MODEL, part)[0], judged.worst_r2(MODEL, part)
-        error = f"largest error {worst:.3g} of the largest torque"
-        yield f"Judged on {part} ({judged.samples_of(part)} samples), worst axis: {error}, R2 {r2:.4f}"
-    for finding in record.findings:
-        yield f"Finding: {finding}"
-    yield "Rotors, mass and all forces are those of the config."
-
-
-def cautions(record: IdentifiedModel) -> Iterator[str]:
-    """Say what speaks against an identified model, wherever it is taken."""
-    words = trust_words(record.trust)
-    if record.verdict is not None and words.tone == "warning":
-        yield ": ".join([f"its verdict is: {words.short}", *(reason for reason, _ in record.verdict.reasons[:1])])
 
 
 def unjudged(record: IdentifiedModel, path: object) -> Iterator[Text]:
@@ -354,10 +306,8 @@ def _scores(judged: Judged, parts: Iterable[str], models: Iterable[str], columns
 WORDS: Mapping[str, Any] = {
     "MODEL": MODEL,
     "RIGID_BODY": RIGID_BODY,
-    "grounds": grounds,
     "scores": _scores,
     "stopped_words": stopped_words,
-    "title": title,
     "words_of": model_words,
 }
 """What the template of an identified model knows."""

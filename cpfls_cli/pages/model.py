@@ -43,13 +43,9 @@ WORDS: Mapping[str, Any] = {
 def trust_box(model: Source[IdentifiedModel]) -> Box:
     """Say how far to trust an identified model, and why."""
     record = model.record
-    own, words, stopped = _of_identified(), model_words(record), stopped_words(record)
-    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{own.title(record)}"
-    return Box(words.short.upper(), title, list(own.grounds(record)), words.tone)
-
-
-def _of_identified() -> Any:
-    return import_module("cpfls_cli.pages.identification")
+    words, stopped, (title,) = model_words(record), stopped_words(record), said_by("identify", record, "title")
+    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{title}"
+    return Box(words.short.upper(), title, said_by("identify", record, "grounds"), words.tone)
 
 
 def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -82,8 +78,7 @@ def slow_words(vehicle: Vehicle) -> str:
 
 def against(record: AnyModel) -> list[str]:
     """Say what speaks against a model itself."""
-    found = isinstance(record, IdentifiedModel)
-    return list(_of_identified().cautions(record)) if found else said_by(record.MADE_BY, record, "against")
+    return said_by(record.MADE_BY, record, "against")
 
 
 def impossible_in_words(record: AnyModel) -> str:
@@ -98,11 +93,7 @@ def impossible_in_words(record: AnyModel) -> str:
 
 def worth_in_words(record: AnyModel) -> list[str]:
     """Say what a model that is used elsewhere is worth."""
-    return (
-        list(_of_identified().worth(record))
-        if isinstance(record, IdentifiedModel)
-        else said_by(record.MADE_BY, record, "usage")
-    )
+    return said_by(record.MADE_BY, record, "usage")
 
 
 def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[Block]:
