@@ -1,6 +1,6 @@
 """Print how often bands of 95 % hold the truth, in 200 simulated flights.
 
-    python benchmarks/band_coverage.py [--runs 200] [--seed 2027]
+    python -m benchmarks.band_coverage [--runs 200] [--seed 2027]
 
 Each flight has the same motion and new noise, 5 % of each torque's root mean square: white, or coloured (first-order
 autoregressive, time constant 5 samples). Bands are those of `cpfls identify`: 40 blocks, 200 draws. They are asked for
@@ -17,21 +17,14 @@ where they flew, and at rolls of 60 to 120 degrees, which they never saw.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy import signal
 
 from benchmarks.shared.full_circle import INERTIA, random_flight
+from benchmarks.shared.measure import table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions

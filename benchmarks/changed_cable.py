@@ -1,4 +1,4 @@
-"""A load on a cable beside flights of the bare vehicle: ``python benchmarks/changed_cable.py FOLDER --gusts 1``.
+"""A load on a cable beside flights of the bare vehicle: ``python -m benchmarks.changed_cable FOLDER --gusts 1``.
 
 The vehicles, flights and hidden loads of the blind study: fast, near the ground, climbing and descending, under an
 autopilot, with noise of all sensors. Five flights without a load are the reference, one or three with it today's; what

@@ -1,6 +1,6 @@
 """Propellers cut, taped, weights: what is said of CrazyPAD's groups of flights, beside the share of each command.
 
-    python benchmarks/changed_crazypad.py STUDY FOLDER [--keep FILE]
+    python -m benchmarks.changed_crazypad STUDY FOLDER [--keep FILE]
 
 FOLDER is `data/motor_data` of AerialRoboticsUUST/CrazyPAD; STUDY reads its logs, as `cpfls init` writes one. Reference
 are all normal flights of the same vehicle (E8, E9). The baseline is the mean share of each motor's command, in
@@ -11,21 +11,15 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.stats import spearmanr, t
 
 from benchmarks.changed_unchanged import numbers_of
+from benchmarks.shared.measure import table
 from cpfls_cli.changes.judge import FALSE_ALARM, changed
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.results import Changed

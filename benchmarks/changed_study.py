@@ -1,6 +1,6 @@
 """What is said of vehicles that nobody changed, and of fifteen changes at three sizes each, in flights with truth.
 
-    python benchmarks/changed_study.py quadrotor|hexarotor|nano [--draws N] [--trim SHARE] [--of CHANGE...]
+    python -m benchmarks.changed_study quadrotor|hexarotor|nano [--draws N] [--trim SHARE] [--of CHANGE...]
 
 Vehicles hover and fly gentle legs for 30 s in gusts, each day with another trim, battery, wind and gusts; their configs
 are off by what configs are off by. Numbers of flights are kept in a folder, so that they need not fly again.
@@ -18,15 +18,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
 from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
+from benchmarks.shared.measure import table
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers

@@ -1,6 +1,6 @@
 """False alarms on flights of a vehicle that nobody changed: each left out in turn, and random splits.
 
-    python benchmarks/changed_unchanged.py STUDY FLIGHT... [--splits N] [--keep FILE]
+    python -m benchmarks.changed_unchanged STUDY FLIGHT... [--splits N] [--keep FILE]
 
 The flights are logs of one vehicle, in any format that the study reads.
 """
@@ -13,14 +13,9 @@ import sys
 from hashlib import sha256
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
 from cpfls_cli.changes.results import Changed

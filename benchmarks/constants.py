@@ -1,6 +1,6 @@
 """Start from mass and geometry alone, and find the rest in flights: errors of the numbers, intervals that hold them.
 
-    python benchmarks/constants.py [PART...]
+    python -m benchmarks.constants [PART...]
 
 The parts, all if none is named: `speeds` (rotor speeds logged), `search` (and the structure looked for), `commands`
 (in per cent, and no rotor speed), `rotorpy` (flights in CPFLS_FLIGHTS), `mujoco` (flown there), `weight` (added).
@@ -15,18 +15,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight

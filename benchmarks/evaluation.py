@@ -1,6 +1,6 @@
 """One evaluation and one local search against plain references, decompositions, and what starting compiled code costs.
 
-python benchmarks/evaluation.py
+python -m benchmarks.evaluation
 """
 
 from __future__ import annotations
@@ -16,14 +16,9 @@ from time import process_time
 from typing import Any
 from unittest import mock
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, ratio_of, seconds, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, ratio_of, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification import least_squares
 from cpfls_cli.identification.data import TorqueData

@@ -1,26 +1,20 @@
 """One evaluation of an exported model in C (gcc -O2) beside the library, in a batch and one at a time; processor time.
 
-python benchmarks/export_speed.py
+python -m benchmarks.export_speed
 """
 
 from __future__ import annotations
 
 import ctypes
 import subprocess
-import sys
 import tempfile
 from functools import partial
 from pathlib import Path
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, table
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.source import c_source
 from cpfls_cli.fuzzy.inputs import InputRange

@@ -1,6 +1,6 @@
 """What the first use of each compiled loop takes in a new process: from nothing, and compiled before.
 
-python benchmarks/first_use.py
+python -m benchmarks.first_use
 
 Processor time of the first call alone; numba itself is loaded before. Compared are processes with an empty cache.
 """
@@ -15,7 +15,6 @@ from pathlib import Path
 from time import process_time
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Print the table of full-circle models: what each structure misses on full rotations that it never learned from.
 
-    python benchmarks/full_circle.py
+    python -m benchmarks.full_circle
 
 The structures are those of configs/full-circle.yaml and a few that are too large to search for. All learn from one
 flight of 54.86 s, the path optimised for the paper's structure, free of noise. Three random flights are kept to choose
@@ -10,16 +10,8 @@ the eight flights.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, seconds, table
-
-pin_threads()
 
 import numpy as np
 
@@ -33,6 +25,7 @@ from benchmarks.shared.full_circle import (
     searched,
     uniform_model,
 )
+from benchmarks.shared.measure import seconds, table
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.overrides import variants
 from cpfls_cli.identification.data import TorqueData, joined

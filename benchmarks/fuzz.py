@@ -29,10 +29,7 @@ from pathlib import Path
 from queue import Empty, Queue
 from threading import Thread
 
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
+from benchmarks.shared.measure import table
 from cpfls_cli.artifacts import patience
 from cpfls_cli.logs import matrices
 from tests.builders.command_line import run

@@ -1,6 +1,6 @@
 """Gains from one log, judged on simulated flights whose vehicle is known: margins as predicted, and as flown.
 
-    python benchmarks/gains_study.py [SEED [FLIGHTS]]
+    python -m benchmarks.gains_study [SEED [FLIGHTS]]
 
 Flights of `look_study.py` under the laws of four autopilots, logged at their ordinary rates: from each log come the
 vehicle and gains. The gains that are proposed fly the true vehicle in gusts and noise, with sines added to the command
@@ -10,17 +10,10 @@ ones, how often inside the predicted interval, and how often the flown gains hav
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.look_study import GUST_S, GUST_SIZE, GUSTS, GYRO_NOISE, Case, Lanes, flights
 from cpfls_cli.autopilots.law import AXES, Law

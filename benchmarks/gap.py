@@ -1,26 +1,19 @@
 """Time a diagnosis: how it grows with flight time, and what leaving out the heavier parts would save.
 
-python benchmarks/gap.py
+python -m benchmarks.gap
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
 from benchmarks.blind.cases import make
 from benchmarks.blind.generator import simulate_many
 from benchmarks.blind.measure import columns, disturb
+from benchmarks.shared.measure import table
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings

@@ -1,6 +1,6 @@
 """What `cpfls gap` says in gusts: names, their numbers, and the gusts, by level of gusts and by instrument.
 
-    python benchmarks/gap_in_gusts.py [DRAWS]
+    python -m benchmarks.gap_in_gusts [DRAWS]
 
 A vehicle of 45 g under an autopilot that knows no gust, four flights of 40 s a draw, the last one held out: of as many
 paths, with the position and velocity that were asked for in the log; of one path, without; or of as many, without. The
@@ -12,17 +12,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight

@@ -1,8 +1,8 @@
 """What `identify` finds of a body in gusts, by instruments and by least squares, with the intervals of the first.
 
-    python benchmarks/identify_in_gusts.py                   four runs of each path
-    python benchmarks/identify_in_gusts.py --setpoints       each path once, with the position that was asked for
-    python benchmarks/identify_in_gusts.py --past            each path once, so that what was before has to tell
+    python -m benchmarks.identify_in_gusts                   four runs of each path
+    python -m benchmarks.identify_in_gusts --setpoints       each path once, with the position that was asked for
+    python -m benchmarks.identify_in_gusts --past            each path once, so that what was before has to tell
 
 A vehicle of 45 g, sets of four flights of 40 s, six of each path or of each four, of 0.8, 3 and 5 Hz at most, in two
 levels of gusts, behind loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the
@@ -20,17 +20,11 @@ import argparse
 import sys
 from collections.abc import Sequence
 from itertools import islice, product
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.closed_loop import freed_torque
 from cpfls_cli.identification.data import TorqueSource, axis_scale, joined

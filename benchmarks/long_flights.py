@@ -1,6 +1,6 @@
 """Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
 
-python benchmarks/long_flights.py [--most 5000000] [--effects]
+python -m benchmarks.long_flights [--most 5000000] [--effects]
 
 Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
 peak memory is read at its end. Draws docs/long-flights.svg. A model with effects predicts a flight of 40 s with rotor
@@ -19,12 +19,6 @@ from mmap import mmap
 from pathlib import Path
 from time import perf_counter
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import h5py
 import numpy as np
 from matplotlib.figure import Figure
@@ -32,6 +26,7 @@ from matplotlib.figure import Figure
 from benchmarks.blind.cases import make
 from benchmarks.blind.generator import generate, write
 from benchmarks.blind_study.fly import config as config_of
+from benchmarks.shared.measure import table
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION

@@ -3,10 +3,6 @@
 Prints Markdown: share of draws whose 95 % interval holds the truth, and the mean half-width. A minute.
 """
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
 from cpfls_cli.look.balance import balance_of

@@ -1,15 +1,11 @@
 """Judge what `look` says of a vehicle's axes on simulated flights whose truth is known.
 
 Rigid axes behind rotors with lag and delay, in torque gusts, under the control laws of four autopilots that step as
-they do on board; logs at the ordinary rates of each. Usage: ``python benchmarks/look_study.py [SEED [FLIGHTS]]``;
+they do on board; logs at the ordinary rates of each. Usage: ``python -m benchmarks.look_study [SEED [FLIGHTS]]``;
 seed 2 is what thresholds were chosen on, seed 4 what the table in docs/look-study.md was judged on.
 """
 
 from __future__ import annotations
-
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
 from dataclasses import dataclass, replace

@@ -1,9 +1,9 @@
 """Print what models predict of the nano-drone benchmark's test flights, beside the models that are published.
 
-    python benchmarks/nanodrone.py DATA [--unknown]
-    python benchmarks/nanodrone.py DATA --history             a forecast that uses 0.5 s of the past, and without it
-    python benchmarks/nanodrone.py DATA --repeats             moments of inertia by runs of each path, and of all
-    python benchmarks/nanodrone.py DATA --write FOLDER        the prepared flights as CSV, and nothing else
+    python -m benchmarks.nanodrone DATA [--unknown]
+    python -m benchmarks.nanodrone DATA --history             a forecast that uses 0.5 s of the past, and without it
+    python -m benchmarks.nanodrone DATA --repeats             moments of inertia by runs of each path, and of all
+    python -m benchmarks.nanodrone DATA --write FOLDER        the prepared flights as CSV, and nothing else
 
 DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
 flights; a folder that holds the files of `data/real/raw/parquets`, `data/real/processed/train`, `data/sim` and
@@ -36,16 +36,11 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
 from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.found_vehicles import constants_unknown, fitted_blocks, learned
+from benchmarks.shared.measure import table
 from benchmarks.shared.nanodrone_files import STATED, TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
     SHOWN,

@@ -1,7 +1,7 @@
 """Print what models predict of six fast flights of NeuroBEM, each held out once, beside BEM+NN.
 
-    python benchmarks/neurobem.py DATA [--unknown] [--held-out NAME ...]
-    python benchmarks/neurobem.py DATA --write FOLDER         the segments as CSV, and nothing else
+    python -m benchmarks.neurobem DATA [--unknown] [--held-out NAME ...]
+    python -m benchmarks.neurobem DATA --write FOLDER         the segments as CSV, and nothing else
 
 DATA is a clone of RCL-NUS/NeuroMHE (commit 64e184c), or any folder with its files bemnn*.mat in it or below it. They
 hold test segments of NeuroBEM (Bauersfeld et al. 2021) with the torques and forces that its model BEM+NN gives.
@@ -21,17 +21,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.found_vehicles import constants_unknown, learned
+from benchmarks.shared.measure import table
 from benchmarks.shared.neurobem_files import INERTIA, MASS, VEHICLE, Segment, segments
 from benchmarks.shared.playback_scores import HORIZON, Runs, free_runs, nothing_moves, rate_stays, score
 from cpfls_cli.arrays import Array

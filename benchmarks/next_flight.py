@@ -1,6 +1,6 @@
 """Settle what a diagnosis leaves open by one more flight: the planned one, a random one, or the one of the advice.
 
-python benchmarks/next_flight.py [SETS]
+python -m benchmarks.next_flight [SETS]
 
 Flights of the own simulator hide one effect; those whose diagnosis is AMBIGUOUS between it and a rival are kept, half
 of the sets with each of two seeds. One more flight of 30 s goes to those that train, and the diagnosis is made again.
@@ -14,19 +14,13 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
-from pathlib import Path
 from time import perf_counter
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
 from benchmarks.blind.vehicles import HUMMINGBIRD, SIXKG, XQUAD
 from benchmarks.gap import vehicle_of
+from benchmarks.shared.measure import table
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError

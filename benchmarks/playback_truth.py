@@ -1,6 +1,6 @@
 """Fit flights of a known vehicle: errors of the numbers, how often intervals hold the truth, which blocks are chosen.
 
-    python benchmarks/playback_truth.py [SEEDS] [SEARCHES]
+    python -m benchmarks.playback_truth [SEEDS] [SEARCHES]
 
 Each seed is nine flights of 20 s with lag, damping, drag, flapping and wrong constants at once
 (tests/builders/playback_flights.py), logged with white and with coloured noise, and three flights that judge. SEEDS
@@ -12,18 +12,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.stats import t as student
 
+from benchmarks.shared.measure import table
 from benchmarks.shared.playback_scores import SYMBOLS, free_runs, score
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, FitWindows, fit, uncertainty

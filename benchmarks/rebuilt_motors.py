@@ -1,6 +1,6 @@
 """Print how well thinned motors are rebuilt, and what wrong ones do to the constants that are found with them.
 
-    python benchmarks/rebuilt_motors.py [LOG...]
+    python -m benchmarks.rebuilt_motors [LOG...]
 
 Simulated flights under the laws of PX4, ArduPilot and Betaflight, in gusts, with commands that reach their limits.
 Their motors are thinned to what each autopilot logs by default, rebuilt, and compared with all of its steps. Then the
@@ -13,14 +13,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.rebuilt import Rebuilt, rebuilt_rotors
 from cpfls_cli.flightlog.smoothing import low_pass

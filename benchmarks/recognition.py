@@ -1,6 +1,6 @@
 """Print how many signals `cpfls init` maps right in logs of others, without a hand on them.
 
-    python benchmarks/recognition.py FOLDER...
+    python -m benchmarks.recognition FOLDER...
 
 Folders are searched for logs of the sets below, by the names of their files; what is right is what each set says of
 itself (or PX4, ArduPilot and Betaflight of their logs), written down here. A signal counts as right where columns,
@@ -17,12 +17,7 @@ from dataclasses import dataclass, field
 from math import isclose
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
+from benchmarks.shared.measure import table
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess
@@ -295,7 +290,7 @@ def main(folders: Sequence[Path]) -> None:
             for wrong in count.wrong:
                 print(f"{name}: {wrong}", file=sys.stderr)
     if not rows:
-        sys.exit("no log of a known set in these folders; call it as: python benchmarks/recognition.py FOLDER...")
+        sys.exit("no log of a known set in these folders; call it as: python -m benchmarks.recognition FOLDER...")
     header = (
         "set",
         "logs",

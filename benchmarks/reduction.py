@@ -1,6 +1,6 @@
 """Reduction of the paper's training path by our criteria and by others: conditioning, what the models are worth, time.
 
-python benchmarks/reduction.py
+python -m benchmarks.reduction
 
 Time is set against the greedy rule done with one eigensolve per candidate and step, extrapolated from a few hundred
 eigensolves timed in turn with each selection; the larger the number, the faster. A model is fitted to the selected
@@ -11,21 +11,14 @@ A sample is three rows. To packages that take one vector per sample it is the ve
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, seconds, table
-
-pin_threads()
 
 import numpy as np
 import scipy.linalg
 
+from benchmarks.shared.measure import in_turn, seconds, table
 from benchmarks.shared.studies import paper_flight, regressor_matrix
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings

@@ -1,6 +1,6 @@
 """What of a gap comes again in gusts, beside the truth of the same paths in still air, and how often gusts alone do.
 
-    python benchmarks/repeated_gaps.py [DRAWS]
+    python -m benchmarks.repeated_gaps [DRAWS]
 
 A vehicle of 45 g on two paths a draw, each flown four times for 40 s: with a drag and a damping that the model does not
 know, in gusts and in still air, and with neither, in gusts.
@@ -9,18 +9,11 @@ know, in gusts and in still air, and with neither, in gusts.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain

@@ -1,6 +1,6 @@
 """19,350 free runs of 50 steps by the compiled loops, beside the same in NumPy over all windows at once; one core.
 
-python benchmarks/replay.py
+python -m benchmarks.replay
 
 The flights are simulated (tests/builders/playback_flights.py): three of 65 s at 100 Hz, run from every sample. Times
 are processor times and hold the weights of each sample as well as the runs; code is compiled before.
@@ -8,21 +8,14 @@ are processor times and hold the weights of each sample as well as the runs; cod
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, seconds, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, seconds, table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers

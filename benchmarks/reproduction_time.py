@@ -1,6 +1,6 @@
 """Time of an evaluation and of the singular value decomposition in it, by the size of the training set.
 
-python benchmarks/reproduction_time.py [--out FILE]
+python -m benchmarks.reproduction_time [--out FILE]
 
 With FILE the rows go there and nowhere else, as JSON for `benchmarks/paper/report.py --times`: no artifact holds a
 time, so that equal content stays an equal file. Seconds of processor time, medians.
@@ -10,22 +10,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
 from benchmarks.paper.claims import line_through
+from benchmarks.shared.measure import table
 from benchmarks.shared.studies import paper_flight, paper_study, regressor_matrix
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator

@@ -1,6 +1,6 @@
 """Vehicles exported for simulators and libraries: flown along flights beside the library, and what a step takes.
 
-    python benchmarks/simulators.py [playback] [steps]
+    python -m benchmarks.simulators [playback] [steps]
 
 Flights: the example's kind (a vehicle with lag, damping, drag and flapping, noise in its log), RotorPy's with its own
 hidden effects, and a real Crazyflie with motor commands and a gyroscope alone, by the vehicle that its config states
@@ -17,14 +17,9 @@ from functools import partial
 from pathlib import Path
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.config.load import load_study
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.registry import FORMS, exported

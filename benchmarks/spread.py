@@ -1,8 +1,8 @@
 """How often 1000 closed-loop flights of vehicles that were drawn hold the rates of a flight that was held out.
 
-    python benchmarks/spread.py simulated
-    python benchmarks/spread.py real DATA [COUNT]
-    python benchmarks/spread.py nanobench DATA [COUNT]
+    python -m benchmarks.spread simulated
+    python -m benchmarks.spread real DATA [COUNT]
+    python -m benchmarks.spread nanobench DATA [COUNT]
 
 simulated: two vehicles of 45 g and 1.5 kg in gusts, whose truth is known. A path with sines of up to 5 Hz is flown four
 times, 20 s each; the constants, how they go together, and the gusts are found in these flights as `cpfls vehicle` does
@@ -35,16 +35,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
 
-from benchmarks.shared.measure import pin_threads, table
+from benchmarks.shared.measure import table
 from benchmarks.shared.nanobench_files import VEHICLE as NANOBENCH
 from benchmarks.shared.nanobench_files import commanded_flights, playback_of
 from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
-
-pin_threads()
-
-import numpy as np
 
 try:
     import jax

@@ -1,6 +1,6 @@
 """Print how often `cpfls trend` finds a change where there is none, and where and how often it finds one of each size.
 
-    python benchmarks/trends.py [--rows 100] [--seed 2029]
+    python -m benchmarks.trends [--rows 100] [--seed 2029]
 
 Numbers are drawn, not flown: those of the paper's quadrotor from day to day (loads, vibration and delays, ten numbers),
 normal, of the scatter that is usual or half, one and a half or twice that, which the program is not told. A row is
@@ -11,17 +11,10 @@ from the flight on at two thirds of a row, in its usual deviations.
 from __future__ import annotations
 
 import argparse
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import FALSE_ALARM
 from cpfls_cli.changes.reference import Reference

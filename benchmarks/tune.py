@@ -1,6 +1,6 @@
 """Gains for autopilots: margins, overshoot and rise as predicted, and as flown by the true vehicle in gusts.
 
-    python benchmarks/tune.py [AUTOPILOT ...]
+    python -m benchmarks.tune [AUTOPILOT ...]
 
 Three vehicles of 35 g, 1.2 kg and 4.5 kg, each flown by the control laws of the autopilots: with their defaults, which
 is the baseline, and with gains for 45 degrees over intervals of 10 % of inertia and 20 % of the rotors' lag. Flown are
@@ -15,16 +15,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import table
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.gusts import Gusts

@@ -1,6 +1,6 @@
 """Time whole identifications of the paper's study, and show where the time goes.
 
-python benchmarks/whole_run.py [--full]     --full adds 500 x 200, which takes a quarter of an hour or more
+python -m benchmarks.whole_run [--full]     --full adds 500 x 200, which takes a quarter of an hour or more
 """
 
 from __future__ import annotations
@@ -9,18 +9,12 @@ import cProfile
 import pstats
 import sys
 from dataclasses import replace
-from pathlib import Path
 from statistics import median
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify

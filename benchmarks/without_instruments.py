@@ -1,6 +1,6 @@
 """Gusty flights that nothing tells apart from the loop: what `cpfls vehicle` says of them, whole.
 
-    python benchmarks/without_instruments.py [DRAWS]
+    python -m benchmarks.without_instruments [DRAWS]
 
 Two vehicles of 45 g and 1.5 kg in three levels of gusts, on paths of 0.8 Hz at most and with sines of up to 5 Hz: three
 paths of 30 s, each flown once, no setpoint logged; mass and places of the rotors are known. No moment that is called
@@ -19,15 +19,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import yaml
 
 from benchmarks.shared.flight_csv import write_flight
+from benchmarks.shared.measure import table
 from tests.builders.gusty_flights import CALM, GRAVITY, GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights
 
 DRAWS = 1

@@ -1,26 +1,19 @@
 """Speed of two workers against one, by kind of worker, on a generation of the paper's study with all 5487 samples.
 
-python benchmarks/workers.py
+python -m benchmarks.workers
 """
 
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 from time import perf_counter
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from benchmarks.blind_study.baselines import baselines
+
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError

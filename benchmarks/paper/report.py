@@ -1,18 +1,15 @@
 """The report on the paper: the page of `cpfls report`, the paper's figures beside ours, and its claims one by one.
 
-python benchmarks/paper/report.py CONFIG ARTIFACT... -o report.html [--times times.json]
+python -m benchmarks.paper.report CONFIG ARTIFACT... -o report.html [--times times.json]
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from benchmarks.paper.beside import with_the_paper
 from benchmarks.paper.claims import EvaluationTime, PaperSources, compares_readings
