@@ -39,11 +39,12 @@ FLAPPING = 8e-9
 
 
 class Asked(NamedTuple):
-    """Which vehicle flies which path, in which wind, s."""
+    """Which vehicle flies which path in which wind, and whether setpoints are logged."""
 
     vehicle: str
     path: int
     draw: int
+    setpoints: bool
 
 
 def main(draws: int = 4) -> None:
@@ -53,7 +54,9 @@ def main(draws: int = 4) -> None:
             for kind in KINDS:
                 paths, runs = (REPEATED, RUNS) if kind == "repeats" else (PATHS, 1)
                 each = product(range(draws), range(paths), range(runs))
-                asked = [Asked(name, paths * draw + path, runs * draw + run) for draw, path, run in each]
+                asked = [
+                    Asked(name, paths * draw + path, runs * draw + run, kind == "setpoints") for draw, path, run in each
+                ]
                 flown, vehicle = pool.map(_flown, asked), _settings(_parameters(name))
                 sets = [list(islice(flown, paths * runs)) for _ in range(draws)]
                 rows.append([name, kind, *cells_of_moments(vehicle, kind, sets), *_bounds(vehicle, sets)])
@@ -136,7 +139,7 @@ def _flown(asked: Asked) -> PlaybackFlight:
     position, velocity, turned, rate, speed = np.split(np.array(logs), [3, 6, 10, 13], axis=1)
     speed = speed + SPEED_NOISE * hover.mean() * rng.standard_normal(speed.shape)
     motion = MeasuredMotion(position, velocity, Rotation.from_quat(turned).as_matrix(), rate, STEP_S * EVERY)
-    setpoints = {"position": path[::EVERY, :3], "velocity": path[::EVERY, 3:6]}
+    setpoints = {"position": path[::EVERY, :3], "velocity": path[::EVERY, 3:6]} if asked.setpoints else {}
     return PlaybackFlight(
         name=f"rotorpy-{asked.path}-{asked.draw}", motion=motion, speed=speed, hold="linear",
         stretches=(slice(0, len(speed)),), setpoints=setpoints,

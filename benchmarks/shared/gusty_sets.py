@@ -34,7 +34,7 @@ def words(gusts: Sequence[float]) -> str:
 def flown_sets(
     flown: Flight, kind: str, draws: int, seconds: float, repeated: int = REPEATED
 ) -> Iterator[list[PlaybackFlight]]:
-    """Fly another set of paths and gusts for each draw."""
+    """Fly another set of paths and gusts for each draw; logs of one kind alone hold the setpoints."""
     paths, runs = (repeated, RUNS) if kind == "repeats" else (PATHS, 1)
     asked = [
         flown._replace(path=paths * draw + path, draw=runs * draw + run)
@@ -44,12 +44,12 @@ def flown_sets(
     ]
     flights = gusty_flights(asked, seconds)
     for _ in range(draws):
-        yield list(islice(flights, paths * runs))
+        own = list(islice(flights, paths * runs))
+        yield own if kind == "setpoints" else [replace(flight, setpoints={}) for flight in own]
 
 
 def instruments_of(kind: str, flights: Sequence[PlaybackFlight]) -> Instruments:
-    """Give the instruments of one kind alone."""
-    flights = flights if kind == "setpoints" else [replace(flight, setpoints={}) for flight in flights]
+    """Give the instruments that the flights of a kind have."""
     given = instruments(list(flights))
     # Paths of the same frequencies may come near each other, which is no repeat that was asked for.
     return given if kind == "repeats" else replace(given, repeats=Repeats(tuple({} for _ in given.runs), {}))
@@ -67,7 +67,7 @@ def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFli
     moments = tuple(2 * moment for moment in vehicle.inertia_kg_m2[:3])
     begun = replace(vehicle, inertia_kg_m2=(*moments, 0.0, 0.0, 0.0), unknown=("inertia",))
     given = instruments_of(kind, flights)
-    found = (constants_of_past if kind == "past" else find_constants)(begun, list(given.flown), given)
+    found = (constants_of_past if kind == "past" else find_constants)(begun, flights, given)
     if found is None:
         return np.ones(2), np.ones(2), np.zeros(2, dtype=bool)
     places = [found.fitted.free.index[name] for name in LOG_INERTIA[:2]]
