@@ -1,13 +1,13 @@
 """What `identify` finds of a body in gusts, by instruments and by least squares, with the intervals of the first.
 
-A vehicle of 45 g, sets of four flights of 40 s, six of each path or of each four, of 0.8, 3 and 5 Hz at most, in two
-levels of gusts, behind loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the
-package flies them. The other runs of a path are the instrument, or the setpoint, each path flown once. A row is a level of gusts and a loop: in how many of its 18 sets the instruments decide, errors of
-the moments there as root mean squares of their logarithms, and how often 95 % intervals hold the truth, around either
-estimate. The last row is of all.
+A vehicle of 45 g, sets of four flights of 40 s of one path, whose other runs are the instrument, or with --setpoints of
+four paths and their position setpoints; six sets of each of 0.8, 3 and 5 Hz at most, in two levels of gusts, behind
+loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. A row is a level of gusts and a loop: in
+how many of its 18 sets the instruments decide, errors of the moments there as root mean squares of their logarithms,
+and how often 95 % intervals hold the truth, around either estimate. The last row is of all.
 
-By what was before (past): vehicles of 45 g and 1.5 kg, sets of three flights of three paths, eight of each, behind a loop of 6
-rad/s; a row is a vehicle, a level of gusts (or none) and the fastest motion of its paths.
+With --past: vehicles of 45 g and 1.5 kg, sets of three flights of three paths without setpoints, eight of each, behind
+a loop of 6 rad/s; a row is a vehicle, a level of gusts (or none) and the fastest motion of its paths.
 """
 
 from __future__ import annotations

@@ -55,9 +55,8 @@ def main(draws: int = 6) -> None:
     known = np.isfinite(told[2] + told[3])[MODELLED]
     print(f"\nshares within their intervals: {np.mean(inside):.3f} of {np.size(inside)}")
     print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
-    print(
-        f"gusts alone: {sum(one.sure.sum() for one in alone)} of {sum(one.sure.size for one in alone)} are called repeatable"
-    )
+    sure = np.array([one.sure for one in alone])
+    print(f"gusts alone: {sure.sum()} of {sure.size} are called repeatable")
     print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
 
 

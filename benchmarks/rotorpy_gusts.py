@@ -42,9 +42,9 @@ class Asked(NamedTuple):
     """Which vehicle flies which path in which wind, and whether setpoints are logged."""
 
     vehicle: str
+    setpoints: bool
     path: int
     draw: int
-    setpoints: bool
 
 
 def main(draws: int = 4) -> None:
@@ -54,9 +54,8 @@ def main(draws: int = 4) -> None:
             for kind in KINDS:
                 paths, runs = (REPEATED, RUNS) if kind == "repeats" else (PATHS, 1)
                 each = product(range(draws), range(paths), range(runs))
-                asked = [
-                    Asked(name, paths * draw + path, runs * draw + run, kind == "setpoints") for draw, path, run in each
-                ]
+                own = name, kind == "setpoints"
+                asked = [Asked(*own, paths * draw + path, runs * draw + run) for draw, path, run in each]
                 flown, vehicle = pool.map(_flown, asked), _settings(_parameters(name))
                 sets = [list(islice(flown, paths * runs)) for _ in range(draws)]
                 rows.append([name, kind, *cells_of_moments(vehicle, kind, sets), *_bounds(vehicle, sets)])
