@@ -121,16 +121,8 @@ class Group(NamedTuple):
     @property
     def counts(self) -> list[int]:
         """Whether it is found, named, among those alike, wrongly named; found by the share, its rotor by the share."""
-        by_share = self.share in self.right
-        wrong = bool(self.sure - {self.right})
-        return [
-            self.run.changed,
-            self.sure == {self.right},
-            self.right in self.listed,
-            wrong,
-            self.share != "—",
-            by_share,
-        ]
+        ours = self.run.changed, self.sure == {self.right}, self.right in self.listed, bool(self.sure - {self.right})
+        return [*ours, self.share != "—", self.share in self.right]
 
 
 KINDS = {
@@ -158,9 +150,8 @@ def _crazypad(study: Study, flights: dict[str, FlightNumbers]) -> None:
     table("changed_crazypad", "group | what was done | said | p | size of M3 | by the share of commands", rows)
     print()
     chosen = {kind: [each for each in judged if of(each)] for kind, of in KINDS.items()}
-    rows = [
-        [kind, len(own), *map(sum, zip(*(each.counts for each in own), strict=True))] for kind, own in chosen.items()
-    ]
+    counts = {kind: np.array([each.counts for each in own], dtype=int) for kind, own in chosen.items()}
+    rows = [[kind, len(each), *each.reshape(-1, 6).sum(axis=0)] for kind, each in counts.items()]
     columns = "done | groups | found | named | among those alike | wrong name | found by share | rotor by share"
     table("changed_crazypad_counts", columns, rows)
     for line in _correlations(chosen["M3 cut"]):
