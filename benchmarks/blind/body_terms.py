@@ -51,6 +51,10 @@ class ParasiticDrag(Term):
         now.torque[:, r] += cross(self.centre, force)
 
 
+class ParasiticPower(ParasiticDrag):
+    """The same with another power."""
+
+
 class TorqueBias(Term):
     """A constant torque."""
 

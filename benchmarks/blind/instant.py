@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,6 +44,11 @@ class Term:
 
     stage = "body"
     state = None
+    kinds: ClassVar = {}
+    """All of them by the name of the effect, in the order in which they act."""
+
+    def __init_subclass__(cls):
+        Term.kinds[re.sub(r"(?<!^)([A-Z])", r"_\1", cls.__name__).lower()] = cls
 
     def __init__(self, rows, parameters, vehicles, rngs):
         self.rows = np.asarray(rows)

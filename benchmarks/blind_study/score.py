@@ -28,10 +28,6 @@ _CANCELS = 0.3
 """Share of the gap beyond all of it, or below none, from which on effects work against one another."""
 
 CERTAIN = ("NAMED", "AMBIGUOUS")
-OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
-
-NOT_COLUMNS = frozenset({"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay", "parameter_error"})
-"""Effects that are not found by a search among columns."""
 
 
 @dataclass(frozen=True)
@@ -177,16 +173,7 @@ def _at_bound(value, low, high):
 
 
 def scored(folder):
-    """Join keys and results.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    list of Scored
-    """
+    """Join keys and results."""
     folder = Path(folder)
     out = []
     for line in (folder / "results.jsonl").read_text(encoding="utf-8").splitlines():
@@ -211,19 +198,7 @@ def _over_flights(sizes, only):
 
 
 def outcome(key, said):
-    """Compare the names given with those hidden.
-
-    Wind acts through rotor drag, so a wind includes its drag.
-
-    Parameters
-    ----------
-    key, said : dict
-
-    Returns
-    -------
-    str
-        One of ``OUTCOMES``.
-    """
+    """Compare the names given with those hidden; wind acts through rotor drag, so a wind includes its drag."""
     if said["verdict"] == "ERROR":
         return ERROR
     truth, names = set(key["truth"]), {effect["name"] for effect in said["effects"]}
@@ -262,16 +237,7 @@ def _with_rivals(said, names, truth):
 
 
 def numbers(each):
-    """Compare the coefficients of rightly named effects with the hidden ones.
-
-    Parameters
-    ----------
-    each : Scored
-
-    Returns
-    -------
-    list of Number
-    """
+    """Compare the coefficients of rightly named effects with the hidden ones."""
     true = coefficients(each.key)
     return [
         number
