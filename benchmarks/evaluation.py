@@ -1,24 +1,16 @@
-"""One evaluation and one local search against plain references, decompositions, and what starting compiled code costs.
-
-python -m benchmarks.evaluation
-"""
+"""One evaluation and one local search against plain references, and decompositions of a Gram matrix."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from time import process_time
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
-from benchmarks.shared.measure import in_turn, ratio_of, seconds, table
+from benchmarks.shared.measure import Ratio, in_turn, program, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification import least_squares
 from cpfls_cli.identification.data import TorqueData
@@ -38,7 +30,6 @@ TIMED = 5
 # Membership functions of each partition, for 113, 241, 417 and 1233 columns.
 FUNCTIONS = (5, 7, 9, 15)
 TOLERANCE = 1e-6
-REPEATS = 5
 
 
 def main() -> None:
@@ -50,51 +41,29 @@ def main() -> None:
         ("5487", flight, flight),
     )
     print("One evaluation, no local search:\n")
+    columns = (
+        "samples | by singular values, ms | by Gram matrix, ms | compiled, ms | times faster than the first (range) | "
+        "than the second (range) | compared | largest relative difference"
+    )
     table(
-        "evaluation",
-        (
-            "samples",
-            "by singular values, ms",
-            "by Gram matrix, ms",
-            "compiled, ms",
-            "times faster than the first (range)",
-            "than the second (range)",
-            "compared",
-            "largest relative difference",
-        ),
-        [(name, *evaluation(training, learned, settings)) for name, training, learned in cases],
+        "evaluation", columns, [(name, *evaluation(training, learned, settings)) for name, training, learned in cases]
     )
     print("\nOne local search:\n")
+    columns = (
+        "samples | 2-point, ms | variable projection, ms | times faster (range) | passes over the samples, theirs and "
+        "ours | times fewer | times by code | MSE, ours over theirs"
+    )
     table(
         "local_search",
-        (
-            "samples",
-            "2-point, ms",
-            "variable projection, ms",
-            "times faster (range)",
-            "passes over the samples, theirs and ours",
-            "times fewer",
-            "times by code",
-            "MSE, ours over theirs",
-        ),
+        columns,
         [(name, *local_search(training, learned, settings)) for name, training, learned in cases],
     )
     print("\nDecompositions of the Gram matrix of random attitudes:\n")
-    table(
-        "decompositions",
-        (
-            "membership functions",
-            "columns",
-            "all eigenvectors, ms",
-            "the lowest, ms",
-            "times faster (range)",
-            "Lanczos, ms",
-            "times faster (range)",
-        ),
-        [decompositions(functions) for functions in FUNCTIONS],
+    columns = (
+        "membership functions | columns | all eigenvectors, ms | the lowest, ms | times faster (range) | Lanczos, ms | "
+        "times faster than all (range)"
     )
-    print("\nStarting:\n")
-    table("start", ("what", "seconds"), starting())
+    table("decompositions", columns, [decompositions(functions) for functions in FUNCTIONS])
 
 
 def evaluation(training, learned, settings: IdentificationSettings) -> tuple[float, float, float, str, str, int, float]:
@@ -107,8 +76,8 @@ def evaluation(training, learned, settings: IdentificationSettings) -> tuple[flo
     comparable = theirs[:, 2] < LARGEST_CONDITION
     difference = np.max(np.abs(ours[comparable] / theirs[comparable] - 1.0))
     some = genes[:TIMED]
-    by_values = in_turn(lambda: densely(slow, some, reference._solve), lambda: fast(some), REPEATS, process_time)
-    by_gram = in_turn(lambda: densely(slow, some, by_gram_matrix), lambda: fast(some), REPEATS, process_time)
+    by_values = in_turn(lambda: densely(slow, some, reference._solve), lambda: fast(some))
+    by_gram = in_turn(lambda: densely(slow, some, by_gram_matrix), lambda: fast(some))
     milliseconds = (1e3 * spent / TIMED for spent in (by_values.slow_s, by_gram.slow_s, by_gram.fast_s))
     return (*milliseconds, by_values.range, by_gram.range, int(comparable.sum()), float(difference))
 
@@ -150,10 +119,10 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
         ours = partial(refine, problem, start, products, budget)
         after, _, few = counted(ours, Samples, "products", "moved")
         passes.append((many, few))
-        times.append((slow_s, seconds(ours, process_time)))
+        times.append((slow_s, seconds(ours)))
         mse = plain(np.array([encode(before), after.genes])).objectives[:, 0]
         ends.append(mse[1] / mse[0])
-    timed, (many, few) = ratio_of(times), np.median(passes, axis=0)
+    timed, (many, few) = Ratio.of(times), np.median(passes, axis=0)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"
     told = f"{many:.0f} and {few:.0f}", many / few, timed.ratio * few / many
     return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, *told, quality
@@ -189,8 +158,8 @@ def decompositions(functions: int) -> tuple[int, int, float, float, str, float, 
         found.apply(size)
 
     every, lowest, lanczos = partial(inverted, 10**6, 10**6), partial(inverted, 1, 10**6), partial(inverted, 1, 1)
-    some = in_turn(every, lowest, REPEATS, process_time)
-    few = in_turn(every, lanczos, REPEATS, process_time)
+    some = in_turn(every, lowest)
+    few = in_turn(every, lanczos)
     spent = 1e3 * some.slow_s, 1e3 * some.fast_s, some.range, 1e3 * few.fast_s, few.range
     return functions, structure.parameters, *spent
 
@@ -201,31 +170,5 @@ def well_conditioned(plain: Evaluator) -> np.ndarray:
     return genes[plain(genes).objectives[:, 2] < LARGEST_CONDITION][:TIMED]
 
 
-def starting() -> list[tuple[str, float]]:
-    """Time starting the program, and compiling once against loading what was compiled."""
-    version = [sys.executable, "-m", "cpfls_cli", "--version"]
-    one = "from benchmarks.evaluation import evaluate_one; evaluate_one()"
-    with tempfile.TemporaryDirectory() as cache:
-        environment = dict(os.environ, NUMBA_CACHE_DIR=cache, PYTHONPATH=str(Path(__file__).resolve().parents[1]))
-
-        def run(command: list[str]) -> float:
-            return seconds(partial(subprocess.run, command, env=environment, check=True, stdout=subprocess.DEVNULL))
-
-        nothing = [sys.executable, "-c", "pass"]
-        return [
-            ("Python alone", min(run(nothing) for _ in range(5))),
-            ("`cpfls --version`", min(run(version) for _ in range(5))),
-            ("one evaluation in a new process, compiling", run([sys.executable, "-c", one])),
-            ("the same, compiled before", min(run([sys.executable, "-c", one]) for _ in range(3))),
-        ]
-
-
-def evaluate_one() -> None:
-    """Evaluate one chromosome with local search."""
-    data = paper_flight()[:200]
-    evaluator = model_evaluator(data, data, paper_study().identification)
-    evaluator(np.full((1, evaluator.structure.genes), 30000))
-
-
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,6 +1,4 @@
-"""Print the table of full-circle models: what each structure misses on full rotations that it never learned from.
-
-    python -m benchmarks.full_circle
+"""What each structure of a full-circle model misses on full rotations that it never learned from.
 
 The structures are those of configs/full-circle.yaml and a few that are too large to search for. All learn from one
 flight of 54.86 s, the path optimised for the paper's structure, free of noise. Three random flights are kept to choose
@@ -25,7 +23,7 @@ from benchmarks.shared.full_circle import (
     searched,
     uniform_model,
 )
-from benchmarks.shared.measure import seconds, table
+from benchmarks.shared.measure import program, seconds, table
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.overrides import variants
 from cpfls_cli.identification.data import TorqueData, joined
@@ -33,8 +31,10 @@ from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.structure import model_structure
 
-COLUMNS = ("structure", "parameters", "rank", "condition number", "random states", "uniform", "genetic", "held-out")
-MORE = ("rms, held-out", "evaluations", "s")
+COLUMNS = (
+    "structure | parameters | rank | condition number | random states | uniform | genetic | held-out | "
+    "rms, held-out | evaluations | s"
+)
 # Too many for the sweep of the study, which is to take a minute.
 LARGER = {
     "seesaw, 9 functions": {"consequents": "seesaw", "products": "additive", "membership_functions": 9},
@@ -72,7 +72,7 @@ def main() -> None:
     own = optimised_flight(study.identification)
     name = "harmonic 2 tensor, 1 function, on its own path"
     rows.append(uniform_row(name, study.identification, own, states, unseen))
-    table("full_circle", (*COLUMNS, *MORE), rows)
+    table("full_circle", COLUMNS, rows)
 
 
 def baselines(training: TorqueData, unseen: list[TorqueData]) -> Iterator[tuple]:
@@ -106,4 +106,4 @@ def uniform_row(name: str, settings: IdentificationSettings, training, states, u
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

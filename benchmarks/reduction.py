@@ -1,7 +1,5 @@
 """Reduction of the paper's training path by our criteria and by others: conditioning, what the models are worth, time.
 
-python -m benchmarks.reduction
-
 Time is set against the greedy rule done with one eigensolve per candidate and step, extrapolated from a few hundred
 eigensolves timed in turn with each selection; the larger the number, the faster. A model is fitted to the selected
 samples with 5 % torque noise; its error is the largest one over the whole path without noise, over the largest torque.
@@ -18,7 +16,7 @@ from functools import partial
 import numpy as np
 import scipy.linalg
 
-from benchmarks.shared.measure import in_turn, seconds, table
+from benchmarks.shared.measure import in_turn, program, seconds, table
 from benchmarks.shared.studies import paper_flight, regressor_matrix
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
@@ -32,14 +30,8 @@ EIGENSOLVES = 200
 # A selection that takes longer is timed once.
 SHORT_S, REPEATS = 6.0, 5
 COLUMNS = (
-    "selection",
-    "samples",
-    "rank",
-    "condition number",
-    "share of the full set's",
-    "model error, median",
-    "model error, worst",
-    "times faster than one eigensolve per candidate",
+    "selection | samples | rank | condition number | share of the full set's | model error, median | "
+    "model error, worst | times faster than one eigensolve per candidate"
 )
 
 Choose = Callable[[], IntArray]
@@ -145,4 +137,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

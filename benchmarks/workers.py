@@ -1,7 +1,4 @@
-"""Speed of two workers against one, by kind of worker, on a generation of the paper's study with all 5487 samples.
-
-python -m benchmarks.workers
-"""
+"""Speed of two workers against one, by kind of worker, on a generation of the paper's study with all 5487 samples."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks.shared.measure import in_turn, table
+from benchmarks.shared.measure import in_turn, program, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
@@ -30,7 +27,7 @@ def main() -> None:
         rows.append((name, "2 processes", *compare(evaluator, employ(evaluator, count=2))))
         if find_spec("distributed"):
             rows.append((name, "Dask, 2 worker processes on loopback", *compare(evaluator, cluster(evaluator))))
-    table("workers", ("study", "workers", "start, s", "times faster than one (range)", "same objectives"), rows)
+    table("workers", "study | workers | start, s | times faster than one (range) | same objectives", rows)
 
 
 def compare(evaluator: Evaluator, workers: contextlib.AbstractContextManager[Workforce]) -> tuple[float, str, str]:
@@ -41,7 +38,7 @@ def compare(evaluator: Evaluator, workers: contextlib.AbstractContextManager[Wor
         workforce(np.full((2, evaluator.structure.genes), 30000))
         started = perf_counter() - start
         same = np.array_equal(evaluator(genes).objectives, workforce(genes).objectives)
-        timed = in_turn(partial(evaluator, genes), partial(workforce, genes), 5)
+        timed = in_turn(partial(evaluator, genes), partial(workforce, genes), clock=perf_counter)
     return started, timed.range, "yes" if same else "NO"
 
 
@@ -58,4 +55,4 @@ def cluster(evaluator: Evaluator) -> Iterator[Workforce]:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -44,20 +44,15 @@ class Judged:
     ----------
     largest : array, shape (flights,)
         Largest error over largest torque, of the worst axis.
-    root_mean_square : array, shape (flights,)
-        Root mean square of the error over that of the torque, all axes together.
+    rms : float
+        Median root mean square of the error over that of the torque, all axes together.
     """
 
     largest: Array
-    root_mean_square: Array
+    rms: float
 
     def __str__(self) -> str:
         return f"{np.median(self.largest):.2g} ({self.largest.max():.2g})"
-
-    @property
-    def rms(self) -> float:
-        """Median root mean square."""
-        return float(np.median(self.root_mean_square))
 
 
 def torque_data(motion: Motion, inertia: Array) -> TorqueData:
@@ -80,12 +75,6 @@ def flown(path: RotationPath, inertia: Array = INERTIA) -> TorqueData:
 def random_flight(seed: int, inertia: Array = INERTIA) -> TorqueData:
     """Fly a random full-rotation path with the program's own limits."""
     return flown(full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(seed)), inertia)
-
-
-def with_noise(flight: TorqueData, share: float, rng: np.random.Generator) -> TorqueData:
-    """Add white noise to the torque, by axis a share of its standard deviation."""
-    noise = share * np.std(flight.torque, axis=0) * rng.standard_normal(flight.torque.shape)
-    return replace(flight, torque=flight.torque + noise)
 
 
 def optimised_flight(structure: StructureSettings, seed: int = 1) -> TorqueData:
@@ -147,7 +136,5 @@ def judged(torque: Callable[[Motion], Array], flights: Sequence[TorqueData]) -> 
     """Judge predictions of torque on several flights."""
     scores = [score_of(flight, torque) for flight in flights]
     squares = [np.mean(flight.torque**2) for flight in flights]
-    return Judged(
-        np.array([score.worst_relative_error for score in scores]),
-        np.array([np.sqrt(np.mean(score.mse) / square) for score, square in zip(scores, squares, strict=True)]),
-    )
+    rms = [np.sqrt(np.mean(score.mse) / square) for score, square in zip(scores, squares, strict=True)]
+    return Judged(np.array([score.worst_relative_error for score in scores]), float(np.median(rms)))

@@ -35,6 +35,13 @@ class Ratio:
     lowest: float
     highest: float
 
+    @classmethod
+    def of(cls, times: Sequence[tuple[float, float]]) -> Ratio:
+        """Compare pairs of times, the slow one first."""
+        ratios = [one / other for one, other in times]
+        both = (median(time[index] for time in times) for index in (0, 1))
+        return cls(*both, median(ratios), min(ratios), max(ratios))
+
     @property
     def range(self) -> str:
         return f"{self.ratio:.3g} ({self.lowest:.3g} to {self.highest:.3g})"
@@ -48,10 +55,7 @@ def in_turn(
 ) -> Ratio:
     """Time two things in turn, each once unmeasured before; medians, and the range of the ratio."""
     slow(), fast()
-    times = [(seconds(slow, clock), seconds(fast, clock)) for _ in range(repeats)]
-    ratios = [one / other for one, other in times]
-    both = (median(time[index] for time in times) for index in (0, 1))
-    return Ratio(*both, median(ratios), min(ratios), max(ratios))
+    return Ratio.of([(seconds(slow, clock), seconds(fast, clock)) for _ in range(repeats)])
 
 
 def seconds(work: Callable[[], object], clock: Callable[[], float] = process_time) -> float:
