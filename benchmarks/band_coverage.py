@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
-from benchmarks.shared.full_circle import INERTIA, random_flight
 from benchmarks.shared.measure import program, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
@@ -33,10 +32,13 @@ from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.trajectory.rotation import full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import bootstrap
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
+INERTIA, DURATION_S, SAMPLES = np.diag([0.6, 0.6, 1.2]), 54.86, 5487
 BENT = 0.3
 NOWHERE = np.zeros((72, 72), dtype=bool)
 
@@ -84,7 +86,9 @@ class Case:
 
 
 def cases() -> list[Case]:
-    paper, path, turning = paper_study().identification, paper_flight(), random_flight(200)
+    paper, path = paper_study().identification, paper_flight()
+    rotation = full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(200))
+    turning = rigid(Motion(*vars(rotation.sample(rotation.times(SAMPLES))).values()))
     every, selected = np.arange(len(path)), np.searchsorted(path.time, paper_selection().time)
     bent = replace(turning, torque=turning.torque + bent_torque(turning))
     alone, held = IdentificationSettings(base="none"), IdentificationSettings()
@@ -105,8 +109,8 @@ def small_angles() -> list[Case]:
     held, found, far = IdentificationSettings(), [], np.zeros((ATTITUDES, 3))
     far[:, 0] = np.deg2rad(np.linspace(60.0, 120.0, ATTITUDES))
     for tilt in (13, 26, 45):
-        rigid = tilted(np.deg2rad(tilt))
-        flight, every = replace(rigid, torque=rigid.torque + bent_torque(rigid)), np.arange(len(rigid))
+        flight = tilted(np.deg2rad(tilt))
+        flight, every = replace(flight, torque=flight.torque + bent_torque(flight)), np.arange(len(flight))
         found.append(Case(f"tilt up to {tilt} degrees, vehicle not rigid", flight, every, held, bent_vehicle))
         found.append(Case("the same, at attitudes not visited", flight, every, held, bent_vehicle, far))
     return found
@@ -122,8 +126,12 @@ def tilted(largest: float) -> TorqueData:
         np.sum(amplitude * frequency**order * np.sin(angle + 0.5 * np.pi * order), axis=1) for order in range(3)
     )
     size = largest / np.max(np.abs(attitude[:, :2]))
-    motion = Motion(size * attitude, size * rate, size * acceleration)
-    return TorqueData(time, motion, newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, INERTIA))
+    return rigid(Motion(size * attitude, size * rate, size * acceleration))
+
+
+def rigid(motion: Motion) -> TorqueData:
+    """Drive the rigid vehicle along a motion."""
+    return TorqueData(0.01 * np.arange(len(motion)), motion, newton_euler_torque(*vars(motion).values(), INERTIA))
 
 
 def vehicle(attitude: Array) -> Array:

@@ -1,7 +1,5 @@
 """Settle what a diagnosis leaves open by one more flight: the planned one, a random one, or the one of the advice.
 
-python -m benchmarks.next_flight [SETS]
-
 Flights of the own simulator hide one effect; those whose diagnosis is AMBIGUOUS between it and a rival are kept, half
 of the sets with each of two seeds. One more flight of 30 s goes to those that train, and the diagnosis is made again.
 """
@@ -20,7 +18,7 @@ import numpy as np
 
 from benchmarks.blind.vehicles import HUMMINGBIRD, SIXKG, XQUAD
 from benchmarks.gap import vehicle_of
-from benchmarks.shared.measure import table
+from benchmarks.shared.measure import program, table
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
@@ -42,13 +40,8 @@ SEEDS = (31, 47)
 # A load on a cable costs as much as the rest of the catalogue, and its swing is no look-alike of a gentle flight.
 SETTINGS = GapSettings(shifts=39, ignore=("payload",))
 NOISE = {
-    "attitude": 0.003,
-    "body_rate": 0.005,
-    "position": 0.02,
-    "velocity": 0.05,
-    "acceleration": 0.1,
-    "rotor_speed": 1.0,
-}
+    "attitude": 0.003, "body_rate": 0.005, "position": 0.02, "velocity": 0.05, "acceleration": 0.1, "rotor_speed": 1.0,
+}  # fmt: skip
 LOGGED = frozenset({"attitude", "position", "velocity", "acceleration"})
 FIRST_S, NEXT_S, RATE_HZ = 20.0, 30.0, 200.0
 WAYS = ("planned", "random", "advice")
@@ -77,23 +70,21 @@ class OpenSet:
     diagnosis: DiagnosisRun
 
 
-def main(count: int) -> None:
-    rows, totals = [], {way: Counter() for way in WAYS}
-    expected = {way: [] for way in WAYS}
+def main(sets: int = 40) -> None:
+    rows, totals, expected = [], {way: Counter() for way in WAYS}, {way: [] for way in WAYS}
     with ProcessPoolExecutor(len(SEEDS)) as pool:
-        of_seeds = list(pool.map(settled, SEEDS, [count // len(SEEDS)] * len(SEEDS)))
+        of_seeds = list(pool.map(settled, SEEDS, [sets // len(SEEDS)] * len(SEEDS)))
     for hidden, rival, outcomes in chain(*of_seeds):
         for way, (outcome, sure) in outcomes.items():
             totals[way][outcome.partition(":")[0]] += 1
             expected[way].append(sure)
         rows.append((hidden, rival, *(f"{outcome} ({sure:.2f})" for outcome, sure in outcomes.values())))
     table("next-flight-sets", ("hidden", "rival", *(f"{way} (predicted)" for way in WAYS)), rows)
-    kinds = ("right", "wrong", "open")
     summary = [
-        (way, *(f"{totals[way][kind]} of {totals[way].total()}" for kind in kinds), f"{np.mean(expected[way]):.2f}")
-        for way in WAYS
+        (way, *(f"{counts[kind]} of {counts.total()}" for kind in ("right", "wrong", "open")), np.mean(expected[way]))
+        for way, counts in totals.items()
     ]
-    table("next-flight", ("one more flight of 30 s", *kinds, "predicted share right"), summary)
+    table("next-flight", "one more flight of 30 s | right | wrong | open | predicted share right", summary)
 
 
 def settled(seed: int, count: int) -> list[tuple[str, str, dict[str, tuple[str, float]]]]:
@@ -251,4 +242,4 @@ def advised(advice: str, room: Room) -> HarmonicPath:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)
+    program(main)
