@@ -27,13 +27,7 @@ _BEFORE = {"summary", "comparison", "models"}
 
 
 def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[EvaluationTime] = ()) -> Page:
-    """Write a report on the paper.
-
-    Parameters
-    ----------
-    times : sequence of EvaluationTime
-        Measured beside the artifacts, of which none holds a time.
-    """
+    """Write a report on the paper; times are measured, for no artifact holds one."""
     study = load_study(config)
     given = read_sources(artifacts, [read_content(path).sha256 for path in artifacts])
     sources = PaperSources(given, study.vehicle, study.report, times)
