@@ -1,4 +1,4 @@
-"""One evaluation and one local search against plain references, and decompositions of a Gram matrix."""
+"""One evaluation and one local search against plain references."""
 
 from __future__ import annotations
 
@@ -12,23 +12,16 @@ import numpy as np
 
 from benchmarks.shared.measure import Ratio, in_turn, program, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification import least_squares
-from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, Problem, decode, encode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.samples import Ready, Samples
+from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
-from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders import reference_evaluator as reference
 from tests.builders.reference_evaluator import ReferenceEvaluator
 
 CHROMOSOMES = 80
 LARGEST_CONDITION = 1e6
 TIMED = 5
-# Membership functions of each partition, for 113, 241, 417 and 1233 columns.
-FUNCTIONS = (5, 7, 9, 15)
 TOLERANCE = 1e-6
 
 
@@ -58,12 +51,6 @@ def main() -> None:
         columns,
         [(name, *local_search(training, learned, settings)) for name, training, learned in cases],
     )
-    print("\nDecompositions of the Gram matrix of random attitudes:\n")
-    columns = (
-        "membership functions | columns | all eigenvectors, ms | the lowest, ms | times faster (range) | Lanczos, ms | "
-        "times faster than all (range)"
-    )
-    table("decompositions", columns, [decompositions(functions) for functions in FUNCTIONS])
 
 
 def evaluation(training, learned, settings: IdentificationSettings) -> tuple[float, float, float, str, str, int, float]:
@@ -137,31 +124,6 @@ def counted(work, where, *names: str) -> tuple[Any, float, int]:
     spent = process_time() - start
     mock.patch.stopall()
     return found, spent, sum(counter.call_count for counter in counters)
-
-
-def decompositions(functions: int) -> tuple[int, int, float, float, str, float, str]:
-    """Time what turns a Gram matrix into parameters and a condition number, in each of the three ways."""
-    settings = StructureSettings(consequents="seesaw", products="additive", membership_functions=functions)
-    structure, rng = model_structure(settings), np.random.default_rng(7)
-    samples = 20 * structure.parameters
-    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    data = TorqueData(0.01 * np.arange(samples), motion, rng.standard_normal((samples, 3)))
-    whole = Samples.of(Ready(data, rigid=False), structure, data_ranges(structure, motion.attitude))
-    gram = whole.products(uniform_breakpoints(structure)).gram[0]
-    size = np.sqrt(np.diag(gram))
-    matrix = gram / size / size[:, None]
-
-    def inverted(few: int, many: int) -> None:
-        with mock.patch.object(least_squares, "_FEW", few), mock.patch.object(least_squares, "_MANY", many):
-            found = least_squares._inverted(matrix, TOLERANCE**2)
-        assert found is not None
-        found.apply(size)
-
-    every, lowest, lanczos = partial(inverted, 10**6, 10**6), partial(inverted, 1, 10**6), partial(inverted, 1, 1)
-    some = in_turn(every, lowest)
-    few = in_turn(every, lanczos)
-    spent = 1e3 * some.slow_s, 1e3 * some.fast_s, some.range, 1e3 * few.fast_s, few.range
-    return functions, structure.parameters, *spent
 
 
 def well_conditioned(plain: Evaluator) -> np.ndarray:

@@ -43,6 +43,7 @@ class Term:
     """
 
     stage = "body"
+    states = 0
     state = None
     kinds: ClassVar = {}
     """All of them by the name of the effect, in the order in which they act."""
@@ -63,8 +64,9 @@ class Term:
         return np.array([getattr(v, name) for v in self.vehicles])
 
     def prepare(self):
-        """Set up states and random sequences."""
+        """Set up states, where there are any, and random sequences."""
+        self.state = np.zeros((self.states, len(self.rows))) if self.states else None
 
-    def apply(self, now):
-        """Add to the forces of this moment; set ``self.rate`` if the term has a state."""
+    def apply(self, now, r):
+        """Add to the forces of this moment in the rows of the term; set ``self.rate`` if it has a state."""
         raise NotImplementedError

@@ -40,21 +40,10 @@ def constants_unknown(vehicle: VehicleSettings) -> VehicleSettings:
 def learned(
     vehicle: VehicleSettings,
     training: Sequence[PlaybackFlight],
-    settings: PlaybackSettings | None = None,
     baselines: bool = True,
 ) -> dict[str, VehicleModel]:
-    """Find a vehicle with the settings of the program, and fit the baselines of the choice; what was found is printed.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    training : sequence of PlaybackFlight
-    settings : PlaybackSettings, optional
-    baselines : bool
-        Whether to fit all blocks, and those added one by one.
-    """
-    used, start = settings or PlaybackSettings(), perf_counter()
+    """Find a vehicle with the program's settings, and fit the baselines of the choice; what was found is printed."""
+    used, start = PlaybackSettings(), perf_counter()
     found = find_vehicle(vehicle, training, used, np.random.default_rng(SEED), _shown)
     choice = found.choice
     print(f"\nfound in {perf_counter() - start:.0f} s, {choice.evaluated} structures judged on flights kept aside:")
@@ -82,17 +71,7 @@ def learned(
 def fitted_blocks(
     vehicle: VehicleSettings, training: Sequence[PlaybackFlight], blocks: Sequence[str], past_s: float
 ) -> tuple[VehicleModel, Observer]:
-    """Fit a forecast of given blocks, and its observer; without a search, as `learned` fits what it has chosen.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    training : sequence of PlaybackFlight
-    blocks : sequence of str
-    past_s : float, s
-        How much of the past the observer uses.
-    """
+    """Fit a forecast of given blocks and its observer, which uses so much of the past, as `learned` fits its choice."""
     used, clock = PlaybackSettings(), perf_counter()
     held = Structure(tuple(block for block in blocks if block != INERTIA))
     windows = [each for part in parts_of(training, used) for each in part]
