@@ -7,6 +7,7 @@ need not fly again.
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -96,10 +97,7 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
 
     if name in ("thrust of a rotor", "two rotors"):
         lost = sorted([one, other] if name == "two rotors" else [one])
-        weak = body._replace(
-            thrust=times(lost, 1 - size, body.thrust),
-            drag=times(lost, 1 - size, body.drag),
-        )
+        weak = body._replace(thrust=times(lost, 1 - size, body.thrust), drag=times(lost, 1 - size, body.drag))
         words = " and ".join(f"M{index + 1}" for index in lost)
         return Altered(weak, {f"rotor{'s' * (len(lost) > 1)} {words}": (size,) * len(lost)})
     if name == "drag of a rotor":
@@ -246,9 +244,8 @@ _NO_CAUSE = "cause not named"
 
 
 def _alarms(runs: Sequence[Changed]) -> list[object]:
-    alarms = [run for run in runs if run.changed]
-    said = ", ".join(sorted("+".join(found.name for found in run.causes) or _NO_CAUSE for run in alarms))
-    return [len(runs), len(alarms), sum(run.p <= 0.05 for run in runs), said or "—"]
+    said = sorted("+".join(found.name for found in run.causes) or _NO_CAUSE for run in runs if run.changed)
+    return [len(runs), len(said), sum(run.p <= 0.05 for run in runs), ", ".join(said) or "—"]
 
 
 def _otherwise(fleet: Fleet, faster: list[list[Told]]) -> Iterator[list[object]]:
@@ -332,11 +329,8 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
 
 def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Changed:
     """Ask what would show in the first draws alone, for it takes long."""
-    given = fleet, case.vehicle, instrument, [case.told], USUAL, case.draw
-    if case.draw < _SHOWN:
-        return _judged(*given)
-    with _WITHOUT_SHOWS:
-        return _judged(*given)
+    with contextlib.nullcontext() if case.draw < _SHOWN else _WITHOUT_SHOWS:
+        return _judged(fleet, case.vehicle, instrument, [case.told], USUAL, case.draw)
 
 
 def _shows(case: Case, run: Changed) -> float:

@@ -207,15 +207,11 @@ def searched(
 
 def curved() -> VehicleModel:
     """Give rotors whose thrust has a linear and a square part, and that hover at the speeds of `truth`."""
+    vehicle, names = truth().vehicle, ("thrust_factor_n_s2", "drag_factor_n_m_s2")
     rotors = tuple(
-        replace(
-            rotor,
-            thrust_factor_n_s2=rotor.thrust_factor_n_s2 / (1 + LINEAR),
-            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 / (1 + LINEAR),
-        )
-        for rotor in truth().vehicle.rotors
+        replace(rotor, **{name: getattr(rotor, name) / (1 + LINEAR) for name in names}) for rotor in vehicle.rotors
     )
-    return replace(truth(), thrust_linear=LINEAR, vehicle=replace(truth().vehicle, rotors=rotors))
+    return replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
 
 
 def without_speeds(seed: int) -> list[PlaybackFlight]:

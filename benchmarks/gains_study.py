@@ -120,11 +120,8 @@ def main(seed: int = 1, count: int = 48) -> None:
             held = [row[phase] >= 44 for row in own]
             table_rows.append([name, label, *map(share, (near, near_gain, inside, inside_gain, held))])
     near = f"phase within {PHASE_DEG:g} deg | gain within {GAIN_DB:g} dB"
-    table(
-        "gains",
-        f"autopilot | vehicle | {near} | phase in its interval | gain in its interval | 45 deg held",
-        table_rows,
-    )
+    columns = f"autopilot | vehicle | {near} | phase in its interval | gain in its interval | 45 deg held"
+    table("gains", columns, table_rows)
 
 
 if __name__ == "__main__":

@@ -73,14 +73,9 @@ def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:
 
 def vehicle_of(craft) -> VehicleSettings:
     """Describe the craft of the generator as a config does."""
+    factors = {"thrust_factor_n_s2": craft.thrust_factor, "drag_factor_n_m_s2": craft.torque_factor}
     rotors = tuple(
-        RotorSettings(
-            position_m=tuple(place),
-            spin=spin,
-            thrust_factor_n_s2=craft.thrust_factor,
-            drag_factor_n_m_s2=craft.torque_factor,
-            radius_m=craft.rotor_radius,
-        )
+        RotorSettings(position_m=tuple(place), spin=spin, radius_m=craft.rotor_radius, **factors)
         for place, spin in zip(craft.rotors, craft.spin, strict=True)
     )
     return VehicleSettings(mass_kg=craft.mass, inertia_kg_m2=craft.inertia, rotors=rotors)

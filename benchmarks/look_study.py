@@ -365,9 +365,8 @@ def main(seed: int = 4, count: int = 200) -> None:
     for key in ("autopilot", "gusts", "sticks", "axis"):
         for value in dict.fromkeys(str(row[key]) for row in rows):
             groups[value] = [row for row in rows if str(row[key]) == value]
-    table(
-        "look", ["flights", *COLUMNS], [[name, *(of(own) for of in COLUMNS.values())] for name, own in groups.items()]
-    )
+    cells = [[name, *(of(own) for of in COLUMNS.values())] for name, own in groups.items()]
+    table("look", ["flights", *COLUMNS], cells)
 
 
 if __name__ == "__main__":

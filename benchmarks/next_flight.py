@@ -12,13 +12,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
-from time import perf_counter
 
 import numpy as np
 
 from benchmarks.blind.vehicles import HUMMINGBIRD, SIXKG, XQUAD
 from benchmarks.gap import vehicle_of
-from benchmarks.shared.measure import program, table
+from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
@@ -89,11 +88,11 @@ def main(sets: int = 40) -> None:
 
 def settled(seed: int, count: int) -> list[tuple[str, str, dict[str, tuple[str, float]]]]:
     """Settle the sets of a seed: hidden effect, its rival, and the outcome of each way."""
-    found, begin = [], perf_counter()
+    found = []
     for number, opened in enumerate(open_sets(seed, count)):
         outcomes = settle(opened, np.random.default_rng([seed, number, 1]))
         found.append((opened.hidden.candidate.effect.name, opened.rival, outcomes))
-        print(seed, number, f"{perf_counter() - begin:.0f} s", *found[-1], sep="; ", flush=True)
+        progress([seed, number, *found[-1]])
     return found
 
 
@@ -174,18 +173,14 @@ def floor_of(craft) -> np.ndarray:
 
 def fly(room: Room, path: HarmonicPath, hidden: SizedEffect, rng: np.random.Generator, name: str) -> Recording:
     """Fly a path in closed loop with the hidden effect, and log it with noise."""
-    return Recording(name, flown(room.planned(path, 0.01), room.vehicle, hidden, rng))
-
-
-def flown(planned, vehicle, hidden: SizedEffect | None, rng: np.random.Generator) -> Signals:
-    """Log a flight with noise."""
-    effects = {} if hidden is None else {hidden.candidate.effect.name: physical_values(hidden)}
+    planned = room.planned(path, 0.01)
+    effects = {hidden.candidate.effect.name: physical_values(hidden)}
     loop = SimulationSettings(
         mode="closed-loop", noise=NOISE, closed_loop=ClosedLoopSettings(effects=effects, integration_rate_hz=RATE_HZ)
     )
-    logged = measure(planned.time, vars(planned), vehicle, loop, rng).signals
-    names = ("attitude", "position", "velocity", "acceleration", "body_rate", "rotor_speed")
-    return Signals(time=planned.time, vehicle=vehicle, **{name: logged[name] for name in names})
+    logged = measure(planned.time, vars(planned), room.vehicle, loop, rng).signals
+    signals = {name: logged[name] for name in NOISE}
+    return Recording(name, Signals(time=planned.time, vehicle=room.vehicle, **signals))
 
 
 def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, float]]:

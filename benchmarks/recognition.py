@@ -43,19 +43,11 @@ HUMMINGBIRD = ("front left", -1), ("front right", 1), ("rear right", -1), ("rear
 
 @dataclass(frozen=True)
 class LogSet:
-    """Logs of one kind, and what is right.
+    """Logs of one kind by patterns of their names, and what is right.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Patterns of the files' names.
-    signals : mapping from signal to (columns, unit, factor) or columns
-        Columns with spaces between them, a minus before a reversed one, the name of the file as ``@``; alone they are
-        in SI.
-    rotors : tuple
-        Corner and way to turn of each; empty where the set does not say.
-    setpoints : mapping
-        As `signals`; one that is left out is none that is wrong.
+    Signals are columns with spaces between them, a minus before a reversed one, the name of the file as ``@``, alone in
+    SI or with unit and factor. Rotors are corner and way to turn of each, empty where the set does not say; a setpoint
+    that is left out is none that is wrong.
     """
 
     names: tuple[str, ...]
@@ -263,10 +255,8 @@ def main(folders: list[Path]) -> None:
             rows.append((name, count["logs"], of["signals"], count["guessed"], count["listed"], *list(of.values())[1:]))
     if not rows:
         sys.exit("no log of a known set in these folders")
-    columns = (
-        "set | logs | signals right | of them guessed | wrong, the right one listed | keys right | rotors | setpoints"
-    )
-    table("recognition", columns, rows)
+    columns = "set | logs | signals right | of them guessed | wrong, the right one listed | keys right"
+    table("recognition", f"{columns} | rotors | setpoints", rows)
     for path in files.values():
         if path.name in REFUSED:
             said = refusal(path)

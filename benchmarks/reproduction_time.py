@@ -1,7 +1,7 @@
 """Time of an evaluation and of the singular value decomposition in it, by the size of the training set.
 
-With --out the rows go to a file and nowhere else, as JSON for `benchmarks/paper/report.py --times`: no artifact holds a
-time, so that equal content stays an equal file. Seconds of processor time, medians.
+With --out the rows go to a file too, as JSON for `benchmarks.paper.report --times`: no artifact holds a time, so that
+equal content stays an equal file. Seconds of processor time, medians.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks.paper.claims import line_through
 from benchmarks.shared.measure import program, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_study, regressor_matrix
 from cpfls_cli.identification.data import TorqueData
@@ -27,24 +26,10 @@ COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")
 
 def main(out: Path | None = None, repeats: int = 7) -> None:
     rows = measured(repeats)
+    table("reproduction_time", COLUMNS, rows)
     if out:
         records = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
         out.write_text(json.dumps(records) + "\n", encoding="utf-8")
-    else:
-        publish(rows)
-
-
-def publish(rows: list[tuple[int, float, float, float]]) -> None:
-    """Print the table and the lines through its logarithms."""
-    samples, svd, evaluation, compiled = np.log(np.array(rows)).T
-    fits = {
-        "decomposition over samples": line_through(samples, svd),
-        "evaluation over decomposition": line_through(svd, evaluation),
-        "compiled evaluation over decomposition": line_through(svd, compiled),
-    }
-    table("reproduction_time", COLUMNS, rows, fits={name: vars(fit) for name, fit in fits.items()})
-    for name, fit in fits.items():
-        print(f"\nslope of the logarithms, {name}: {fit.slope:.3f}, R2 {fit.r2:.4f}")
 
 
 def measured(repeats: int) -> list[tuple[int, float, float, float]]:

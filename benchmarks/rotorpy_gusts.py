@@ -93,23 +93,14 @@ def _parameters(name: str) -> dict[str, Any]:
 
 def _settings(numbers: Mapping[str, Any]) -> VehicleSettings:
     """State RotorPy's vehicle; its direction of a rotor is that of the torque on the body."""
+    factors = {"thrust_factor_n_s2": float(numbers["k_eta"]), "drag_factor_n_m_s2": float(numbers["k_m"])}
     rotors = tuple(
-        RotorSettings(
-            position_m=tuple(float(x) for x in place),
-            spin=-int(direction),
-            thrust_factor_n_s2=float(numbers["k_eta"]),
-            drag_factor_n_m_s2=float(numbers["k_m"]),
-        )
+        RotorSettings(position_m=tuple(float(x) for x in place), spin=-int(direction), **factors)
         for place, direction in zip(numbers["rotor_pos"].values(), numbers["rotor_directions"], strict=True)
     )
     inertia = tuple(float(numbers[name]) for name in ("Ixx", "Iyy", "Izz"))
-    fastest = float(numbers["rotor_speed_max"])
-    return VehicleSettings(
-        mass_kg=float(numbers["mass"]),
-        inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0),
-        rotors=rotors,
-        rotor_speed_max_rad_s=fastest,
-    )
+    known = {"mass_kg": float(numbers["mass"]), "rotor_speed_max_rad_s": float(numbers["rotor_speed_max"])}
+    return VehicleSettings(inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0), rotors=rotors, **known)
 
 
 def _flown(asked: Asked) -> PlaybackFlight:

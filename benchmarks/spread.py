@@ -311,14 +311,7 @@ ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9)}
 
 
 class Law(NamedTuple):
-    """How thrust and torque answer a difference between two states, as accelerations.
-
-    Attributes
-    ----------
-    keep : array, shape (4,)
-        Share of an answer that is left a sample later.
-    gain : array, shape (4, 12)
-    """
+    """How thrust and torque answer a difference between two states, as accelerations: what is left later, and gains."""
 
     keep: Array
     gain: Array
@@ -438,14 +431,9 @@ def about_z(angle: Any) -> Any:
 
 
 def twins(model: VehicleModel, flying: Fleet, law: Law, period: float) -> Callable[[PlaybackFlight], Array]:
-    """Make what flies all vehicles from the first logged state of a flight, asked what the flight was asked.
+    """Make what flies all vehicles from the first logged state of a flight to rates, shape (vehicle, time, 3).
 
-    About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
-
-    Returns
-    -------
-    callable
-        From a flight to rates, shape (vehicle, time, 3); it is compiled once.
+    They are asked what the flight was asked. About yaw they keep what was logged, which these flights do not identify.
     """
     module, count = flying.module, len(flying.parameters)
     unmix = np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)

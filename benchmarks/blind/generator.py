@@ -96,7 +96,7 @@ def _collect(case, plans, record, first):
 
 
 def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
-    """Fly all cases in one batch, flights to train before as many held out; each depends on the seed and its case alone.
+    """Fly all cases in one batch, flights to train before as many held out; each depends on seed and case alone.
 
     The log lasts for a time in s, after a lead-in that it does not hold.
     """

@@ -27,43 +27,9 @@ def air_totals(judged):
     """Write what a study in gusts is held against, one column for each air; nothing for a study in still air alone."""
     if all(each.usual for each in judged):
         return ""
-    outcomes = {
-        "nothing hidden: false name": (lambda own: [bool(e.names) for e in of(own, "none")], "1 in 300"),
-        f"one effect of {VISIBLE} floors or more: exactly right": (
-            lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.visible >= VISIBLE],
-            "96 % in still air",
-        ),
-        "one effect above the air's share: exactly right": (
-            lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.over_air >= 1],
-            "96 %",
-        ),
-        "any group: wrong name": (lambda own: [e.wrong_name for e in own], "0"),
-        "any group but outside: a false name": (
-            lambda own: [e.false_name for e in own if not e.key["outside"]],
-            "1 in 300",
-        ),
-        "outside the catalogue: NAMED": (
-            lambda own: [e.verdict == "NAMED" for e in of(own, "outside") if e.key["outside"]],
-            "at most 2 %",
-        ),
-        "two or three effects: all named": (lambda own: [e.outcome == RIGHT for e in several(own)], "92 %"),
-        "95 % intervals that hold the hidden value": (
-            lambda own: [number.inside for number in coefficients_of(own) if exact(number)],
-            "90 to 98 %",
-        ),
-        "channels in gusts: told to be all that is left": (lambda own: [_is_told(*one) for one in _channels(own)], ""),
-        "channels in gusts: told how large": (lambda own: [_is_sized(*one) for one in _channels(own)], ""),
-        f"of these: size within {100 * _SIZE:.0f} %": (lambda own: _near(own, "size", 1 - _SIZE, 1 + _SIZE), "all"),
-        f"of these: memory within a factor of {_MEMORY:.0f}": (
-            lambda own: _near(own, "memory", 1 / _MEMORY, _MEMORY),
-            "all",
-        ),
-        "of these: size in its interval": (lambda own: _within(own, "size", ""), "90 to 98 %"),
-        "of these: memory in its interval": (lambda own: _within(own, "memory", "memory_"), "90 to 98 %"),
-        "channels without gusts: told to be all that is left": (_told_in_vain, "0"),
-    }
-    airs, rows = _airs(judged), [("sets", *map(len, _airs(judged).values()), "")]
-    for name, (measure, target) in outcomes.items():
+    airs = grouped(sorted(judged, key=lambda each: each.key.get("gusts", 0)), lambda each: each.air)
+    rows = [("sets", *map(len, airs.values()), "")]
+    for name, target, measure in _MEASURES:
         cells = [percent(measure(own)) for own in airs.values()]
         rows += [(name, *cells, target)] if {*cells} != {NONE_TRIED} else []
     return table(" | ".join(["", *airs, "target"]), rows)
@@ -128,3 +94,29 @@ def _near(own, what, low, high):
 def _within(own, what, prefix):
     sized = [one for one in _channels(own) if _is_sized(*one)]
     return [_ratio(*one, f"{prefix}low", what) <= 1 <= _ratio(*one, f"{prefix}high", what) for one in sized]
+
+
+_RARE = "1 in 300"
+_MEASURES = (
+    ("nothing hidden: false name", _RARE, lambda own: [bool(e.names) for e in of(own, "none")]),
+    (f"one effect of {VISIBLE} floors or more: exactly right", "96 % in still air",
+     lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.visible >= VISIBLE]),
+    ("one effect above the air's share: exactly right", "96 %",
+     lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.over_air >= 1]),
+    ("any group: wrong name", "0", lambda own: [e.wrong_name for e in own]),
+    ("any group but outside: a false name", _RARE, lambda own: [e.false_name for e in own if not e.key["outside"]]),
+    ("outside the catalogue: NAMED", "at most 2 %",
+     lambda own: [e.verdict == "NAMED" for e in of(own, "outside") if e.key["outside"]]),
+    ("two or three effects: all named", "92 %", lambda own: [e.outcome == RIGHT for e in several(own)]),
+    ("95 % intervals that hold the hidden value", "90 to 98 %",
+     lambda own: [number.inside for number in coefficients_of(own) if exact(number)]),
+    ("channels in gusts: told to be all that is left", "", lambda own: [_is_told(*one) for one in _channels(own)]),
+    ("channels in gusts: told how large", "", lambda own: [_is_sized(*one) for one in _channels(own)]),
+    (f"of these: size within {100 * _SIZE:.0f} %", "all", lambda own: _near(own, "size", 1 - _SIZE, 1 + _SIZE)),
+    (f"of these: memory within a factor of {_MEMORY:.0f}", "all",
+     lambda own: _near(own, "memory", 1 / _MEMORY, _MEMORY)),
+    ("of these: size in its interval", "90 to 98 %", lambda own: _within(own, "size", "")),
+    ("of these: memory in its interval", "90 to 98 %", lambda own: _within(own, "memory", "memory_")),
+    ("channels without gusts: told to be all that is left", "0", _told_in_vain),
+)  # fmt: skip
+"""Name, target, and what gives the flags of sets in one air."""

@@ -97,14 +97,10 @@ class Scored:
     @property
     def unphysical(self):
         """Whether a certain verdict has numbers at or beyond their bounds, or effects that cancel one another."""
-        return self.verdict in CERTAIN and (self._at_bounds() or self._cancelling())
-
-    def _at_bounds(self):
-        numbers = [number for effect in self.said["effects"] for number in effect["coefficients"].values()]
-        return any(_at_bound(number["value"], *number["possible"]) for number in numbers)
-
-    def _cancelling(self):
-        return any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in self.said["effects"])
+        effects = self.said["effects"] if self.verdict in CERTAIN else []
+        numbers = [number for effect in effects for number in effect["coefficients"].values()]
+        cancel = any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in effects)
+        return cancel or any(_at_bound(number["value"], *number["possible"]) for number in numbers)
 
     @property
     def visible(self):

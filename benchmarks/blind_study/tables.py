@@ -43,14 +43,7 @@ def percent(flags):
 
 
 def tables(judged, more):
-    """Write all tables of a study.
-
-    Parameters
-    ----------
-    judged : list of Scored
-    more : mapping from title to text
-        Those of studies in gusts.
-    """
+    """Write all tables of a study, and more by their titles."""
     seconds, single = [each.said["seconds"] for each in judged], of(judged, "single")
     parts = {
         "Totals against the targets": totals(judged),

@@ -52,11 +52,7 @@ class PaperSources(Sources):
 
 
 class ClaimVerdict(StrEnum):
-    """One claim of the paper, in its own words.
-
-    `rule` states what is measured and what counts as a pass, without the outcome. `of_searches` measures the claim on
-    searches alone, those of one reading of the paper; None for a claim about other things.
-    """
+    """Whether a claim of the paper holds here."""
 
     PASS = "PASS"
     FAIL = "FAIL"
@@ -75,24 +71,10 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper.
+    """One claim of the paper, in its own words.
 
-    Attributes
-    ----------
-    name : str
-        In a few words.
-    where : str
-        Section of the paper.
-    words : str
-        The paper's own.
-    rule : str
-        What is measured, and what counts as a pass; stated without the outcome.
-    paper : str
-        The paper's number.
-    measure : callable
-        Measures it on the artifacts of a report.
-    of_searches : callable or None
-        Measures it on searches alone, those of one reading of the paper; None for a claim about other things.
+    `rule` states what is measured and what counts as a pass, without the outcome. `of_searches` measures the claim on
+    searches alone, those of one reading of the paper; None for a claim about other things.
     """
 
     name: str

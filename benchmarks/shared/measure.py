@@ -66,13 +66,7 @@ def seconds(work: Callable[[], object], clock: Callable[[], float] = process_tim
 
 
 def table(name: str, columns: str | Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 3, **more: Any) -> None:
-    """Print a Markdown table and write it, with the machine in words, to ``benchmarks/results/NAME.json``.
-
-    Parameters
-    ----------
-    columns : str or sequence of str
-        In a string with " | " between them.
-    """
+    """Print a Markdown table and write it to ``benchmarks/results``; columns are one text, or a sequence."""
     columns = columns.split(" | ") if isinstance(columns, str) else columns
     print("| " + " | ".join(columns) + " |")
     print("|" + "---|" * len(columns))
