@@ -58,8 +58,8 @@ def main() -> None:
         f"library, one at a time, ns | one at a time over C (range) | C, share of {BUDGET_NS // 1000} us"
     )
     table("export_speed", columns, rows)
-    print("\nWhat is stored, and roughly the arithmetic of one torque with two rules firing along each input:\n")
-    columns = "structure | parameters | tables, bytes | the same, float | object file, bytes | flops of a torque"
+    print("\nWhat is stored:\n")
+    columns = "structure | parameters | tables, bytes | the same, float | object file, bytes"
     table("export_size", columns, sizes)
 
 
@@ -130,23 +130,15 @@ def library(model: InertiaFunctions, call: str, states: np.ndarray):
     return partial(model.inertia, q) if call == "inertia" else partial(model.coriolis, q, qd)
 
 
-def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int, int]:
-    """Count numbers of the tables, the bytes of the object file and, roughly, the arithmetic of a torque."""
+def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int]:
+    """Count numbers of the tables and the bytes of the object file."""
     structure = model.structure
     used = any(block.rules > 1 for block in structure.blocks)
     numbers = structure.parameters + (sum(p.functions for p in structure.partitions) if used else 0)
     region = CELLS * CELLS // 8
     text = subprocess.run(["size", folder / "double.o"], capture_output=True, text=True, check=True).stdout
     loaded = int(text.splitlines()[1].split()[0])
-    return structure.parameters, 8 * numbers + region, 4 * numbers + region, loaded, flops(structure, used)
-
-
-def flops(structure, used: bool) -> int:
-    """Multiplications and additions of the sums over rules and features, and of a torque from D and its slopes."""
-    one = next(block.features for block in structure.blocks if len(block.partitions) == 1)
-    rules = 2 if used else 1
-    pair = 4 * one**2 + 6 * one if structure.settings.products == "tensor" else 8 * (one - 1)
-    return 2 * rules * (4 * one + 6) + 2 * rules**2 * (pair + 12) + 9 * 14 + 60
+    return structure.parameters, 8 * numbers + region, 4 * numbers + region, loaded
 
 
 if __name__ == "__main__":
