@@ -52,19 +52,19 @@ def learned(
         worse, uncertain = judged.worse_than(choice.best)
         blocks = " ".join(judged.structure.blocks)
         print(
-            f"  {name}: error {judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f}), {judged.numbers} numbers: {blocks}"
+            f"  {name}: error {judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f}), {judged.numbers} parameters: {blocks}"
         )
     for number in found.numbers:
         weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
     # Where flights repeat each other the model is the constants, and no forecast.
-    models = {f"vehicle, {choice.chosen.numbers} numbers": found.forecast or found.model}
+    models = {f"vehicle, {choice.chosen.numbers} parameters": found.forecast or found.model}
     for name in ("greedy", "everything") if baselines else ():
         judged = getattr(choice, name)
         clock = perf_counter()
         fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fit)
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
-        models[f"{name}, {judged.numbers} numbers"] = fitted.model
+        models[f"{name}, {judged.numbers} parameters"] = fitted.model
     return models
 
 
@@ -78,7 +78,7 @@ def fitted_blocks(
     # On the body as it is first, as in a search.
     first = fit(held.free(vehicle), windows, {}, 12, 1e-3)
     fitted, windows = fitted_to_all(Structure(tuple(blocks)), vehicle, training, used, first)
-    print(f"{len(fitted.values)} numbers fitted in {perf_counter() - clock:.0f} s, loss {fitted.loss:.4f}")
+    print(f"{len(fitted.values)} parameters fitted in {perf_counter() - clock:.0f} s, loss {fitted.loss:.4f}")
     clock = perf_counter()
     observer = fit_observer(fitted, windows, past_s)
     print(f"observer fitted in {perf_counter() - clock:.0f} s: {observer}\n")
