@@ -51,9 +51,8 @@ def learned(
         judged = getattr(choice, name)
         worse, uncertain = judged.worse_than(choice.best)
         blocks = " ".join(judged.structure.blocks)
-        print(
-            f"  {name}: error {judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f}), {judged.numbers} parameters: {blocks}"
-        )
+        size = f"{judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f})"
+        print(f"  {name}: error {size}, {judged.numbers} parameters: {blocks}")
     for number in found.numbers:
         weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
