@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.shared.measure import in_turn, program, table
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.source import c_source
 from cpfls_cli.fuzzy.inputs import InputRange
@@ -127,7 +128,9 @@ def library(model: InertiaFunctions, call: str, states: np.ndarray):
     q, qd, qdd = np.split(states, 3, axis=1)
     if call == "torque":
         return partial(model.torque, Motion(q, qd, qdd))
-    return partial(model.inertia, q) if call == "inertia" else partial(model.coriolis, q, qd)
+    if call == "inertia":
+        return partial(model.inertia, q)
+    return lambda: coriolis_matrix(model.inertia(q), qd)
 
 
 def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int]:
