@@ -18,25 +18,16 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 class Cause:
     """A change and its directions in the numbers of a flight.
 
-    Attributes
-    ----------
-    name : str
-        What changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
-    directions : array, shape (number, size)
-        Of each size of it, the first of which is told, for as much as is usual where it happens.
-    usual : float
-        The first size, in its unit, where it happens: standard deviation of a normal prior.
-    unit : str
-    prior : float
-        Beside the others, of the belief in it.
-    searched : float
-        The same where it is searched for; 0 where another way in which it shows stands for it.
-    losses : int
-        Of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than none.
-    told : int
-        Of the first so many sizes: they have the unit of the cause.
-    ratio : int
-        1 where what is told shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
+    `name`: what changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
+    `directions`, shape (number, size): of each size of it, the first of which is told, for as much as is usual where it
+    happens.
+    `usual`: the first size, in its unit, where it happens: standard deviation of a normal prior.
+    `prior`: beside the others, of the belief in it.
+    `searched`: the same where it is searched for; 0 where another way in which it shows stands for it.
+    `losses`: of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than
+    none.
+    `told`: of the first so many sizes: they have the unit of the cause.
+    `ratio`: 1 where what is told shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
     """
 
     name: str

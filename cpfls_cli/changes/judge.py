@@ -73,13 +73,10 @@ _HALF_WIDTH = 1.96
 class Judged(NamedTuple):
     """What flights say against a reference, as `Changed`, with their numbers as arrays.
 
-    Attributes
-    ----------
-    apart : array, shape (flight, number)
-        Numbers of each of today's flights less those of the reference, loads at its voltage.
-    deviation : array, shape (number,)
-    limit : array, shape (number,)
-        In deviations.
+    `apart`, shape (flight, number): numbers of each of today's flights less those of the reference, loads at its
+    voltage.
+    `deviation`: shape (number,).
+    `limit`, shape (number,): in deviations.
     """
 
     apart: Array
@@ -105,15 +102,7 @@ def changed(
     counts, against the largest that unchanged flights have, searched alike. Beside that each number is held against its
     own limit, whatever is known to change it. The only threshold is the rate of false alarms, half of it for each test.
 
-    Parameters
-    ----------
-    today, before : sequence of FlightNumbers
-        At least one each; today's of one day.
-
-    Raises
-    ------
-    InputError
-        If the flights have no number in common.
+    `today`, `before`: at least one each; today's of one day. Raises InputError if the flights have no number in common.
     """
     names = common_numbers([*before, *today])
     if not names:
@@ -183,10 +172,8 @@ def judged(
 ) -> Judged:
     """Hold flights of today against a reference, as `changed`.
 
-    Parameters
-    ----------
-    starts : sequence of int
-        Flights from which on it may be changed, up to the last: the most telling one counts, as it does in chance.
+    `starts`: flights from which on it may be changed, up to the last: the most telling one counts, as it does in
+    chance.
     """
     names = reference.names
     apart, covariance = reference.apart(today)
@@ -291,12 +278,8 @@ class _Space:
     def evidence(self, rows: Array, of: Sequence[int], beside: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of changes, without what was believed before, shape (cause, row).
 
-        Parameters
-        ----------
-        rows : array, shape (number, row)
-            Whitened.
-        beside : array, shape (number, size), or None
-            Whitened directions of changes that are there anyway.
+        `rows`, shape (number, row): whitened.
+        `beside`, shape (number, size): whitened directions of changes that are there anyway.
         """
         base = rows[:, :0] if beside is None else beside
         told: dict[tuple[bytes, ...], Array] = {}
@@ -314,12 +297,8 @@ class _Space:
     def _density(self, rows: Array, directions: Array, losses: IntArray, told: dict[tuple[bytes, ...], Array]) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
-        Parameters
-        ----------
-        losses : array, shape (loss,)
-            Directions whose sizes are nearly always above 0.
-        told : dict
-            Densities of parts, which changes have in common; what is not there is added.
+        `losses`, shape (loss,): directions whose sizes are nearly always above 0.
+        `told`: densities of parts, which changes have in common; what is not there is added.
         """
         total = np.zeros(rows.shape[1])
         for kinds, columns in self._parts(directions):
@@ -353,19 +332,12 @@ class _Space:
 
         Each kind is a multivariate t of its own: that the others scatter little tells nothing of it.
 
-        Parameters
-        ----------
-        rows : array, shape (number, row)
-            Whitened.
-        losses : array, shape (loss,)
-            Directions whose sizes are nearly always above 0.
-
-        Returns
-        -------
-        logarithm : array, shape (node, row)
-            Of the density, with the weight of the node, but for what all have in common.
-        mean : array, shape (node, size, row)
-        covariance : array, shape (node, size, size)
+        `rows`, shape (number, row): whitened.
+        `losses`, shape (loss,): directions whose sizes are nearly always above 0.
+        Result `logarithm`, shape (node, row): of the density, with the weight of the node, but for what all have in
+        common.
+        Result `mean`: shape (node, size, row).
+        Result `covariance`: shape (node, size, size).
         """
         scales, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
         precision = np.eye(directions.shape[1]) + np.tensordot(
@@ -422,14 +394,9 @@ class _Space:
 class _Held(NamedTuple):
     """Flights that are held against what they can be off by.
 
-    Attributes
-    ----------
-    mean : array, shape (number,)
-        Whitened.
-    evidence : float
-        Logarithm of the largest evidence of a change.
-    furthest : float
-        At most how probable it is that any number is as far off.
+    `mean`, shape (number,): whitened.
+    `evidence`: logarithm of the largest evidence of a change.
+    `furthest`: at most how probable it is that any number is as far off.
     """
 
     space: _Space
@@ -471,11 +438,7 @@ def _losing(mean: Array, variance: Array) -> Array:
 
     Of two losses as if neither told of the other.
 
-    Parameters
-    ----------
-    mean : array, shape (scale, loss, row)
-    variance : array, shape (scale, loss)
-        Of the size of each.
+    `mean`: shape (scale, loss, row); `variance`, shape (scale, loss): of the size of each.
     """
     from scipy.special import ndtr
 

@@ -35,16 +35,11 @@ _AXES, _ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 class Kind:
     """One kind of numbers.
 
-    Attributes
-    ----------
-    unit : str
-        Of a number; 1 for logarithms of ratios.
-    apart, together : float
-        Standard deviations from day to day of a vehicle that nobody changed: of each number by itself, and of all
-        numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
-    agile : float
-        By how much numbers differ in flights that are flown e times as agile: standard deviation, half of its variance
-        in common.
+    `unit`: of a number; 1 for logarithms of ratios.
+    `apart`, `together`: standard deviations from day to day of a vehicle that nobody changed: of each number by itself,
+    and of all numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
+    `agile`: by how much numbers differ in flights that are flown e times as agile: standard deviation, half of its
+    variance in common.
     """
 
     unit: str
@@ -210,17 +205,9 @@ def unit_of(name: str) -> str:
 def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
     """Compute the numbers of a flight.
 
-    Parameters
-    ----------
-    full_voltage : float
-        What its voltage is a share of, V; 1 for shares.
-    has_gyroscope : bool
-        Whether the log holds body rates, though they never move.
-
-    Raises
-    ------
-    InputError
-        If the flight has no speeds or commands of single rotors, or flies for less than four seconds.
+    `full_voltage`: what its voltage is a share of, V; 1 for shares.
+    `has_gyroscope`: whether the log holds body rates, though they never move.
+    Raises InputError if the flight has no speeds or commands of single rotors, or flies for less than four seconds.
     """
     signals, name = recording.signals, recording.name
     if signals.rotor_speed is None:
@@ -494,13 +481,10 @@ def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     Beside what goes with the other columns, and with those that nothing follows: of a weak rotor thrust turns the body
     too, and so does each torque about all axes.
 
-    Parameters
-    ----------
-    count : int
-        Of windows.
-    sums : array, shape (delay, drive and column)
-    products : array, shape (delay, drive and column, drive and column)
-        Over them of what drives and of what follows, the last of them.
+    `count`: of windows.
+    `sums`: shape (delay, drive and column).
+    `products`, shape (delay, drive and column, drive and column): over them of what drives and of what follows, the
+    last of them.
     """
     products = products - sums[:, :, None] * sums[:, None, :] / count
     drives = products.shape[1] - columns

@@ -48,28 +48,18 @@ _CALM = 1.0
 class Reference:
     """Numbers of reference flights: their mean and covariance.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Numbers that all flights tell, today's too.
-    mean : array, shape (number,)
-    covariance : array, shape (number, number)
-        Of the mean of flights of one other day beside that of the reference.
-    freedom : array, shape (number,)
-        Degrees of freedom of the covariance; of numbers of a kind the same.
-    measured : array, shape (number,)
-        Mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
-    by_voltage, voltage_error : array, shape (number,)
-        Power of the voltage that a number goes with, and its error, which all of a kind have in common; 0 where it goes
-        with none.
-    voltage : float
-        Of the mean; NaN where it does not count.
-    by_agility : array, shape (number,)
-        By how much a number goes with the logarithm of how agile a flight is flown.
-    agility_error : array, shape (number,)
-        Its standard error; 0 where it does not count.
-    agility : float
-        That logarithm of the mean; NaN where it does not count.
+    `names`: numbers that all flights tell, today's too.
+    `mean`: shape (number,).
+    `covariance`, shape (number, number): of the mean of flights of one other day beside that of the reference.
+    `freedom`, shape (number,): degrees of freedom of the covariance; of numbers of a kind the same.
+    `measured`, shape (number,): mean variance by which a number of one flight is off, by its blocks; it is in the
+    covariance.
+    `by_voltage`, `voltage_error`, shape (number,): power of the voltage that a number goes with, and its error, which
+    all of a kind have in common; 0 where it goes with none.
+    `voltage`: of the mean; NaN where it does not count.
+    `by_agility`, shape (number,): by how much a number goes with the logarithm of how agile a flight is flown.
+    `agility_error`, shape (number,): its standard error; 0 where it does not count.
+    `agility`: that logarithm of the mean; NaN where it does not count.
     """
 
     names: tuple[str, ...]
@@ -93,14 +83,8 @@ class Reference:
         flights are flown by a regression with a prior of its own: where the reference flights are all flown alike,
         flights that are not tell the less the more they differ.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Numbers to take, which all of them have.
-
-        References
-        ----------
-        Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
+        `names`: numbers to take, which all of them have.
+        Reference: Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
         """
         values = np.array([[flight.values[name] for name in names] for flight in flights])
         power, error, voltage = _by_voltage(flights, names, values)
@@ -158,12 +142,7 @@ def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
 def number_limits(freedom: Array, asked: int) -> Array:
     """Compute the deviations that some number of an unchanged vehicle exceeds at the rate of `EACH_TEST` at most.
 
-    Parameters
-    ----------
-    freedom : array, shape (number,)
-        Degrees of freedom of each.
-    asked : int
-        How many means of flights all of them are asked of.
+    `freedom`, shape (number,): degrees of freedom of each; `asked`: how many means of flights all of them are asked of.
     """
     # Slow to load, and who reads a record computes nothing.
     from scipy.special import stdtrit
@@ -174,9 +153,7 @@ def number_limits(freedom: Array, asked: int) -> Array:
 def furthest(deviations: Array, freedom: Array, asked: int) -> float:
     """Compute at most how probable it is that any number of so many means of unchanged flights is as far off.
 
-    Parameters
-    ----------
-    deviations : array, shape (..., number)
+    `deviations`: shape (..., number).
     """
     from scipy.special import stdtr
 
@@ -204,10 +181,7 @@ def learned_covariance(apart: Array, freedom: float, expected: Array, names: Seq
 
     What is expected of a kind counts as six flights, at a scale that the numbers of the kind tell together.
 
-    Parameters
-    ----------
-    apart : array, shape (row, number)
-        Whose squares add up to the covariance, times the degrees of freedom that they have.
+    `apart`, shape (row, number): whose squares add up to the covariance, times the degrees of freedom that they have.
     """
     alike = _alike(names)
     seen, kinds = (apart.T @ apart) * alike, np.array(kinds_of(names))
@@ -225,15 +199,9 @@ def _scale(expected: Array, seen: Array, freedom: float) -> tuple[float, float]:
     an inverse Wishart distribution about that scale: numbers of a kind tell it together, and few flights hardly do. How
     unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
 
-    Parameters
-    ----------
-    expected : array, shape (number, number)
-    seen : array, shape (number, number)
-        Sum of squares, of so many degrees of freedom.
-
-    References
-    ----------
-    Gelman 2006, Prior distributions for variance parameters in hierarchical models.
+    `expected`: shape (number, number).
+    `seen`, shape (number, number): sum of squares, of so many degrees of freedom.
+    Reference: Gelman 2006, Prior distributions for variance parameters in hierarchical models.
     """
     logarithms = np.linspace(-4.0, 4.0, 81) * 2 * _SCALE_ERROR
     beyond = np.maximum(np.linalg.eigvals(np.linalg.solve(expected, seen)).real, 0.0)
@@ -265,16 +233,10 @@ def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:
 class LoadDirections:
     """What a change does to the logarithms of the rotors' loads in hover.
 
-    Attributes
-    ----------
-    rotor : array, shape (rotor, rotor)
-        Of each rotor that lacks a share of its thrust and drag, for a whole share.
-    mass : array, shape (rotor,)
-        For a relative change of the mass.
-    offset : array, shape (2, rotor)
-        Of the centre of mass along x and y, per m.
-    yaw : array, shape (rotor,)
-        Of a torque about z, for as much as all rotors' drag.
+    `rotor`, shape (rotor, rotor): of each rotor that lacks a share of its thrust and drag, for a whole share.
+    `mass`, shape (rotor,): for a relative change of the mass.
+    `offset`, shape (2, rotor): of the centre of mass along x and y, per m.
+    `yaw`, shape (rotor,): of a torque about z, for as much as all rotors' drag.
     """
 
     rotor: Array
@@ -326,14 +288,9 @@ def _by_agility(
 ) -> tuple[Array, Array, Array, float, float]:
     """Regress numbers on the logarithm of how agile flights are flown.
 
-    Returns
-    -------
-    rows : array, shape (row, number)
-        What is left, and what the prior adds.
-    slope, prior : array, shape (number,)
-        And the variance of the slope before any flight.
-    agility, spread : float
-        Mean of the logarithm, and the sum of squares about it.
+    Result `rows`, shape (row, number): what is left, and what the prior adds.
+    Result `slope`, `prior`, shape (number,): and the variance of the slope before any flight.
+    Result `agility`, `spread`: mean of the logarithm, and the sum of squares about it.
     """
     prior = np.array([KINDS[kind].agile ** 2 for kind in kinds_of(names)])
     more = _logarithms(flights)

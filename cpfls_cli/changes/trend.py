@@ -50,23 +50,12 @@ def trend(
     touches. Change points are those of least squares with a penalty for each (PELT), the one that rows of an unchanged
     vehicle exceed at the rate of false alarms: the same number of flights, drawn, whitened and searched alike.
 
-    Parameters
-    ----------
-    flights : sequence of FlightNumbers
-        In time order.
-    reference : int, optional
-        How many of the first flights are the reference: by default half of them, or those before the first change, and
-        at least three.
-
-    Raises
-    ------
-    InputError
-        If there are fewer flights than the reference and one more, or ruptures is not installed.
-
-    References
-    ----------
-    Killick, Fearnhead and Eckley 2012, Optimal detection of changepoints with a linear computational cost, JASA
-    107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
+    `flights`: in time order.
+    `reference`: how many of the first flights are the reference: by default half of them, or those before the first
+    change, and at least three.
+    Raises InputError if there are fewer flights than the reference and one more, or ruptures is not installed.
+    Reference: Killick, Fearnhead and Eckley 2012, Optimal detection of changepoints with a linear computational cost,
+    JASA 107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
     Processing 167.
     """
     names, kept = most_told(flights)
@@ -175,18 +164,13 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
 class Row:
     """Flights one after another, and what is expected of such a row.
 
-    Attributes
-    ----------
-    values : array, shape (flight, number)
-    expected : array, shape (number, number)
-        Covariance of a flight before any is seen.
-    voltage : array, shape (flight, number)
-        Standard deviation of what numbers of a kind have in common by the voltage, whose effect is not known well.
-    noise : array, shape (flight, number)
-        Standard deviation of what a flight tells worse than others do.
-    agility : array, shape (flight, number)
-        Standard deviation of what is not known for how agile a flight is flown; half of its variance numbers of a kind
-        have in common.
+    `values`: shape (flight, number).
+    `expected`, shape (number, number): covariance of a flight before any is seen.
+    `voltage`, shape (flight, number): standard deviation of what numbers of a kind have in common by the voltage, whose
+    effect is not known well.
+    `noise`, shape (flight, number): standard deviation of what a flight tells worse than others do.
+    `agility`, shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of
+    its variance numbers of a kind have in common.
     """
 
     names: tuple[str, ...]

@@ -88,16 +88,9 @@ def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> A
 def audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals] = ()) -> Audit:
     """Check the sensors of flights with the same hardware against each other.
 
-    Parameters
-    ----------
-    flights : sequence of Signals
-        At least one, with the sampling period of the windows.
-    whole : sequence of Signals
-        Those that rotors and attitude are held against the vehicle in, where `flights` are but a part of them.
-
-    References
-    ----------
-    Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
+    `flights`: at least one, with the sampling period of the windows.
+    `whole`: those that rotors and attitude are held against the vehicle in, where `flights` are but a part of them.
+    Reference: Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
     key = (audit, tuple(flights), windows, tuple(whole))
     return flights[0].once(key, lambda: _audit(flights, windows, whole or flights))

@@ -52,19 +52,10 @@ def _instead(correlation: Array, axis: int) -> int | None:
 def axes_apart(words: str, first: Array, second: Array, floor: float) -> Iterator[tuple[str, float]]:
     """Detect axes that are swapped, reversed or missing.
 
-    Parameters
-    ----------
-    words : str
-        The two channels, "one and other".
-    first, second : array, shape (window, 3)
-        What should be the same.
-    floor : float
-        Standard deviation above which something moves.
-
-    Yields
-    ------
-    tuple of str and float
-        What is wrong, and the correlation along that axis.
+    `words`: the two channels, "one and other".
+    `first`, `second`, shape (window, 3): what should be the same.
+    `floor`: standard deviation above which something moves.
+    Result: what is wrong, and the correlation along that axis.
     """
     spread, other_spread = first.std(axis=0), second.std(axis=0)
     correlation = _correlated(first, second)
@@ -87,19 +78,11 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
     The gain of an axis that agrees is the ratio of the two standard deviations (reduced major axis regression), for
     either may hold the noise.
 
-    Parameters
-    ----------
-    seen, read : array, shape (window, 3), rad/s
-        The rate by the attitude, and by the gyroscope.
-
-    Returns
-    -------
-    unlike : tuple of Finding
-        One for each axis whose correlation is below 0.6.
-    scaled : tuple of Finding
-        One for each axis that agrees whose gain is not within 0.5 .. 2, and for each other one whose gain is that of
-        degrees for radians: noise in one of the two brings the correlation down to the ratio of their sizes, and so
-        explains no gain beyond its inverse.
+    `seen`, `read`, shape (window, 3), rad/s: the rate by the attitude, and by the gyroscope.
+    Result `unlike`: one for each axis whose correlation is below 0.6.
+    Result `scaled`: one for each axis that agrees whose gain is not within 0.5 .. 2, and for each other one whose gain
+    is that of degrees for radians: noise in one of the two brings the correlation down to the ratio of their sizes, and
+    so explains no gain beyond its inverse.
     """
     motion = np.maximum(seen.std(axis=0), read.std(axis=0))
     correlation = _correlated(seen, read)

@@ -68,10 +68,7 @@ def _channels(signals: Signals) -> Mapping[str, Array]:
 def known_up_to(signals: Signals) -> dict[str, float]:
     """Find the cut-offs of the low-pass filters that the signals of a flight went through before they were logged.
 
-    Returns
-    -------
-    dict from field of `Signals` to float, Hz
-        Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
+    Result: signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
     """
     return signals.once(known_up_to, lambda: _known_up_to(signals))
 

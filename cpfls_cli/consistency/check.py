@@ -41,12 +41,8 @@ def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, 
 
     What is not flown, where a touchdown is a motion of its own, tells nothing.
 
-    Parameters
-    ----------
-    parts : sequence of Signals
-        Stretches of one flight, or flights with the same hardware; those too short for windows are left out.
-    settings : WindowSettings
-        Of the section `gap`, as in the sensor audit.
+    `parts`: stretches of one flight, or flights with the same hardware; those too short for windows are left out.
+    `settings`: of the section `gap`, as in the sensor audit.
     """
     parts = [_flown(part) for part in parts]
     looked_at = _middle(parts)

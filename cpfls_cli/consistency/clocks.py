@@ -79,17 +79,9 @@ def attitude_on_clock(
     Which of the two is late the rotors say. Where they do not, as commands or a loop that answers gusts, it is the one
     that comes after the other: a sensor, a filter or a wire makes a log late, and nothing makes it early.
 
-    Parameters
-    ----------
-    gyro_delay : float
-        Of the gyroscope behind the attitude, s.
-
-    Returns
-    -------
-    repairs : tuple of ChannelRepair
-        Empty where the gyroscope is late.
-    notes : tuple of str
-        That only this makes the gyroscope late.
+    `gyro_delay`: of the gyroscope behind the attitude, s.
+    Result `repairs`: empty where the gyroscope is late.
+    Result `notes`: that only this makes the gyroscope late.
     """
     behind = np.array([delay for half in _halves(flights, windows) if (delay := _behind(half)) is not None])
     agrees, lags = False, False
@@ -112,10 +104,7 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     and a shift has to halve what is left at least: on real flights whose clocks agree, drag and damping explain the
     torque as well with any shift. Yaw says nothing, because rotors that speed up turn the vehicle ahead of their drag.
 
-    Returns
-    -------
-    ChannelRepair or None
-        None where nothing is wrong, or nobody knows.
+    None where nothing is wrong, or nobody knows.
     """
     told = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
     if len(told) < _FEWEST_SHIFTS:

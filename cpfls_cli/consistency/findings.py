@@ -16,23 +16,14 @@ _CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
 class Finding:
     """Something that is wrong with a log, or with what the config says of its vehicle.
 
-    Attributes
-    ----------
-    what : str
-        Who says so and what is wrong, with its numbers; begins small, to stand behind the name of a flight.
-    remedy : str
-        What would mend it: keys of the config, or a part of the log.
-    channels : tuple of str
-        What was held against each other.
-    size : float
-        Of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
-    unit : str
-        Of the size; empty for a ratio.
-    contradiction : bool
-        Whether no verdict can stand beside it: a unit, an axis or a sign is wrong. What is late, noisy or a little off
-        is fitted, repaired or told, and spoils no verdict.
-    repairable : bool
-        Whether `cpfls gap` sets it right before it looks at the model.
+    `what`: who says so and what is wrong, with its numbers; begins small, to stand behind the name of a flight.
+    `remedy`: what would mend it: keys of the config, or a part of the log.
+    `channels`: what was held against each other.
+    `size`: of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
+    `unit`: of the size; empty for a ratio.
+    `contradiction`: whether no verdict can stand beside it: a unit, an axis or a sign is wrong. What is late, noisy or
+    a little off is fitted, repaired or told, and spoils no verdict.
+    `repairable`: whether `cpfls gap` sets it right before it looks at the model.
     """
 
     what: str

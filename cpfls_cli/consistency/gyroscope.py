@@ -41,15 +41,12 @@ class Kinematics:
 
     The equation keeps its form under any fixed rotation of r, so noise of the middle sample does not enter.
 
-    Attributes
-    ----------
-    rate : array, shape (window, 3), rad/s
-        Averages of the rate that the attitude shows, body axes at the middle of the window; nothing is differentiated.
-    turning : array, shape (window, sample, 3, 3)
-        ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
-    time : array, shape (window, sample), s
-    gyro : CubicSpline
-        Body rate over time; through smooth windows its interpolation error is nothing.
+    `rate`, shape (window, 3), rad/s: averages of the rate that the attitude shows, body axes at the middle of the
+    window; nothing is differentiated.
+    `turning`, shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those
+    axes.
+    `time`: shape (window, sample), s.
+    `gyro`: body rate over time; through smooth windows its interpolation error is nothing.
     """
 
     rate: Array
@@ -75,16 +72,7 @@ class Kinematics:
     def products(self, delay: float, order: int = 0) -> Array:
         """Average each reading, put on each axis; the columns of a matrix on the gyroscope.
 
-        Parameters
-        ----------
-        delay : float
-            s.
-        order : int
-            1 for the derivative of the reading.
-
-        Returns
-        -------
-        array, shape (window, 3, to, from), rad/s or rad/s^2
+        `delay`: s; `order`: 1 for the derivative of the reading; Result: shape (window, 3, to, from), rad/s or rad/s^2.
         """
         turning = np.moveaxis(self.turning, 1, 3)
         averages = turning.reshape(len(turning), 9, -1) @ self.gyro(self.time + delay, order)
@@ -131,16 +119,10 @@ def _relative(turned: Array) -> Array:
 class DelayScan:
     """The delay at which the readings as they are fit best.
 
-    Attributes
-    ----------
-    delay : float
-        Positive where the gyroscope is late, s, on a coarse grid.
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    excited : array of bool, shape (3,)
-        Axes that turn enough to tell a scale.
-    seen, read : array, shape (window, 3), rad/s
-        Averages of the rate by the attitude, and by the gyroscope at that delay.
+    `delay`: positive where the gyroscope is late, s, on a coarse grid.
+    `variance`, shape (3,), rad^2/s^2: left about each axis.
+    `excited`, shape (3,): axes that turn enough to tell a scale.
+    `seen`, `read`, shape (window, 3), rad/s: averages of the rate by the attitude, and by the gyroscope at that delay.
     """
 
     delay: float
@@ -185,22 +167,14 @@ def _precision(read: Array) -> Array:
 class GyroFit:
     """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
 
-    Attributes
-    ----------
-    value : array, shape (13,)
-        Bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
-        misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
-    error : array, shape (13,)
-        Standard errors by the jackknife over blocks.
-    pull : array, shape (13,)
-        How far noise of the gyroscope can have pulled the value at most.
-    known : array of bool, shape (13,)
-        What the motion could tell.
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    flight_bias : array, shape (flight, 3), rad/s
-        Bias of each flight less that of all.
-    flight_bias_error : array, shape (flight, 3), rad/s
+    `value`, shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay
+    (s). The misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
+    `error`, shape (13,): standard errors by the jackknife over blocks.
+    `pull`, shape (13,): how far noise of the gyroscope can have pulled the value at most.
+    `known`, shape (13,): what the motion could tell.
+    `variance`, shape (3,), rad^2/s^2: left about each axis.
+    `flight_bias`, shape (flight, 3), rad/s: bias of each flight less that of all.
+    `flight_bias_error`: shape (flight, 3), rad/s.
     """
 
     value: Array
@@ -225,14 +199,8 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
 
-    Returns
-    -------
-    GyroFit or None
-        None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
-
-    References
-    ----------
-    Frisch 1934 (bounds of regression with noise on both sides).
+    None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
+    Reference: Frisch 1934 (bounds of regression with noise on both sides).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     whole = sum(float(np.ptp(flight.centres)) for flight in flights)

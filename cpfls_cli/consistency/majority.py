@@ -57,14 +57,10 @@ _Read = tuple[ChannelRepair, tuple[str, ...]]
 class Settled:
     """What a majority of the channels decides.
 
-    Attributes
-    ----------
-    checks : tuple of PairCheck
-        Of the repaired flights.
-    against_thrust : Finding or None
-        That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
-    dropped : tuple of Finding
-        Of repairs that another channel contradicts, so that nothing is done.
+    `checks`: of the repaired flights.
+    `against_thrust`: that the world is upside down, turned or mirrored against thrust and attitude; None where it is
+    not.
+    `dropped`: of repairs that another channel contradicts, so that nothing is done.
     """
 
     repairs: tuple[ChannelRepair, ...]
@@ -113,10 +109,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     one that agrees with fewest, is read in the ways that logs are usually wrong (unit, gravity, axes, clock). It is
     mended if it then contradicts nothing, and left out if nothing mends it and two others are against it.
 
-    Parameters
-    ----------
-    flights : sequence of Signals
-        With the sampling period of the windows, and a late attitude set right.
+    `flights`: with the sampling period of the windows, and a late attitude set right.
     """
     repairs: tuple[ChannelRepair, ...] = ()
     dropped: tuple[Finding, ...] = ()

@@ -49,16 +49,10 @@ TINY = 1e-100
 class MotionChannel(NamedTuple):
     """A channel of the motion.
 
-    Attributes
-    ----------
-    words : str
-        What it is called.
-    keys : str
-        What of the config says how it is read.
-    units : mapping of str to float
-        Units that logs hold it in by mistake, in SI.
-    without : str
-        What follows where it is left out; empty for one that is never mended or left out.
+    `words`: what it is called.
+    `keys`: what of the config says how it is read.
+    `units`: units that logs hold it in by mistake, in SI.
+    `without`: what follows where it is left out; empty for one that is never mended or left out.
     """
 
     words: str
@@ -144,22 +138,13 @@ class Pair(NamedTuple):
 class PairCheck:
     """Two channels held against each other.
 
-    Attributes
-    ----------
-    first, second : array, shape (window, 3)
-        What should be the same.
-    scale, r2 : array, shape (3,)
-        Of the second against the first along each axis, and the share of what moves in both.
-    delay : Sure
-        Of the second against the first, s.
-    turn : Sure
-        Of the second against the first about the vertical, rad.
-    hop_s : float
-        From one window to the next, s.
-    problems : tuple of Finding
-        What is wrong between the two; empty where nothing is.
-    agrees : bool
-        Whether what moves moves together.
+    `first`, `second`, shape (window, 3): what should be the same.
+    `scale`, `r2`, shape (3,): of the second against the first along each axis, and the share of what moves in both.
+    `delay`: of the second against the first, s.
+    `turn`: of the second against the first about the vertical, rad.
+    `hop_s`: from one window to the next, s.
+    `problems`: what is wrong between the two; empty where nothing is.
+    `agrees`: whether what moves moves together.
     """
 
     pair: Pair
@@ -198,10 +183,7 @@ _PAIRS = (
 def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = None) -> tuple[PairCheck, ...]:
     """Compare channels with the derivatives of others.
 
-    Parameters
-    ----------
-    channel : str or None
-        The one that is compared with the others; None for all pairs.
+    `channel`: the one that is compared with the others; None for all pairs.
     """
     pairs = [pair for pair in _PAIRS if channel is None or channel in pair]
     return tuple(check for pair in pairs if (check := _checked(pair, flights, windows)) is not None)

@@ -46,10 +46,7 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
 def impossible(off: Mapping[str, float]) -> tuple[Finding, ...]:
     """Say of numbers of the vehicle that a fit asks for and no vehicle has what makes them so: the log is wrong.
 
-    Parameters
-    ----------
-    off : mapping of str to float
-        Their ratios to the config.
+    `off`: their ratios to the config.
     """
     return tuple(
         Finding(

@@ -24,10 +24,7 @@ _SCALED = 0.1
 class ChannelRepair:
     """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
 
-    Attributes
-    ----------
-    finding : Finding or None
-        The same as the sentence, where nothing is done about it.
+    `finding`: the same as the sentence, where nothing is done about it.
     """
 
     channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")

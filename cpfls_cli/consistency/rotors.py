@@ -117,17 +117,9 @@ class MeantUnit(NamedTuple):
 def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, declared: str) -> MeantUnit | None:
     """Tell in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
 
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-        As read in the unit that is declared.
-    attitude : array, shape (time, 3), rad, or None
-        Slow rotors may idle on the ground where it does not lean.
-
-    Returns
-    -------
-    MeantUnit or None
-        None where they may be right, or no other unit makes them so.
+    `speed`, shape (time, rotor), rad/s: as read in the unit that is declared.
+    `attitude`, shape (time, 3), rad: slow rotors may idle on the ground where it does not lean.
+    None where they may be right, or no other unit makes them so.
     """
     turning, guessed = _turning(speed), "thrust_factor" in vehicle.unknown
     if len(vehicle.rotors) < _FEWEST_ROTORS or speed.shape[1] != len(vehicle.rotors) or not turning.any():

@@ -56,14 +56,7 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
     A number is named when its size matters, and Student's t of what exceeds the possible pull of noise and half of
     that size stays significant after Holm's correction over all numbers that the motion can tell.
 
-    Parameters
-    ----------
-    period : float
-        Sampling period, s.
-
-    References
-    ----------
-    Holm 1979.
+    `period`: sampling period, s. Reference: Holm 1979.
     """
     known_faults = [fault for fault in faults if fault.fit.known.any()]
     if not known_faults:
@@ -128,14 +121,9 @@ _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 
 class Gyroscope:
     """The gyroscope held against the attitude.
 
-    Attributes
-    ----------
-    faults : tuple of CheckedFault
-        What can be told.
-    untested : mapping of str to str
-        Faults that cannot, with the reason.
-    apart : tuple of Finding
-        That the two do not show one motion in one unit.
+    `faults`: what can be told.
+    `untested`: faults that cannot, with the reason.
+    `apart`: that the two do not show one motion in one unit.
     """
 
     faults: tuple[CheckedFault, ...] = ()
@@ -166,20 +154,12 @@ class Gyroscope:
 class Sensors:
     """What the sensors of flights say of each other.
 
-    Attributes
-    ----------
-    gyroscope : Gyroscope
-        Once a late attitude is set right.
-    clocks : tuple of ChannelRepair
-        What sets a late attitude and late rotors right.
-    notes : tuple of str
-        What nobody knows of a clock.
-    flights : tuple of Signals
-        On one clock.
-    motion : Settled
-        What a majority says of the channels of the motion.
-    findings : tuple of Finding
-        What is wrong.
+    `gyroscope`: once a late attitude is set right.
+    `clocks`: what sets a late attitude and late rotors right.
+    `notes`: what nobody knows of a clock.
+    `flights`: on one clock.
+    `motion`: what a majority says of the channels of the motion.
+    `findings`: what is wrong.
     """
 
     gyroscope: Gyroscope

@@ -25,10 +25,7 @@ def second_order(frequency: float, damping: float, period: float, upper: tuple[f
 def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
     """Change the rotor speeds, or the stated torque and thrust of a flight without rotor speeds.
 
-    Parameters
-    ----------
-    change : callable
-        From a signal to the changed one, time first.
+    `change`: from a signal to the changed one, time first.
     """
     if signals.rotor_speed is not None:
         return signals.with_rotor_speed(change(signals.rotor_speed))
@@ -46,12 +43,7 @@ def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
 class DelayLine:
     """Rotors behind a delay, step by step, in straight lines; before the first have arrived they keep their speed.
 
-    Attributes
-    ----------
-    steps : float
-        Delay in steps, at least 0.
-    past : list of RotorMotion
-        What is still under way.
+    `steps`: delay in steps, at least 0; `past`: what is still under way.
     """
 
     steps: float
@@ -75,12 +67,7 @@ class DelayLine:
 class CommandFilter:
     """A second-order filter between command and rotors, with the functions that an effect is made of.
 
-    Attributes
-    ----------
-    damping : str
-        Name of the shape that is zeta; the other one is ``frequency_hz``.
-    upper : tuple of float
-        (a, b, c) of `SecondOrder`.
+    `damping`: name of the shape that is zeta; the other one is ``frequency_hz``; `upper`: (a, b, c) of `SecondOrder`.
     """
 
     damping: str

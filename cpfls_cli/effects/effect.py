@@ -21,14 +21,9 @@ Kind = Literal["wrench", "actuator", "sensor", "parameter"]
 class Coefficient:
     """One number that an effect needs.
 
-    Attributes
-    ----------
-    low, high : float
-        What is physically possible, not what is usual, in multiples of `scale`.
-    scale : callable or None
-        Natural size on a vehicle, in `unit`; None for 1.
-    of_log : bool
-        Whether it tells how the motion is logged, and leaves the motion itself as it is.
+    `low`, `high`: what is physically possible, not what is usual, in multiples of `scale`.
+    `scale`: natural size on a vehicle, in `unit`; None for 1.
+    `of_log`: whether it tells how the motion is logged, and leaves the motion itself as it is.
     """
 
     name: str
@@ -65,14 +60,9 @@ def of_axes(
 class Shape:
     """A parameter that an effect depends on nonlinearly.
 
-    Attributes
-    ----------
-    grid : tuple of float
-        Ascending; values that a search starts from. The first and the last bound it.
-    first : float or None
-        Where a search stays until the effect is chosen; None: it tries the whole grid.
-    valley : float or None
-        Where the residual has many valleys over it: their width, as a share of the value.
+    `grid`: ascending; values that a search starts from. The first and the last bound it.
+    `first`: where a search stays until the effect is chosen; None: it tries the whole grid.
+    `valley`: where the residual has many valleys over it: their width, as a share of the value.
     """
 
     name: str
@@ -96,13 +86,10 @@ class Shape:
 class Columns:
     """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``.
 
-    Attributes
-    ----------
-    direct : array, shape (time, 6, coefficient)
-        Torque (3) and force (3) about the body axes for one unit of each coefficient.
-    momentum : array, shape (time, 6, coefficient), or None
-        What has to be differentiated in time; None for nothing. Nobody differentiates it: windows are integrated by
-        parts.
+    `direct`, shape (time, 6, coefficient): torque (3) and force (3) about the body axes for one unit of each
+    coefficient.
+    `momentum`, shape (time, 6, coefficient): what has to be differentiated in time; None for nothing. Nobody
+    differentiates it: windows are integrated by parts.
     """
 
     direct: Array
@@ -111,14 +98,7 @@ class Columns:
     def at_samples(self, coefficients: Array, time: Array) -> Array:
         """Evaluate ``direct @ c + d/dt (momentum @ c)`` sample by sample; noise of what is differentiated shows in it.
 
-        Parameters
-        ----------
-        coefficients : array, shape (coefficient,)
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (time, 6)
+        `coefficients`: shape (coefficient,); `time`: shape (time,), s; Result: shape (time, 6).
         """
         momentum = None if self.momentum is None else self.momentum @ coefficients
         return Columns(np.asarray(self.direct @ coefficients), momentum).along(time)
@@ -137,68 +117,43 @@ class Columns:
 class Effect:
     """A physical effect that a model may miss.
 
-    Attributes
-    ----------
-    name : str
-        Identifier.
-    title : str
-        What people call it.
-    kind : {"wrench", "actuator", "sensor", "parameter"}
-        Adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the vehicle.
-    formula : str
-        One line.
-    sentence : str
-        What a pilot understands.
-    coefficients : tuple of Coefficient
-        Physical, as reported; those of `shapes` not among them.
-    needs : frozenset of str
-        Of `Signals.available`.
-    excitation : str
-        The flight that shows it.
-    rivals : mapping of str to str
-        Effects that look alike, each with the flight that tells them apart.
-    columns : callable or None
-        ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
-        None for what only the audit of the sensors can see.
-    physical : PhysicalNumbers or None
-        None: the linear coefficients are the physical ones, whose bounds bound them.
-    apply : callable or None
-        For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
-        effect's error, or with its air, so that all other columns can be computed from them.
-    describe : callable or None
-        ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
-    rate_derivative : bool
-        Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
-    holds : frozenset of str
-        Effects that are special cases of this one, which is then not their rival.
-    scatter : callable or None
-        For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
-        force for a unit of relative scatter.
-    order : int
-        Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
-    of_all_forces : bool
-        Whether the columns have a lever for the forces of all other effects.
-    actuation : Actuation or None
-        For effects between command and rotors: how they are simulated.
-    carried : callable or None
-        For effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of the
-        columns.
-    log : SensorLog or None
-        For effects on the log: how they are simulated.
-    test : SensorTest or None
-        For effects that the sensor audit finds.
-    accounts : callable or None
-        ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
-        so that the number is not called wrong.
-    in_vehicle : callable or None
-        ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model
-        of a whole vehicle.
-    exact : Effect or None
-        What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
-        would do as well, or with those that others depend on as shapes, under the same names.
-    lever : callable or None
-        ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
-        possible, a torque being no larger than its force on a lever as long as the body.
+    `name`: identifier.
+    `title`: what people call it.
+    `kind`: adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the
+    vehicle.
+    `formula`: one line.
+    `sentence`: what a pilot understands.
+    `coefficients`: physical, as reported; those of `shapes` not among them.
+    `needs`: of `Signals.available`.
+    `excitation`: the flight that shows it.
+    `rivals`: effects that look alike, each with the flight that tells them apart.
+    `columns`: ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of
+    wrench. None for what only the audit of the sensors can see.
+    `physical`: None: the linear coefficients are the physical ones, whose bounds bound them.
+    `apply`: for effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without
+    the effect's error, or with its air, so that all other columns can be computed from them.
+    `describe`: ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by
+    name.
+    `rate_derivative`: whether the columns hold the derivative of the body rates, and with it the noise of the
+    gyroscope.
+    `holds`: effects that are special cases of this one, which is then not their rival.
+    `scatter`: for effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque
+    and force for a unit of relative scatter.
+    `order`: place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
+    `of_all_forces`: whether the columns have a lever for the forces of all other effects.
+    `actuation`: for effects between command and rotors: how they are simulated.
+    `carried`: for effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of
+    the columns.
+    `log`: for effects on the log: how they are simulated.
+    `test`: for effects that the sensor audit finds.
+    `accounts`: ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself
+    leaves, so that the number is not called wrong.
+    `in_vehicle`: ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in
+    the model of a whole vehicle.
+    `exact`: what takes the place of this one once it is chosen: the same effect with numbers for which alone another
+    effect would do as well, or with those that others depend on as shapes, under the same names.
+    `lever`: ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others
+    leave possible, a torque being no larger than its force on a lever as long as the body.
     """
 
     name: str
@@ -265,30 +220,17 @@ class Effect:
 
 
 def stack(*wrenches: Array) -> Array:
-    """Arrange wrenches, one for each coefficient, as columns.
+    """Arrange wrenches, one for each coefficient, as columns, shape (time, 6, coefficient).
 
-    Parameters
-    ----------
-    *wrenches : array, shape (time, 6)
-
-    Returns
-    -------
-    array, shape (time, 6, coefficient)
+    `wrenches`: shape (time, 6).
     """
     return np.stack(wrenches, axis=2)
 
 
 def wrench(torque: Array | None = None, force: Array | None = None) -> Array:
-    """Join a body torque and a body force.
+    """Join a body torque and a body force, shape (time, 6), N m and N.
 
-    Parameters
-    ----------
-    torque, force : array, shape (time, 3), or None
-        None for zero; one of them is given.
-
-    Returns
-    -------
-    array, shape (time, 6), N m and N
+    `torque`, `force`, shape (time, 3): None for zero; one of them is given.
     """
     given = torque if torque is not None else force
     assert given is not None, "torque or force"
@@ -299,29 +241,15 @@ def wrench(torque: Array | None = None, force: Array | None = None) -> Array:
 def hub_wrench(hubs: Array, force: Array) -> Array:
     """Sum forces at the hubs to a wrench about the centre of mass, ``(sum r_i x F_i, sum F_i)``.
 
-    Parameters
-    ----------
-    hubs : array, shape (rotor, 3), m
-    force : array, shape (time, rotor, 3), N
-
-    Returns
-    -------
-    array, shape (time, 6)
+    `hubs`: shape (rotor, 3), m; `force`: shape (time, rotor, 3), N; Result: shape (time, 6).
     """
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
 
 
 def thrust_wrench(hubs: Array, thrust: Array) -> Array:
-    """Sum changes of thrust along body z to a wrench.
+    """Sum changes of thrust along body z to a wrench, shape (time, 6).
 
-    Parameters
-    ----------
-    hubs : array, shape (rotor, 3), m
-    thrust : array, shape (time, rotor), N
-
-    Returns
-    -------
-    array, shape (time, 6)
+    `hubs`: shape (rotor, 3), m; `thrust`: shape (time, rotor), N.
     """
     force = np.zeros((*thrust.shape, 3))
     force[..., 2] = thrust

@@ -16,10 +16,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 class RotorMotion(NamedTuple):
     """Rotors in the middle of a step.
 
-    Attributes
-    ----------
-    speed : array, shape (rotor,), rad/s
-    acceleration : array, shape (rotor,), rad/s^2
+    `speed`: shape (rotor,), rad/s; `acceleration`: shape (rotor,), rad/s^2.
     """
 
     speed: Array
@@ -34,16 +31,11 @@ Link = Callable[[RotorMotion], RotorMotion]
 class Actuation:
     """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds.
 
-    Attributes
-    ----------
-    lag : callable or None
-        ``lag(values) -> float``: time constant in s that replaces that of the rotors.
-    link : callable or None
-        ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
-    delay : callable or None
-        ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
-    supply : callable or None
-        ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
+    `lag`: ``lag(values) -> float``: time constant in s that replaces that of the rotors.
+    `link`: ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
+    `delay`: ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
+    `supply`: ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is
+    logged.
     """
 
     lag: Callable[[Mapping[str, float]], float] | None = None
@@ -55,12 +47,7 @@ class Actuation:
 class PhysicalNumbers(NamedTuple):
     """How linear coefficients are written as physical ones, which are not linear in the columns.
 
-    Attributes
-    ----------
-    of : callable
-        ``of(linear) -> physical``, NaN where the data left one open.
-    linear : callable
-        The reverse.
+    `of`: ``of(linear) -> physical``, NaN where the data left one open; `linear`: the reverse.
     """
 
     of: Callable[[Array], Array]
@@ -70,13 +57,9 @@ class PhysicalNumbers(NamedTuple):
 class VehicleParts(NamedTuple):
     """What effects become in the model of a whole vehicle.
 
-    Attributes
-    ----------
-    inertia : array, shape (3, 3), kg m^2
-        Added to that of the vehicle.
-    wind : tuple of float, m/s, world frame
-    effects : tuple of (str, mapping of str to float, array)
-        Those without a place of their own: name, shape, linear coefficients.
+    `inertia`, shape (3, 3), kg m^2: added to that of the vehicle.
+    `wind`: m/s, world frame.
+    `effects`: those without a place of their own: name, shape, linear coefficients.
     """
 
     vehicle: VehicleSettings
@@ -88,17 +71,12 @@ class VehicleParts(NamedTuple):
 class Carrier(NamedTuple):
     """The vehicle that carries a body.
 
-    Attributes
-    ----------
-    mass : float, kg
-    inertia : array, shape (3, 3), kg m^2, body frame
-    rotation : array, shape (3, 3)
-        Body to world.
-    body_rate : array, shape (3,), rad/s, body frame
-    acceleration : array, shape (3,), m/s^2, world frame
-        Without the carried body.
-    turning : array, shape (3,), rad/s^2, body frame
-        The same.
+    `mass`: kg.
+    `inertia`: shape (3, 3), kg m^2, body frame.
+    `rotation`, shape (3, 3): body to world.
+    `body_rate`: shape (3,), rad/s, body frame.
+    `acceleration`, shape (3,), m/s^2, world frame: without the carried body.
+    `turning`, shape (3,), rad/s^2, body frame: the same.
     """
 
     mass: float
@@ -112,12 +90,9 @@ class Carrier(NamedTuple):
 class Pull(NamedTuple):
     """Acceleration of the carrier by a carried body, and the derivative of its state.
 
-    Attributes
-    ----------
-    acceleration : array, shape (3,), m/s^2, world frame
-    turning : array, shape (3,), rad/s^2, body frame
-    change : array, shape (state,)
-        Derivative of the state of the body.
+    `acceleration`: shape (3,), m/s^2, world frame.
+    `turning`: shape (3,), rad/s^2, body frame.
+    `change`, shape (state,): derivative of the state of the body.
     """
 
     acceleration: Array
@@ -141,13 +116,10 @@ class CarriedBody(Protocol):
 class TrueMotion(NamedTuple):
     """True motion at the samples of a simulated flight.
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    rotation : array, shape (time, 3, 3)
-        Body to world.
-    body_rate : array, shape (time, 3), rad/s, body frame
-    body_acceleration : array, shape (time, 3), rad/s^2, body frame
+    `time`: shape (time,), s.
+    `rotation`, shape (time, 3, 3): body to world.
+    `body_rate`: shape (time, 3), rad/s, body frame.
+    `body_acceleration`: shape (time, 3), rad/s^2, body frame.
     """
 
     time: Array
@@ -165,12 +137,9 @@ class TrueMotion(NamedTuple):
 class SensorLog:
     """How the log of a sensor differs from the truth.
 
-    Attributes
-    ----------
-    change : callable
-        ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without noise.
-    does : str
-        The same in words, for refusals.
+    `change`: ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without
+    noise.
+    `does`: the same in words, for refusals.
     """
 
     change: Callable[[Mapping[str, Array], TrueMotion, Mapping[str, float]], dict[str, Array]]
@@ -197,16 +166,10 @@ class ReadingError(NamedTuple):
 class FaultFit(NamedTuple):
     """Estimated numbers of a fault.
 
-    Attributes
-    ----------
-    value, error : array, shape (number,)
-        With standard errors.
-    pull : array, shape (number,)
-        How far noise of the sensor can have pulled the value at most.
-    known : array of bool, shape (number,)
-        What the motion could tell.
-    blocks : int
-        Of time that scattered the values.
+    `value`, `error`, shape (number,): with standard errors.
+    `pull`, shape (number,): how far noise of the sensor can have pulled the value at most.
+    `known`, shape (number,): what the motion could tell.
+    `blocks`: of time that scattered the values.
     """
 
     value: Array
@@ -220,29 +183,18 @@ class FaultFit(NamedTuple):
 class SensorTest:
     """How the sensor audit tests a fault, says what it found, and repairs it.
 
-    Attributes
-    ----------
-    estimate : str or callable
-        Numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or ``delay``;
-        else ``estimate(flights) -> FaultFit``, None where the flights do not tell.
-    labels : tuple of str
-        Names of the numbers in findings, in the order of the effect's coefficients, then shapes.
-    smallest : float
-        Size below which a fault moves no torque by more than the noise of a window, so that nothing is to repair.
-    smallest_samples : float
-        The same in sampling periods, for a time.
-    number : callable
-        ``number(label, value) -> str``: a number in words.
-    found : str
-        Sentence with ``{}`` for the numbers.
-    nothing : str
-        Sentence where no number is named.
-    error : callable
-        ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
-    signal : str
-        Field of `Signals`, shape (time, 3).
-    integrated : bool
-        Whether an attitude that is integrated from the gyroscope would not show the fault.
+    `estimate`: numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or
+    ``delay``; else ``estimate(flights) -> FaultFit``, None where the flights do not tell.
+    `labels`: names of the numbers in findings, in the order of the effect's coefficients, then shapes.
+    `smallest`: size below which a fault moves no torque by more than the noise of a window, so that nothing is to
+    repair.
+    `smallest_samples`: the same in sampling periods, for a time.
+    `number`: ``number(label, value) -> str``: a number in words.
+    `found`: sentence with ``{}`` for the numbers.
+    `nothing`: sentence where no number is named.
+    `error`: ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
+    `signal`: field of `Signals`, shape (time, 3).
+    `integrated`: whether an attitude that is integrated from the gyroscope would not show the fault.
     """
 
     estimate: str | Callable[[Sequence[Signals]], FaultFit | None]

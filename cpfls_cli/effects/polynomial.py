@@ -39,16 +39,9 @@ _EXACT, _NEGLIGIBLE = 1e-9, 1e-10
 def state_terms(velocity: Array, rate: Array) -> Array:
     """Evaluate the terms of the motion.
 
-    Parameters
-    ----------
-    velocity : array, shape (time, 3), m/s, body frame
-        Through the air.
-    rate : array, shape (time, 3), rad/s, body frame
-
-    Returns
-    -------
-    array, shape (time, 34)
-        In the order of `STATE_TERMS`, SI.
+    `velocity`, shape (time, 3), m/s, body frame: through the air.
+    `rate`: shape (time, 3), rad/s, body frame.
+    Result: shape (time, 34); in the order of `STATE_TERMS`, SI.
     """
     motion = np.hstack([velocity, rate])
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -59,14 +52,9 @@ def state_terms(velocity: Array, rate: Array) -> Array:
 def rotor_terms(speed: Array, acceleration: Array) -> Array:
     """Evaluate the terms of the rotors: 1, then speeds, squared speeds and accelerations of all of them.
 
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-    acceleration : array, shape (time, rotor), rad/s^2
-
-    Returns
-    -------
-    array, shape (time, 1 + 3 rotors)
+    `speed`: shape (time, rotor), rad/s.
+    `acceleration`: shape (time, rotor), rad/s^2.
+    Result: shape (time, 1 + 3 rotors).
     """
     return np.hstack([np.ones((len(speed), 1)), speed, speed**2, acceleration])
 
@@ -75,10 +63,8 @@ def rotor_terms(speed: Array, acceleration: Array) -> Array:
 class Probe:
     """Motions and rotor speeds at random, and their terms, for one vehicle.
 
-    Attributes
-    ----------
-    share : array, shape (time, rotor)
-        Rotor speeds as shares of the one at which the vehicle hovers; the same for all vehicles of as many rotors.
+    `share`, shape (time, rotor): rotor speeds as shares of the one at which the vehicle hovers; the same for all
+    vehicles of as many rotors.
     """
 
     signals: Signals
@@ -133,15 +119,9 @@ def _joint(state: bytes, share: bytes, probes: int) -> tuple[Array, Array, Array
 def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array | None:
     """Find the polynomial that an effect is, from its columns at random motions.
 
-    Parameters
-    ----------
-    shape : mapping of str to float
-        Its nonlinear parameters.
-
-    Returns
-    -------
-    array, shape (coefficient, 6, state terms, rotor terms), or None
-        Torque and force for a unit of each coefficient, SI, body frame; None if the effect is not such a polynomial.
+    `shape`: its nonlinear parameters.
+    Result: shape (coefficient, 6, state terms, rotor terms); torque and force for a unit of each coefficient, SI, body
+    frame; None if the effect is not such a polynomial.
     """
     if known.columns is None or known.kind != "wrench" or known.missing(probe.signals):
         return None
@@ -161,14 +141,8 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
 def fitted_terms(columns: Array, probe: Probe) -> Array | None:
     """Find the weights that columns of torque and force along a probe are.
 
-    Parameters
-    ----------
-    columns : array, shape (time, 6, coefficient)
-
-    Returns
-    -------
-    array, shape (coefficient, 6, state terms, rotor terms), or None
-        None where they leave anything.
+    `columns`: shape (time, 6, coefficient).
+    Result: shape (coefficient, 6, state terms, rotor terms); None where they leave anything.
     """
     joint, inverse, scale = probe.joint
     values = columns.reshape(len(columns), -1)

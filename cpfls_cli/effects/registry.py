@@ -32,10 +32,7 @@ CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_
 def effect(name: str) -> Effect:
     """Find an effect by its identifier.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name; the message gives the nearest ones.
+    Raises InputError if there is none of that name; the message gives the nearest ones.
     """
     if name in CATALOGUE:
         return CATALOGUE[name]

@@ -35,10 +35,7 @@ _EVERY = 5
 class PlayedPair(Played):
     """A flight, a model with effects, and the model as given, which takes the log as it is.
 
-    Attributes
-    ----------
-    logged : PlaybackFlight
-        With the faults of the sensors, so that a fault shows.
+    `logged`: with the faults of the sensors, so that a fault shows.
     """
 
     logged: PlaybackFlight
@@ -61,15 +58,8 @@ def played_pairs(
 ) -> list[PlayedPair]:
     """Make flights, a model with effects and the model as given ready for playback.
 
-    Parameters
-    ----------
-    fading_s : float or None, s
-        How fast rates of the flights fade that the effects were found in (`rates_fade`); None where none train.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that an effect needs.
+    `fading_s`: how fast rates of the flights fade that the effects were found in (`rates_fade`); None where none train.
+    Raises InputError if a flight lacks a signal that an effect needs.
     """
     pairs = []
     for recording in recordings:
@@ -93,17 +83,9 @@ def left_out(
 ) -> list[LeftOut]:
     """Play a model back along flights, as it is and without single effects.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of effects.
-    horizon_s : float, s
-        At which the ends of free runs are compared; errors still add up there.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that an effect needs.
+    `names`: of effects.
+    `horizon_s`, s: at which the ends of free runs are compared; errors still add up there.
+    Raises InputError if a flight lacks a signal that an effect needs.
     """
     found = []
     for name in names:
@@ -124,12 +106,7 @@ def left_out(
 def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
     """Play back from every fifth sample of the flights.
 
-    Parameters
-    ----------
-    pairs : sequence of PlayedPair
-        Of one rate.
-    horizon_s : float, s
-        At most; one sample at least.
+    `pairs`: of one rate; `horizon_s`, s: at most; one sample at least.
     """
     asked = max(1, round(horizon_s / pairs[0].flight.motion.period))
     longest = min(asked, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
@@ -154,15 +131,8 @@ def worst_stretch(
 ) -> FreeRuns:
     """Find where free runs of the model as given, one after another, are farthest off.
 
-    Parameters
-    ----------
-    horizon_s, shown_s : float, s
-        Length of a run, and of all that are shown.
-
-    Raises
-    ------
-    InputError
-        If a flight is shorter than one run.
+    `horizon_s`, `shown_s`, s: length of a run, and of all that are shown.
+    Raises InputError if a flight is shorter than one run.
     """
     samples = max(2, round(horizon_s / pairs[0].flight.motion.period))
     most = max(1, round(shown_s / horizon_s))
@@ -282,12 +252,9 @@ class PlaybackChange(AlongFlights):
 class BeforeAfter:
     """Errors of the model as given and of the model with effects on held-out flights.
 
-    Attributes
-    ----------
-    stretches : tuple of GapStretch
-        Of the model as given, largest gap first.
-    again_before, again_after : ComesAgain or None
-        What of the gap comes again, of training flights too; None where no flight repeats another.
+    `stretches`: of the model as given, largest gap first.
+    `again_before`, `again_after`: what of the gap comes again, of training flights too; None where no flight repeats
+    another.
     """
 
     playback: PlaybackChange
@@ -310,14 +277,10 @@ def before_after(
 ) -> BeforeAfter:
     """Compare a model with effects with the model as given on held-out flights.
 
-    Parameters
-    ----------
-    training, held : sequence of Recording
-        Flights that the effects were found in, and that they are judged on.
-    unseen : HeldOut
-        Their residuals.
-    base : VehicleModel or None
-        A vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is part.
+    `training`, `held`: flights that the effects were found in, and that they are judged on.
+    `unseen`: their residuals.
+    `base`: a vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is
+    part.
     """
     windows = common_windows(held, settings)
     centres = [windows.centres(recording.signals.time) for recording in held]

@@ -119,21 +119,11 @@ def compare(
 
     Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
-    rng : numpy.random.Generator
-        Of the shifts that say what chance explains.
-    progress : callable
-        Takes the share of the work that is done and a note.
-    whole : sequence of Recording
-        Flights that rotors and attitude are held against, where there are more than these, or longer ones.
-
-    Raises
-    ------
-    InputError
-        If the flights are too short or of different rates, or lack a signal that the model needs.
+    `model`: its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
+    `rng`: of the shifts that say what chance explains.
+    `progress`: takes the share of the work that is done and a note.
+    `whole`: flights that rotors and attitude are held against, where there are more than these, or longer ones.
+    Raises InputError if the flights are too short or of different rates, or lack a signal that the model needs.
     """
     windows = common_windows(recordings, settings)
     progress(0.0, "sensor audit")

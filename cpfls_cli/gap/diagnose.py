@@ -61,12 +61,8 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 class DiagnosisRun:
     """A diagnosis with the fits and residuals that it was made from.
 
-    Attributes
-    ----------
-    air : Air or None
-        Gusts in the training flights; None where nothing but noise is left, or the flights are too short.
-    hypothesis : System
-        Of the training flights, with the chosen effects.
+    `air`: gusts in the training flights; None where nothing but noise is left, or the flights are too short.
+    `hypothesis`: of the training flights, with the chosen effects.
     """
 
     diagnosis: Conclusion
@@ -98,21 +94,11 @@ def diagnose(
     the held-out flights, once. Where instruments tell that what is left is gusts, these are a part of the noise, the
     effects are sought once more beside them, and their numbers come by instruments.
 
-    Parameters
-    ----------
-    training, held : sequence of Recording
-        At least one each.
-    whole : sequence of Recording
-        The flights that these are parts of, where they are.
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-    progress : callable
-        Takes the share of the work that is done and a note.
-
-    Raises
-    ------
-    InputError
-        If the flights are too short, of different rates, or have nothing in common with the catalogue.
+    `training`, `held`: at least one each.
+    `whole`: the flights that these are parts of, where they are.
+    `model`: None for the rigid body of the vehicle.
+    `progress`: takes the share of the work that is done and a note.
+    Raises InputError if the flights are too short, of different rates, or have nothing in common with the catalogue.
     """
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)

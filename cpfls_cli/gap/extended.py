@@ -36,10 +36,7 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 class FittedEffect(NamedTuple):
     """An effect of a model with its linear coefficients.
 
-    Attributes
-    ----------
-    linear : array, shape (coefficient,)
-        Of its columns; empty where everything is in the shape.
+    `linear`, shape (coefficient,): of its columns; empty where everything is in the shape.
     """
 
     candidate: Candidate
@@ -50,14 +47,9 @@ class FittedEffect(NamedTuple):
 class ExtendedModel:
     """A model with effects; without any and with zero parameters it is the base.
 
-    Attributes
-    ----------
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    parameters : array, shape (parameter,)
-        Relative errors of the vehicle's own numbers, in the order of the catalogue.
-    audit : Audit or None
-        Faults of the sensors, which are taken out of signals first.
+    `base`: None for the rigid body of the vehicle.
+    `parameters`, shape (parameter,): relative errors of the vehicle's own numbers, in the order of the catalogue.
+    `audit`: faults of the sensors, which are taken out of signals first.
     """
 
     base: InertiaModel | None
@@ -88,15 +80,8 @@ class ExtendedModel:
     def system(self, flights: Sequence[WeakFlight]) -> System:
         """Set up the balance of flights under the model's effects.
 
-        Parameters
-        ----------
-        flights : sequence of WeakFlight
-            Made with `base`, of repaired signals.
-
-        Raises
-        ------
-        InputError
-            If a flight lacks a signal that an effect needs.
+        `flights`: made with `base`, of repaired signals.
+        Raises InputError if a flight lacks a signal that an effect needs.
         """
         for flight, candidate in product(flights, self.chosen):
             missing = candidate.effect.missing(flight.signals)
@@ -121,10 +106,7 @@ def plain(base: InertiaModel | None) -> ExtendedModel:
 class Refit:
     """A refitted model with effects and its residuals on held-out flights.
 
-    Attributes
-    ----------
-    effects : tuple of NamedEffect
-        With refitted numbers.
+    `effects`: with refitted numbers.
     """
 
     model: ExtendedModel
@@ -144,21 +126,12 @@ def extend(
 ) -> Refit:
     """Refit a model together with effects and evaluate it on held-out flights.
 
-    Parameters
-    ----------
-    effects : sequence of NamedEffect
-        To become part of the model; shapes start from theirs.
-    audit : Audit
-        Faults of the sensors that are repaired.
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    gusty_floor : array, shape (6,), N m and N, or None
-        Noise floor with the gusts of the flights, beside which the numbers come by instruments; None for no gusts.
-
-    Raises
-    ------
-    ComputationError
-        If the gap on the held-out flights does not shrink in the channels that change.
+    `effects`: to become part of the model; shapes start from theirs.
+    `audit`: faults of the sensors that are repaired.
+    `base`: None for the rigid body of the vehicle.
+    `gusty_floor`, shape (6,), N m and N: noise floor with the gusts of the flights, beside which the numbers come by
+    instruments; None for no gusts.
+    Raises ComputationError if the gap on the held-out flights does not shrink in the channels that change.
     """
     prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
     flights, logged, repaired = prepared.repaired(training), prepared.logged(held), prepared.repaired(held)

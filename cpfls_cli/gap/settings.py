@@ -75,9 +75,7 @@ class GapSettings(Settings):
     def __post_init__(self) -> None:
         """Check the shares against each other.
 
-        Raises
-        ------
-        SettingError
+        Raises SettingError.
         """
         if self.partial_share >= self.named_share:
             raise SettingError("partial_share", "must be below named_share")

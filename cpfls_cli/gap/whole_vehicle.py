@@ -28,15 +28,8 @@ from cpfls_cli.weak_form.windows import Recording
 def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        That the effects were fitted with.
-
-    Returns
-    -------
-    VehicleModel
-        With the inertia of before where the one that comes with the effects is that of no body.
+    `vehicle`: that the effects were fitted with.
+    Result: with the inertia of before where the one that comes with the effects is that of no body.
     """
     given, fuzzy = inertia_tensor(vehicle), extended.base
     parts, times = _parts(extended, vehicle)
@@ -84,14 +77,7 @@ def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     """Refuse effects with which the inertia is that of no body.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        That they were fitted with.
-
-    Raises
-    ------
-    ComputationError
+    `vehicle`: that they were fitted with. Raises ComputationError.
     """
     inertia = inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia
     if extended.base is None and not positive_definite(inertia[None]).all():
@@ -113,10 +99,7 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
 
     A model with more than effects of the catalogue has a single one: all that it has beyond its rigid body.
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Signals have to be those of its vehicle, see `of_vehicle`.
+    `model`: signals have to be those of its vehicle, see `of_vehicle`.
     """
     base = replace(plain(model.fuzzy), audit=model.repairs)
     numbers = next((one.coefficients for one in model.effects if one.name == VEHICLE_NUMBERS.name), base.parameters)
@@ -134,10 +117,7 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
 def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Exchange the stated vehicle of flights for that of a model.
 
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that the model needs.
+    Raises InputError if a flight lacks a signal that the model needs.
     """
     wind, given = np.array(model.wind) if any(model.wind) else None, []
     for recording in recordings:
@@ -160,10 +140,7 @@ def has_effects(model: VehicleModel) -> bool:
 def beside_rotors(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
 
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that the model needs.
+    Raises InputError if a flight lacks a signal that the model needs.
     """
     if not has_effects(model):
         return list(recordings)

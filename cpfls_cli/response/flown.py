@@ -107,18 +107,9 @@ def vehicle_responses(
     what a window does to a curve it does to both. A command of the rotors knows no gust that the speeds do not know, so
     the response of the speeds needs no instruments. What instruments do not move is estimated without.
 
-    Parameters
-    ----------
-    model : VehicleModel
-    flights : sequence of LoggedFlight
-        Of one sampling period.
-    instruments : callable
-        See `InstrumentSource`.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks what the model needs, or all are too short for a window.
+    `flights`: of one sampling period.
+    `instruments`: see `InstrumentSource`.
+    Raises InputError if a flight lacks what the model needs, or all are too short for a window.
     """
     by_flight = [_of_flight(model, flight) for flight in flights]
     found: dict[str, list[Stretch]] = {}

@@ -81,10 +81,7 @@ def clearness(coherence: Array, random_error: Array, averages: Array, instrument
     for the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
     is the share that may be the loop's.
 
-    Parameters
-    ----------
-    coherence, random_error, averages : array, shape (..., frequency)
-        See `FrequencyResponse`.
+    `coherence`, `random_error`, `averages`, shape (..., frequency): see `FrequencyResponse`.
     """
     if not instrumented:
         return coherence
@@ -112,9 +109,7 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     evenly spread on a logarithmic scale. A model is off where this sum, without W, is above 100 for one frequency
     alone, and by more than twice the random error.
 
-    References
-    ----------
-    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapter 11.
+    Reference: Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapter 11.
     """
     part = judged_band(response)
     if part is None:

@@ -47,11 +47,7 @@ _TINY = np.finfo(float).tiny
 class Channel(NamedTuple):
     """A signal, or the derivative of one that is never differentiated, or the sum of both.
 
-    Attributes
-    ----------
-    values : array, shape (time,), or None
-    integral : array, shape (time,), or None
-        Of which the derivative is meant, unit times s.
+    `values`: shape (time,); `integral`, shape (time,): of which the derivative is meant, unit times s.
     """
 
     values: Array | None = None
@@ -65,16 +61,11 @@ class Channel(NamedTuple):
 class Stretch(NamedTuple):
     """Signals without a pause, evenly sampled.
 
-    Attributes
-    ----------
-    input : array, shape (time,)
-    output : Channel
-    model : Channel or None
-        What a model gives for the output.
-    instrument : array, shape (time, column), or None
-        NaN where there is none. None: the input, which is right where nothing disturbs the output.
-    start : int
-        First sample, counted from where the path begins that a flight has in common with its repeats.
+    `input`: shape (time,).
+    `model`: what a model gives for the output.
+    `instrument`, shape (time, column): NaN where there is none. None: the input, which is right where nothing disturbs
+    the output.
+    `start`: first sample, counted from where the path begins that a flight has in common with its repeats.
     """
 
     input: Array
@@ -179,23 +170,13 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
     ``sqrt(S_ee / (2 n |G|^2 S_uu g^2))``, g^2 the coherence of instrument and input; with the input for instrument it
     is Bendat and Piersol's ``sqrt((1 - g^2) / (2 n g^2))``.
 
-    Parameters
-    ----------
-    stretches : sequence of Stretch
-        All with a model, or none; all with as many instruments, or none. One without them among others that have
-        some is left out.
-    period : float, s
-
-    Returns
-    -------
-    FrequencyResponse or None
-        None where no stretch is long enough.
-
-    References
-    ----------
-    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapters 7 and 10 (random error; composite
-    windows: spectra are averaged with the squares of ``(error / least error)^-4``); Bendat and Piersol, *Random Data*;
-    Angrist, Imbens and Krueger 1999 (instruments found without the sample that they are used in).
+    `stretches`: all with a model, or none; all with as many instruments, or none. One without them among others that
+    have some is left out.
+    `period`: s.
+    None where no stretch is long enough.
+    Reference: Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapters 7 and 10 (random error;
+    composite windows: spectra are averaged with the squares of ``(error / least error)^-4``); Bendat and Piersol,
+    *Random Data*; Angrist, Imbens and Krueger 1999 (instruments found without the sample that they are used in).
     """
     instrumented = any(stretch.instrument is not None for stretch in stretches)
     usable = [part for stretch in stretches for part in _known(stretch, instrumented)]

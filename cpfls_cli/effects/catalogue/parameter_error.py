@@ -37,16 +37,9 @@ NUMBERS = {
 
 
 def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
-    """Compute what relative errors add to the inertia tensor.
+    """Compute what relative errors add to the inertia tensor, shape (3, 3), kg m^2.
 
-    Parameters
-    ----------
-    values : array, shape (10,)
-        The coefficients.
-
-    Returns
-    -------
-    array, shape (3, 3), kg m^2
+    `values`, shape (10,): the coefficients.
     """
     return np.diag(values[:3] * np.array(vehicle.inertia_kg_m2[:3]))
 
@@ -54,15 +47,7 @@ def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
 def shown(turns: BoolArray) -> Array:
     """Mark the coefficients that a flight can show: inertia and coupling only about axes that turn.
 
-    Parameters
-    ----------
-    turns : array of bool, shape (3,)
-        Whether the vehicle turns about x, y, z.
-
-    Returns
-    -------
-    array, shape (10,)
-        1 or 0.
+    `turns`, shape (3,): whether the vehicle turns about x, y, z; Result: shape (10,); 1 or 0.
     """
     return np.concatenate([turns, turns, np.ones(4)]).astype(float)
 
@@ -70,12 +55,9 @@ def shown(turns: BoolArray) -> Array:
 class Change(NamedTuple):
     """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle.
 
-    Attributes
-    ----------
-    offset : array, shape (10,)
-    matrix : array, shape (10, 10)
-        Columns of numbers that stay as they are, are zero.
-    low, high : array, shape (10,)
+    `offset`: shape (10,).
+    `matrix`, shape (10, 10): columns of numbers that stay as they are, are zero.
+    `low`, `high`: shape (10,).
     """
 
     offset: Array
@@ -91,12 +73,8 @@ def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Ch
     ``M + C`` and ``M - C``, both of which are above zero. Rates show either by the scale of the rotor torque about this
     axis alone, so the bounds hold axis by axis.
 
-    Parameters
-    ----------
-    shown : array of bool, shape (3,)
-        Axes whose inertia the flights show.
-    least : array of bool, shape (3,)
-        Axes that are held at the least inertia, without coupling.
+    `shown`, shape (3,): axes whose inertia the flights show.
+    `least`, shape (3,): axes that are held at the least inertia, without coupling.
     """
     moments = np.array(vehicle.inertia_kg_m2[:3])
     moved = shown & ~least

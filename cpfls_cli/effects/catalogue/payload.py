@@ -77,22 +77,13 @@ def _unit(state: _State) -> _State:
 def integrate(nodes: Array, middles: Array, step: float, length: float, damping: float, start: Array) -> Array:
     """Integrate direction and rate of a cable by the classical Runge-Kutta method.
 
-    Parameters
-    ----------
-    nodes : array, shape (step, 3), m/s^2
-        Acceleration of the hook plus gravity at each step, world frame.
-    middles : array, shape (step - 1, 3), m/s^2
-        Half a step later.
-    step : float, s
-    length : float, m
-    damping : float, 1/s
-    start : array, shape (6,)
-        Direction, then rate in 1/s, at the first step.
-
-    Returns
-    -------
-    array, shape (step, 6)
-        Direction, then rate in 1/s.
+    `nodes`, shape (step, 3), m/s^2: acceleration of the hook plus gravity at each step, world frame.
+    `middles`, shape (step - 1, 3), m/s^2: half a step later.
+    `step`: s.
+    `length`: m.
+    `damping`: 1/s.
+    `start`, shape (6,): direction, then rate in 1/s, at the first step.
+    Result: shape (step, 6); direction, then rate in 1/s.
     """
     state = (start[0], start[1], start[2], start[3], start[4], start[5])
     states = np.zeros((len(nodes), 6))
@@ -116,25 +107,12 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
     so no filter will do.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    length : float, m
-        L.
-    damping : float, 1/s
-        c.
-    depth : float, m
-        Of the hook below the centre of mass, with which it swings to and fro itself.
-
-    Returns
-    -------
-    array, shape (time, 6)
-        Direction of the cable from the hook, world frame, and its rate in 1/s.
-
-    References
-    ----------
-    Equation of the spherical pendulum with a moving pivot.
+    `signals`: with velocity.
+    `length`, m: L.
+    `damping`, 1/s: c.
+    `depth`, m: of the hook below the centre of mass, with which it swings to and fro itself.
+    Result: shape (time, 6); direction of the cable from the hook, world frame, and its rate in 1/s.
+    Reference: Equation of the spherical pendulum with a moving pivot.
     """
     return _at_samples(signals, _Way.of(signals, length, damping, depth).swing(_AT_REST))
 
@@ -199,12 +177,7 @@ def _tension(length: float, states: Array, felt: Array) -> Array:
 def felt_acceleration(signals: Signals, depth: float) -> Array:
     """Add gravity to the acceleration of the hook, shape (time, 3), world frame.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    depth : float, m
-        Of the hook below the centre of mass.
+    `signals`: with velocity; `depth`, m: of the hook below the centre of mass.
     """
     key, kept = "felt", signals.of_motion
     if key not in kept:
@@ -236,19 +209,11 @@ def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> A
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
     """Integrate the swing from where the force balance says that it began.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity. Without thrust and acceleration the cable starts at rest.
-    length : float, m
-    damping : float, 1/s
-    depth : float, m
-        Of the hook.
-
-    Returns
-    -------
-    array, shape (time, 6)
-        Direction of the cable from the hook, world frame, and its rate in 1/s.
+    `signals`: with velocity. Without thrust and acceleration the cable starts at rest.
+    `length`: m.
+    `damping`: 1/s.
+    `depth`, m: of the hook.
+    Result: shape (time, 6); direction of the cable from the hook, world frame, and its rate in 1/s.
     """
     way, start = _Way.of(signals, length, damping, depth), _AT_REST
     if signals.acceleration is not None and signals.thrust is not None and signals.attitude is not None:
@@ -270,10 +235,7 @@ def _start(signals: Signals, way: _Way) -> Array:
     so that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
     contradicts: what rings late is no swing at the start.
 
-    Returns
-    -------
-    array, shape (4,)
-        As `_Way.swing` takes it; at rest where nothing pulls like a load.
+    Result: shape (4,); as `_Way.swing` takes it; at rest where nothing pulls like a load.
     """
     assert signals.acceleration is not None
     assert signals.thrust is not None

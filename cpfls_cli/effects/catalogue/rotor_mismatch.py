@@ -20,10 +20,7 @@ def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
 
     The centre of mass may lie beside the middle, as that of a vehicle out of trim does.
 
-    Returns
-    -------
-    tuple of tuple of int
-        Indices from 0, in the order of the first rotor of each pair.
+    Result: indices from 0, in the order of the first rotor of each pair.
     """
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     hubs = hubs - hubs.mean(axis=0)
@@ -39,10 +36,7 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
     For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
     What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
 
-    Returns
-    -------
-    array, shape (rotor, 2)
-        Gain of each rotor for a difference of 1 from end to end.
+    Result: shape (rotor, 2); gain of each rotor for a difference of 1 from end to end.
     """
     spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
     common = np.column_stack([np.ones_like(spins), spins])
@@ -53,15 +47,9 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
 def gains(vehicle: VehicleSettings, differences: Array) -> Array:
     """Assign each difference to the weaker rotor of its pair.
 
-    Parameters
-    ----------
-    differences : array, shape (2,)
-        The first two coefficients.
-
-    Returns
-    -------
-    array, shape (rotor,)
-        Relative error of each thrust, at most 0; on vehicles without two opposite pairs, the patterns themselves.
+    `differences`, shape (2,): the first two coefficients.
+    Result: shape (rotor,); relative error of each thrust, at most 0; on vehicles without two opposite pairs, the
+    patterns themselves.
     """
     pairs = opposite_pairs(vehicle)
     patterns = gain_modes(vehicle) @ differences

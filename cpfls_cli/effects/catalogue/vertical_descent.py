@@ -24,18 +24,9 @@ _STATES = ((0.5, "normal working state"), (1.6, "vortex ring"), (2.0, "turbulent
 def induced_velocity(signals: Signals) -> Array:
     """Compute the velocity that each rotor gives the air in hover, ``v_h = sqrt(T_h / (2 rho pi R^2))``.
 
-    Parameters
-    ----------
-    signals : Signals
-        With radii of the rotors.
-
-    Returns
-    -------
-    array, shape (rotor,), m/s
-
-    References
-    ----------
-    Leishman, Principles of Helicopter Aerodynamics: momentum theory of the hovering rotor.
+    `signals`: with radii of the rotors.
+    Result: shape (rotor,), m/s.
+    Reference: Leishman, Principles of Helicopter Aerodynamics: momentum theory of the hovering rotor.
     """
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in signals.vehicle.rotors])
     thrust = factors * scales.hover_speed(signals.vehicle) ** 2
@@ -45,10 +36,7 @@ def induced_velocity(signals: Signals) -> Array:
 def descent_ratio(signals: Signals) -> Array:
     """Compute the speed of descent of each hub over its induced velocity, ``x_i = max(-u_iz / v_h, 0)``.
 
-    Returns
-    -------
-    array, shape (time, rotor)
-        At most 2.5: no data of the sources reaches further.
+    Result: shape (time, rotor); at most 2.5: no data of the sources reaches further.
     """
     ratio = -signals.hub_velocity[..., 2] / induced_velocity(signals)
     return np.asarray(np.clip(ratio, 0.0, _LARGEST_RATIO))
@@ -64,13 +52,7 @@ def thrust_basis(ratio: Array) -> Array:
 
     Hats are local, so that a ratio that no flight has reached says nothing about the others.
 
-    Parameters
-    ----------
-    ratio : array, shape (...)
-
-    Returns
-    -------
-    array, shape (..., 6)
+    `ratio`: shape (...); Result: shape (..., 6).
     """
     hats = [np.interp(ratio, _KNOTS, unit) for unit in np.eye(len(_KNOTS))[1:]]
     return np.stack(hats, axis=-1)

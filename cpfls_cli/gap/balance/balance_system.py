@@ -27,14 +27,9 @@ _QUIET_AXIS = 0.3
 class System:
     """The balance of all flights under a hypothesis; windows of all flights one after another.
 
-    Attributes
-    ----------
-    chosen : tuple of Candidate
-        Effects of the hypothesis.
-    signals : tuple of Signals
-        Of each flight, with the actuator effects among `chosen` applied.
-    cache : dict
-        Columns by effect and shape.
+    `chosen`: effects of the hypothesis.
+    `signals`: of each flight, with the actuator effects among `chosen` applied.
+    `cache`: columns by effect and shape.
     """
 
     flights: tuple[WeakFlight, ...]
@@ -193,15 +188,8 @@ def is_free(candidate: Candidate) -> bool:
 def floors(hypothesis: System, coefficients: Array) -> Array:
     """Estimate the noise floor of each channel over all flights, the air in it where that is known.
 
-    Parameters
-    ----------
-    coefficients : array, shape (column,)
-        Of `hypothesis.base`.
-
-    Returns
-    -------
-    array, shape (6,), N m and N
-        1 for channels that no flight has.
+    `coefficients`, shape (column,): of `hypothesis.base`.
+    Result: shape (6,), N m and N; 1 for channels that no flight has.
     """
     square, count = np.zeros(6), np.zeros(6)
     for number, flight in enumerate(hypothesis.flights):
@@ -219,16 +207,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
 def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
     """Compute the residual of a fitted hypothesis along one flight, sample by sample.
 
-    Parameters
-    ----------
-    number : int
-        Of the flight.
-    coefficients : array, shape (column,)
-
-    Returns
-    -------
-    Columns
-        Of shape (time, 6).
+    `number`: of the flight; `coefficients`: shape (column,); Result: shape (time, 6).
     """
     flight, signals = hypothesis.flights[number], hypothesis.signals[number]
     residual = flight.residual(signals)
@@ -246,10 +225,7 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
 def scatter_variance(hypothesis: System) -> Array:
     """Average over windows the variance of the random part of the chosen effects, for a unit of relative scatter.
 
-    Returns
-    -------
-    array, shape (window, 6)
-        Zero where no effect scatters.
+    Result: shape (window, 6); zero where no effect scatters.
     """
 
     def of_flight(flight: WeakFlight, signals: Signals) -> Array:
@@ -265,17 +241,10 @@ def scatter_variance(hypothesis: System) -> Array:
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
     """Estimate the relative scatter of effects, one number for all channels, by its likelihood in what a fit leaves.
 
-    Parameters
-    ----------
-    variance : array, shape (window, 6)
-        For a unit of scatter.
-    residual : array, shape (window, 6)
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    float
-        Mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
+    `variance`, shape (window, 6): for a unit of scatter.
+    `residual`: shape (window, 6).
+    `floor`: shape (6,).
+    Result: mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
     """
     expected = variance / floor**2
     scatters = expected.any(axis=0)
@@ -301,11 +270,7 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
 def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:
     """Add to the floor of each window what the chosen effects do there at random, shape (window, 6), N m and N.
 
-    Parameters
-    ----------
-    residual : array, shape (window, 6)
-        Of a fit; the size of the random part is read from it.
-    floor : array, shape (6,)
+    `residual`, shape (window, 6): of a fit; the size of the random part is read from it; `floor`: shape (6,).
     """
     variance = scatter_variance(hypothesis)
     return np.asarray(np.sqrt(floor**2 + scatter_size(variance, residual, floor) * variance))

@@ -31,7 +31,7 @@ _PADDED = 8
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
-    """Estimate the standard deviation of the window averages that noise causes.
+    """Estimate the standard deviation of the window averages that noise causes, shape (6,), N m and N.
 
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
@@ -40,16 +40,8 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
     keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: above
     it the filter has removed the noise as well.
 
-    Parameters
-    ----------
-    residual : Columns
-        What the model leaves, shape (time, 6).
-    cut_off : array, shape (6,), Hz, or None
-        Of the filter that each channel went through before it was logged, infinite for none.
-
-    Returns
-    -------
-    array, shape (6,), N m and N
+    `residual`: what the model leaves, shape (time, 6).
+    `cut_off`, shape (6,), Hz: of the filter that each channel went through before it was logged, infinite for none.
     """
     limit = np.full(6, np.inf) if cut_off is None else np.asarray(cut_off)
     floor = np.empty(6)
@@ -62,15 +54,8 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
 def channel_cut_offs(signals: Signals, euler: bool) -> Array:
     """Find the lowest cut-off among the signals that each channel of the balance is made of.
 
-    Parameters
-    ----------
-    euler : bool
-        Whether the inertial torque takes the attitude.
-
-    Returns
-    -------
-    array, shape (6,), Hz
-        Infinite where nothing was filtered.
+    `euler`: whether the inertial torque takes the attitude.
+    Result: shape (6,), Hz; infinite where nothing was filtered.
     """
     found = known_up_to(signals)
     force = next(
@@ -160,15 +145,7 @@ def _best_pair(relative: Array) -> int:
 def modulated(windows: Windows, frequency: float) -> Windows:
     """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``.
 
-    Parameters
-    ----------
-    frequency : float
-        Hz.
-
-    Returns
-    -------
-    Windows
-        Complex.
+    `frequency`: Hz; Result: complex.
     """
     turn = 2j * np.pi * frequency
     phase = np.exp(-turn * windows.period * np.arange(len(windows.weight)))

@@ -32,9 +32,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     The newest shapes first, one by one between the points of their grids; then, where there are several, all together
     (`refitted`), because a lag and a delay, say, trade with each other.
 
-    Parameters
-    ----------
-    floor : array, shape (6,)
+    `floor`: shape (6,).
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
     rotor_wrench = system(flights).rotor_wrench
@@ -60,16 +58,10 @@ class Equations:
     Noise in a column shrinks its coefficient, and what goes with it takes the rest: noisy rates and rotor speeds made
     Izz and the inertia of the rotors 4 % too small, both. So what noise adds is taken off the normal equations.
 
-    Attributes
-    ----------
-    columns : array, shape (row, column)
-    right : array, shape (row,)
-    noise : array, shape (row, column + 1)
-        That of the right side in the last column.
-
-    References
-    ----------
-    Fuller 1987, Measurement Error Models, section 2.2 (method of moments).
+    `columns`: shape (row, column).
+    `right`: shape (row,).
+    `noise`, shape (row, column + 1): that of the right side in the last column.
+    Reference: Fuller 1987, Measurement Error Models, section 2.2 (method of moments).
     """
 
     columns: Array
@@ -112,11 +104,7 @@ class Equations:
     def around(self, linear: Array, kept: BoolArray, moving: Array) -> Equations:
         """Subtract what coefficients explain, keep the columns of some, and add weighted columns without noise.
 
-        Parameters
-        ----------
-        linear : array, shape (column,)
-        kept : array of bool, shape (column,)
-        moving : array, shape (..., shape)
+        `linear`: shape (column,); `kept`: shape (column,); `moving`: shape (..., shape).
         """
         added = moving.reshape(len(self.right), -1)
         left = self.noise[:, -1] - self.noise[:, :-1] @ linear
@@ -131,10 +119,7 @@ class Equations:
 def equations(hypothesis: System, weight: Array) -> Equations:
     """Weigh the rows of a hypothesis.
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
     """
     columns, noise = (rows / weight[..., None] for rows in (hypothesis.base, hypothesis.noise))
     right = (hypothesis.residual / weight).reshape(-1)
@@ -144,13 +129,7 @@ def equations(hypothesis: System, weight: Array) -> Equations:
 def fit(hypothesis: System, floor: Array) -> Array:
     """Fit all free columns by weighted least squares, which leave the least but shrink numbers whose columns are noisy.
 
-    Parameters
-    ----------
-    floor : array, shape (6,) or (window, 6)
-
-    Returns
-    -------
-    array, shape (column,)
+    `floor`: shape (6,) or (window, 6); Result: shape (column,).
     """
     matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
     return least_squares(matrix, (hypothesis.residual / floor).reshape(-1))
@@ -166,18 +145,11 @@ def least_squares(matrix: Array, right: Array) -> Array:
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
     """Fit all free columns by weighted least squares under the bounds of their coefficients.
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
-    of_vehicle : bool
-        Whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is wrong.
-
-    Returns
-    -------
-    linear : array, shape (column,)
-    held : array of bool, shape (column,)
-        Coefficients on a bound, and those that nothing shows, which are 0.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
+    `of_vehicle`: whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is
+    wrong.
+    Result `linear`: shape (column,).
+    Result `held`, shape (column,): coefficients on a bound, and those that nothing shows, which are 0.
     """
     rows = equations(hypothesis, weight)
     linear = rows.solve()
@@ -263,10 +235,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
     The last fit of a hypothesis that is believed: it stands where the same linear system that gives the intervals asks
     for no further step. As in the search, less torque with less inertia explains nothing (`compensation`).
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
     """
     hypothesis = _exact(hypothesis, weight)
     if not hypothesis.shapes:
@@ -376,16 +345,10 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
 def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
     """Differentiate what the hypothesis explains by each of its shapes, by central differences.
 
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of the base, held.
-    rotor_wrench : array, shape (window, 6), N m and N, optional
-        Of the rotors without effects on the actuation, for which a change of the rotor torque is compensated.
-
-    Returns
-    -------
-    array, shape (window, 6, shape)
+    `linear`, shape (column,): coefficients of the base, held.
+    `rotor_wrench`, shape (window, 6), N m and N: of the rotors without effects on the actuation, for which a change of
+    the rotor torque is compensated.
+    Result: shape (window, 6, shape).
     """
     values = hypothesis.shape_values
     columns = np.zeros((*hypothesis.residual.shape, len(values)))
@@ -414,15 +377,9 @@ def compensation(before: Array, after: Array) -> Array:
     times this factor, what counts is the share of the torque that the motion does not follow. A torque that grows, and
     the inertia with it, leaves the residual as it was and explains nothing either.
 
-    Parameters
-    ----------
-    before, after : array, shape (window, 6), N m and N
-        Wrench of the rotors without and with the effect.
-
-    Returns
-    -------
-    array, shape (6,)
-        Ratio of the standard deviations, at least 1; 1 for the forces, where weight and mass hold the scale.
+    `before`, `after`, shape (window, 6), N m and N: wrench of the rotors without and with the effect.
+    Result: shape (6,); ratio of the standard deviations, at least 1; 1 for the forces, where weight and mass hold the
+    scale.
     """
     factor = np.ones(before.shape[1])
     spread, shrunk = before[:, :3].std(axis=0), after[:, :3].std(axis=0)

@@ -29,12 +29,9 @@ from cpfls_cli.playback.newness import PER_WINDOW, news
 class _Told(NamedTuple):
     """What a source of knowledge tells of numbers.
 
-    Attributes
-    ----------
-    products : array, shape (block, number + 1, number + 1)
-        Of what is known of each number, and of what is left, with what they move.
-    numbers : array of bool, shape (number,)
-        Those that are free, that it tells, and that no source before it does.
+    `products`, shape (block, number + 1, number + 1): of what is known of each number, and of what is left, with what
+    they move.
+    `numbers`, shape (number,): those that are free, that it tells, and that no source before it does.
     """
 
     products: Array
@@ -49,9 +46,8 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     instruments hardly tell stay as they were, and all do where the flights are too short to tell errors. Bounds count
     as standard deviations of a normal prior, as in the search.
 
-    References
-    ----------
-    Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
+    Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
+    instruments).
     """
     at, moved = found, np.zeros(len(found.values), dtype=bool)
     # Shapes are followed where they go; a few steps are enough, and one where there are none.
@@ -112,9 +108,7 @@ def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, flo
     wind that it acts in. With each comes how likely chance makes what they show of it. One that they do not tell is
     asked by its interval, and its chance is NaN.
 
-    References
-    ----------
-    Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
+    Reference: Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
     sources, nothing, values = _sources(found, given), nothing_by_size(found), found.values
     stand, every = list[tuple[Candidate, float]](), np.arange(len(values))
@@ -214,9 +208,7 @@ def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
 
     Of what is known of each number, and of what it moves, that counts which no other explains.
 
-    References
-    ----------
-    Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
+    Reference: Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
     """
     alone = _strength(np.diagonal(crossed, axis1=1, axis2=2)[:, :-1])
     kept = np.flatnonzero(numbers & (alone > STRONG))
@@ -268,10 +260,7 @@ def _told_numbers(
 class _Windows(NamedTuple):
     """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
 
-    Attributes
-    ----------
-    rows, known : array, shape (window, 6, number + 1)
-    block : array of int, shape (window,)
+    `rows`, `known`: shape (window, 6, number + 1); `block`: shape (window,).
     """
 
     rows: Array

@@ -32,10 +32,8 @@ _MATTERS = 0.02
 class JudgedEffect:
     """A chosen effect and its rivals.
 
-    Attributes
-    ----------
-    odds : mapping of tuple of str to array, shape (block,)
-        Of each set with others in its place, beside the chosen one: logarithm of the predictive density of each block.
+    `odds`: of each set with others in its place, beside the chosen one: logarithm of the predictive density of each
+    block.
     """
 
     effect: NamedEffect
@@ -121,10 +119,7 @@ def shares(found: NamedFit) -> Array:
 def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
-    Parameters
-    ----------
-    removed : array, shape (6,)
-        Part of each channel's gap on unseen flights that refitting the numbers takes off.
+    `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))

@@ -34,16 +34,10 @@ formulas leave out terms as small."""
 class Estimates:
     """A fitted hypothesis.
 
-    Attributes
-    ----------
-    linear : array, shape (column,)
-        Of the base of the hypothesis.
-    effects : tuple of tuple of Estimate
-        Of each chosen effect: physical coefficients, then shapes.
-    parameters : tuple of Estimate
-        Of the vehicle's own numbers.
-    of_effect : tuple of array, shape (coefficient,)
-        Linear coefficients of each chosen effect; empty where it has none.
+    `linear`, shape (column,): of the base of the hypothesis.
+    `effects`: of each chosen effect: physical coefficients, then shapes.
+    `parameters`: of the vehicle's own numbers.
+    `of_effect`, each shape (coefficient,): linear coefficients of each chosen effect; empty where it has none.
     """
 
     linear: Array
@@ -131,9 +125,7 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     part by their derivatives. The numbers of the vehicle are within what a vehicle can have; only where free ones are
     surely beyond it, they are told, because the log is wrong then.
 
-    References
-    ----------
-    JCGM 100:2008, 4.3 (uncertainty of what is assumed).
+    Reference: JCGM 100:2008, 4.3 (uncertainty of what is assumed).
     """
     free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
     linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
@@ -186,11 +178,7 @@ def places_of(hypothesis: System) -> list[tuple[slice, slice]]:
 def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
     """Tell numbers from coefficients and shapes, with those of fits that each left one block out.
 
-    Parameters
-    ----------
-    values : array, shape (number,)
-        Coefficients of the base, then shapes.
-    left_out : array, shape (block, number)
+    `values`, shape (number,): coefficients of the base, then shapes; `left_out`: shape (block, number).
     """
     rows, vehicle = np.vstack([values, left_out]), hypothesis.vehicle
     (of_vehicle, own), *_ = hypothesis.places
@@ -252,10 +240,7 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
 class Refusal(NamedTuple):
     """An effect that is no name, and why, as the end of a sentence.
 
-    Attributes
-    ----------
-    in_the_way : bool
-        Whether others are to be looked for without it: on a bound it may stand for what another one is.
+    `in_the_way`: whether others are to be looked for without it: on a bound it may stand for what another one is.
     """
 
     name: str

@@ -35,23 +35,15 @@ from cpfls_cli.rounding import ascending, largest, levelled, smallest
 class HeldOut:
     """Residuals of held-out flights under three models.
 
-    Attributes
-    ----------
-    before : array, shape (window, 6), N m and N
-        Of the model as given, on signals as logged.
-    parameters : array, shape (window, 6)
-        Of the model with its own numbers refitted on the training flights.
-    after : array, shape (window, 6)
-        Of the model with effects.
-    floor : array, shape (6,)
-    known : array of bool, shape (window, 6)
-    noise : array, shape (window, 6)
-        Floor of each window with the scatter that belongs to the effects.
-    most_noise : array, shape (6,)
-        Mean square of each channel in squared floors up to which it is noise.
-    unlearned : mapping of str to float
-        Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
-        descent, with the share of the windows that do; nothing is judged there.
+    `before`, shape (window, 6), N m and N: of the model as given, on signals as logged.
+    `parameters`, shape (window, 6): of the model with its own numbers refitted on the training flights.
+    `after`, shape (window, 6): of the model with effects.
+    `floor`: shape (6,).
+    `known`: shape (window, 6).
+    `noise`, shape (window, 6): floor of each window with the scatter that belongs to the effects.
+    `most_noise`, shape (6,): mean square of each channel in squared floors up to which it is noise.
+    `unlearned`: effects of which these flights ask for a number that no flight learned from shows, such as that of a
+    faster descent, with the share of the windows that do; nothing is judged there.
     """
 
     before: Array
@@ -70,16 +62,9 @@ class HeldOut:
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.
 
-        Parameters
-        ----------
-        as_given : bool
-            Of the gap of the model as given, on signals as logged; else of what its own numbers leave.
-
-        Returns
-        -------
-        dict
-            Of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where neither
-            does.
+        `as_given`: of the gap of the model as given, on signals as logged; else of what its own numbers leave.
+        Result: of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where
+        neither does.
         """
         before, after = (self.before if as_given else self.parameters) / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
@@ -131,20 +116,11 @@ def held_out(
 ) -> HeldOut:
     """Apply a fitted hypothesis to held-out flights, and the model with its own numbers refitted beside it.
 
-    Parameters
-    ----------
-    logged, repaired : sequence of WeakFlight
-        The flights as logged, and after repair of the sensors.
-    fitted : System
-        Of the training flights.
-    linear : array, shape (column,)
-    floor : array, shape (6,)
-        Of the training flights, above which the effects scatter there.
-
-    Raises
-    ------
-    InputError
-        If they lack a signal that the effects need.
+    `logged`, `repaired`: the flights as logged, and after repair of the sensors.
+    `fitted`: of the training flights.
+    `linear`: shape (column,).
+    `floor`, shape (6,): of the training flights, above which the effects scatter there.
+    Raises InputError if they lack a signal that the effects need.
     """
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
@@ -180,10 +156,7 @@ class Judgement(NamedTuple):
 class Judge:
     """Judges fits on held-out flights.
 
-    Attributes
-    ----------
-    logged, repaired : sequence of WeakFlight
-        The held-out flights as logged, and after repair of the sensors.
+    `logged`, `repaired`: the held-out flights as logged, and after repair of the sensors.
     """
 
     training: Sequence[WeakFlight]
@@ -250,16 +223,10 @@ class Judge:
 class Without(NamedTuple):
     """Held-out flights without one of the effects, the others refitted.
 
-    Attributes
-    ----------
-    raised : array, shape (6,)
-        Mean square of each channel beyond that with the effect, in squared floors.
-    error : array, shape (6,)
-        Standard error of it over blocks.
-    left : array, shape (6,)
-        Root mean square without it, in floors.
-    gusts : array of bool, shape (6,)
-        Channels whose floor holds gusts.
+    `raised`, shape (6,): mean square of each channel beyond that with the effect, in squared floors.
+    `error`, shape (6,): standard error of it over blocks.
+    `left`, shape (6,): root mean square without it, in floors.
+    `gusts`, shape (6,): channels whose floor holds gusts.
     """
 
     raised: Array

@@ -28,12 +28,7 @@ _Names = tuple[str, ...]
 class Lateness(NamedTuple):
     """What lies between command and rotors: fits with the set that leaves least, and with none.
 
-    Attributes
-    ----------
-    chances : dict of str to float
-        How likely chance makes each effect of the set.
-    alike : tuple of Alternative
-        Sets that leave as little.
+    `chances`: how likely chance makes each effect of the set; `alike`: sets that leave as little.
     """
 
     found: NamedFit
@@ -82,12 +77,8 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
 class _Sets:
     """Sets of effects between command and rotors by their names, each fitted by instruments beside all other effects.
 
-    Attributes
-    ----------
-    fits : dict of tuple of str to NamedFit
-        Of the sets that were tried, and whose numbers instruments tell.
-    left : dict of tuple of str to array, shape (block,)
-        What of what each leaves was known before.
+    `fits`: of the sets that were tried, and whose numbers instruments tell.
+    `left`: what of what each leaves was known before.
     """
 
     found: NamedFit

@@ -53,12 +53,8 @@ def off_by(explained: float, left: float, above: float) -> float:
     same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
     before any flight it is known to be a tenth of torque and force at most, `OFF`.
 
-    Parameters
-    ----------
-    explained : float
-        The gap that formulas are asked to explain, in squared floors.
-    left, above : float
-        What the better one leaves, and what of that is above the floor, in squared floors.
+    `explained`: the gap that formulas are asked to explain, in squared floors.
+    `left`, `above`: what the better one leaves, and what of that is above the floor, in squared floors.
     """
     return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
 
@@ -66,12 +62,8 @@ def off_by(explained: float, left: float, above: float) -> float:
 def log_odds(more: Array, off: float) -> Array:
     """Compute the logarithm of the predictive density of blocks under another set, less that under the first one.
 
-    Parameters
-    ----------
-    more : array, shape (block,)
-        By how much more the other one leaves, in squared floors.
-    off : float
-        What formulas are off by, in squared floors.
+    `more`, shape (block,): by how much more the other one leaves, in squared floors.
+    `off`: what formulas are off by, in squared floors.
     """
     # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
     density = -0.5 * more / (NOISE + off)
@@ -97,19 +89,11 @@ def likely(odds: Sequence[Array]) -> Array:
 
     Sets differ in some blocks and not in others, and no formula is exact, so blocks are weighed at random.
 
-    Parameters
-    ----------
-    odds : sequence of array, shape (block,)
-        Logarithm of the predictive density of each block under another set, less that under the first one.
-
-    Returns
-    -------
-    array, shape (1 + other,)
-        Of the first one and of the others; they add up to 1.
-
-    References
-    ----------
-    Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
+    `odds`, each shape (block,): logarithm of the predictive density of each block under another set, less that under
+    the first one.
+    Result: shape (1 + other,); of the first one and of the others; they add up to 1.
+    Reference: Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions
+    (pseudo-BMA+).
     """
     blocks = len(odds[0]) if odds else 0
     if blocks < 2:
@@ -132,12 +116,9 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
 def simplest(ranking: Sequence[Scored], above_floor: float, number: float) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
-    Parameters
-    ----------
-    ranking : sequence of Scored
-        Best first.
-    number : float
-        What a free number has to explain, in squared floors: the logarithm of the number of residuals (Schwarz 1978).
+    `ranking`: best first.
+    `number`: what a free number has to explain, in squared floors: the logarithm of the number of residuals (Schwarz
+    1978).
     """
     best = ranking[0]
     off = off_by(above_floor, float(best.block_error.sum()), above_floor - best.gain)

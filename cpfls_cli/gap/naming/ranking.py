@@ -27,16 +27,11 @@ from cpfls_cli.weak_form.resampling import Beside, blocks_of, folds, mirror_shif
 class Scored:
     """A candidate, the last of its set, with its cross-validated gain.
 
-    Attributes
-    ----------
-    chosen : tuple of Candidate
-        What it stands beside, and itself.
-    gain : float
-        Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
-    block_error : array, shape (block,)
-        What is left on each block.
-    coefficients : array, shape (coefficient,)
-        Linear, of a fit on all blocks; 0 where a bound took one out.
+    `chosen`: what it stands beside, and itself.
+    `gain`: sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where
+    refused.
+    `block_error`, shape (block,): what is left on each block.
+    `coefficients`, shape (coefficient,): linear, of a fit on all blocks; 0 where a bound took one out.
     """
 
     chosen: tuple[Candidate, ...]
@@ -54,16 +49,10 @@ class Scored:
 class RankedStep:
     """All candidates ranked beside a hypothesis.
 
-    Attributes
-    ----------
-    ranking : tuple of Scored
-        Best first, each effect once, at its best shape.
-    chance : array, shape (shift,)
-        What the best candidate explains of shifted residuals.
-    above_floor : float
-        Sum of squares that the hypothesis leaves above the floor, in squared floors.
-    block : array of int, shape (window,)
-        Of the cross-validation.
+    `ranking`: best first, each effect once, at its best shape.
+    `chance`, shape (shift,): what the best candidate explains of shifted residuals.
+    `above_floor`: sum of squares that the hypothesis leaves above the floor, in squared floors.
+    `block`, shape (window,): of the cross-validation.
     """
 
     hypothesis: System
@@ -105,14 +94,9 @@ def rank_effects(
 ) -> RankedStep:
     """Score all effects beside those chosen.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator or None
-        Of the shifts; None for none.
-    also : sequence of Candidate
-        Tried beside the grids, with shapes of their own.
-    floor : array, shape (6,), or None
-        None: as the residual of the hypothesis shows it.
+    `rng`: of the shifts; None for none.
+    `also`: tried beside the grids, with shapes of their own.
+    `floor`, shape (6,): None: as the residual of the hypothesis shows it.
     """
     hypothesis = system(flights, chosen)
     floor = best_floor(hypothesis) if floor is None else floor
@@ -168,15 +152,10 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
 class ScoringMatrix(NamedTuple):
     """Base columns and candidates side by side.
 
-    Attributes
-    ----------
-    matrix : array, shape (window, 6, column), floors
-    base : array of int
-        Columns of the base, and behind them derivatives by the shapes of its effects.
-    candidates : list of (Candidate, array of int, array)
-        Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
-    prior : array, shape (column,)
-        What bounds say of the coefficients before any data.
+    `matrix`: shape (window, 6, column), floors.
+    `base`: columns of the base, and behind them derivatives by the shapes of its effects.
+    `candidates`: each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
+    `prior`, shape (column,): what bounds say of the coefficients before any data.
     """
 
     matrix: Array
@@ -251,17 +230,10 @@ def _scored(
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
     """Check coefficients against the bounds of their effect: they are beyond one only by more than their uncertainty.
 
-    Parameters
-    ----------
-    linear, error : array, shape (coefficient,)
-        Linear coefficients of a fit, and their standard errors.
-
-    Returns
-    -------
-    keep : array of bool, shape (coefficient,)
-        False where a coefficient lies beyond a bound at 0, so that 0 is the best that is possible.
-    admissible : bool
-        False where one lies beyond another bound.
+    `linear`, `error`, shape (coefficient,): linear coefficients of a fit, and their standard errors.
+    Result `keep`, shape (coefficient,): false where a coefficient lies beyond a bound at 0, so that 0 is the best that
+    is possible.
+    Result `admissible`: false where one lies beyond another bound.
     """
     low, high = np.array([each.bounds(vehicle) for each in effect.coefficients]).T
     if effect.physical is not None:

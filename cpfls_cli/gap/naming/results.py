@@ -142,10 +142,7 @@ class NotExcited:
 class GapSize(NamedTuple):
     """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown.
 
-    Attributes
-    ----------
-    value : array, shape (6,), N m and N
-    floors : array, shape (6,)
+    `value`: shape (6,), N m and N; `floors`: shape (6,).
     """
 
     value: Array
@@ -278,16 +275,11 @@ def verdict_of(
     What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round; so
     has an effect without which chance explains as much beside the others.
 
-    Parameters
-    ----------
-    unexplained : sequence of Unexplained
-        Where effects were found: of those, the ones that matter.
-    shares : sequence of float
-        Of the gap of torque or force above the floor that the effects take off flights not seen, where there is one.
-    stays : bool
-        Whether an axis keeps a clear gap.
-    excited : bool
-        Whether anything moved enough to show a gap.
+    `unexplained`: where effects were found: of those, the ones that matter.
+    `shares`: of the gap of torque or force above the floor that the effects take off flights not seen, where there is
+    one.
+    `stays`: whether an axis keeps a clear gap.
+    `excited`: whether anything moved enough to show a gap.
     """
     if not effects:
         if unexplained:
@@ -308,12 +300,8 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
 
     Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
 
-    Parameters
-    ----------
-    before, after : array, shape (6,), floors
-        With the vehicle's own numbers refitted, and with so many named effects.
-    named_share : float
-        Of the gap above the floor that has to go.
+    `before`, `after`, shape (6,), floors: with the vehicle's own numbers refitted, and with so many named effects.
+    `named_share`: of the gap above the floor that has to go.
     """
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
@@ -325,12 +313,8 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
     """Tell whether an unexplained residual is a second cause, by what it follows, or more than a name may leave.
 
-    Parameters
-    ----------
-    before : array, shape (6,), floors
-        The gap of each channel without effects.
-    named_share : float
-        Of the gap above the floor that has to go.
+    `before`, shape (6,), floors: the gap of each channel without effects.
+    `named_share`: of the gap above the floor that has to go.
     """
     follows = unexplained.signal is not None or unexplained.frequency_hz is not None
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)

@@ -26,15 +26,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
     """Refuse effects that no torque and no force shows.
 
-    Parameters
-    ----------
-    source : str
-        File or key that named them, for the message.
-
-    Raises
-    ------
-    InputError
-        It names the effect and what shows it.
+    `source`: file or key that named them, for the message. Raises InputError: it names the effect and what shows it.
     """
     for effect in effects:
         if effect.columns is None:
@@ -91,13 +83,7 @@ def questions_left(
 ) -> tuple[Question, ...]:
     """Ask what a diagnosis left open: which of two rivals it is, and what its flights could not show.
 
-    Parameters
-    ----------
-    unseen : sequence of Effect
-        To show at a usual size.
-    flights : sequence of WeakFlight
-        Of the diagnosis, repaired.
-    floor : array, shape (6,), N m and N
+    `unseen`: to show at a usual size; `flights`: of the diagnosis, repaired; `floor`: shape (6,), N m and N.
     """
     sized = {
         each.name: SizedEffect(each.candidate, each.linear if len(each.linear) else np.ones(1))
@@ -136,11 +122,7 @@ def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array, se
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
     """Fit effects together on flights; what the flights leave open stays small beside its bounds.
 
-    Parameters
-    ----------
-    chosen : sequence of Candidate
-        Their shapes are kept.
-    floor : array, shape (6,), N m and N
+    `chosen`: their shapes are kept; `floor`: shape (6,), N m and N.
     """
     balance = system(flights, chosen)
     matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
@@ -157,11 +139,7 @@ def fitted_rival(
 ) -> SizedEffect:
     """Fit a rival in place of a named effect, at its best shape; at a usual size where the flights lack its signals.
 
-    Parameters
-    ----------
-    besides : sequence of Candidate
-        The other named effects.
-    floor : array, shape (6,), N m and N
+    `besides`: the other named effects; `floor`: shape (6,), N m and N.
     """
     if all(rival.missing(flight.signals) for flight in flights):
         return usual(rival, flights[0].signals.vehicle)

@@ -26,13 +26,10 @@ _SLOPES = (0.5, 3.5)
 class HarmonicPath:
     """Position and yaw over a duration, ``centre + sum_k cosine_k cos(w_k t) + sine_k sin(w_k t)``.
 
-    Attributes
-    ----------
-    centre : array, shape (4,), m and rad
-    order : array of int, shape (4, harmonic)
-        Periods in the duration.
-    cosine, sine : array, shape (4, harmonic), m and rad
-    duration : float, s
+    `centre`: shape (4,), m and rad.
+    `order`, shape (4, harmonic): periods in the duration.
+    `cosine`, `sine`: shape (4, harmonic), m and rad.
+    `duration`: s.
     """
 
     centre: Array
@@ -42,15 +39,9 @@ class HarmonicPath:
     duration: float
 
     def sample(self, time: Array) -> Array:
-        """Evaluate position and yaw with six derivatives.
+        """Evaluate position and yaw with six derivatives, shape (7, time, 4), m, rad and s.
 
-        Parameters
-        ----------
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (7, time, 4), m, rad and s
+        `time`: shape (time,), s.
         """
         frequency = 2 * np.pi / self.duration * self.order
         phase = np.multiply.outer(time, frequency).transpose(1, 0, 2)
@@ -68,12 +59,7 @@ class HarmonicPath:
         return np.ascontiguousarray(values)
 
     def scaled(self, factor: float | Array) -> HarmonicPath:
-        """Scale the path about the origin.
-
-        Parameters
-        ----------
-        factor : float or array, shape (4,)
-        """
+        """Scale the path about the origin."""
         by_axis = np.broadcast_to(factor, (4,))[:, None]
         return replace(self, centre=self.centre * factor, cosine=self.cosine * by_axis, sine=self.sine * by_axis)
 
@@ -93,12 +79,7 @@ class HarmonicPath:
 def random_path(duration: float, frequency_max: float, harmonics: int, rng: np.random.Generator) -> HarmonicPath:
     """Draw a path of about unit size on each axis, about the origin.
 
-    Parameters
-    ----------
-    duration : float, s
-    frequency_max : float, Hz
-    harmonics : int
-        Of each axis, fewer where the duration has no room for them.
+    `duration`: s; `frequency_max`: Hz; `harmonics`: of each axis, fewer where the duration has no room for them.
     """
     highest = max(int(frequency_max * duration + 1e-9), 1)
     count = min(harmonics, highest)
@@ -113,15 +94,9 @@ def random_path(duration: float, frequency_max: float, harmonics: int, rng: np.r
 def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) -> Trajectory:
     """Sample a path with the attitude that flies it.
 
-    Parameters
-    ----------
-    sample_time : float, s
-    gravity : float, m/s^2
-
-    Raises
-    ------
-    ComputationError
-        If the path asks for free fall, where the attitude is not defined.
+    `sample_time`: s.
+    `gravity`: m/s^2.
+    Raises ComputationError if the path asks for free fall, where the attitude is not defined.
     """
     time = sample_times(path.duration, sample_time)
     motion = path.sample(time)
@@ -144,15 +119,10 @@ _HARMONICS = 10
 class Room:
     """Space, limits and rotors that a path may use.
 
-    Attributes
-    ----------
-    half : array, shape (3,), m
-        Half of the box, less the vehicle's own size.
-    middle : array, shape (3,), m, world frame
-    settings : TrajectorySettings
-        Limits, tilt and duration.
-    period : float
-        Between the samples that are looked at, s.
+    `half`, shape (3,), m: half of the box, less the vehicle's own size.
+    `middle`: shape (3,), m, world frame.
+    `settings`: limits, tilt and duration.
+    `period`: between the samples that are looked at, s.
     """
 
     half: Array
@@ -213,17 +183,9 @@ class Room:
 def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: float, period: float) -> Room:
     """Find the room that a vehicle has.
 
-    Parameters
-    ----------
-    ground : float
-        Height of the ground, m.
-    period : float
-        Between the samples that are looked at, s.
-
-    Raises
-    ------
-    SettingError
-        If the vehicle does not fit into the box, or the box reaches into the ground.
+    `ground`: height of the ground, m.
+    `period`: between the samples that are looked at, s.
+    Raises SettingError if the vehicle does not fit into the box, or the box reaches into the ground.
     """
     asked = settings.next_flight
     size = 2 * max(float(np.hypot(*rotor.position_m[:2])) + (rotor.radius_m or 0.0) for rotor in vehicle.rotors)

@@ -23,12 +23,8 @@ from cpfls_cli.weak_form.windows import windows
 class Goal:
     """What the next flight has to tell, beside what is known from others.
 
-    Attributes
-    ----------
-    known : tuple of Evidence
-        What the flights already flown say on each question; no blocks without such flights.
-    noise : float
-        See `shared_noise`.
+    `known`: what the flights already flown say on each question; no blocks without such flights.
+    `noise`: see `shared_noise`.
     """
 
     questions: tuple[Question, ...]
@@ -67,10 +63,7 @@ class Goal:
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
     """Set up what the next flight has to tell.
 
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-        That are there already.
+    `flights`: that are there already.
     """
 
     def known(question: Question) -> Evidence:
@@ -89,12 +82,8 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
 class NextFlight:
     """The best path that was found.
 
-    Attributes
-    ----------
-    random : tuple of HarmonicPath
-        Drawn at random within the same room, from the worst to the best; the best was improved.
-    history : array, shape (iteration,)
-        Scores in the course of the search.
+    `random`: drawn at random within the same room, from the worst to the best; the best was improved.
+    `history`, shape (iteration,): scores in the course of the search.
     """
 
     path: HarmonicPath
@@ -111,15 +100,9 @@ def next_flight(
 
     The best of some random paths is changed at random as long as that helps, by steps that shrink to nothing.
 
-    Parameters
-    ----------
-    progress : callable
-        Takes paths done, paths in all, and a note.
-
-    References
-    ----------
-    Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62
-    (T-optimality).
+    `progress`: takes paths done, paths in all, and a note.
+    Reference: Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models,
+    Biometrika 62 (T-optimality).
     """
     settings, room = asked.room.settings.next_flight, asked.room
     total = settings.starts + settings.iterations

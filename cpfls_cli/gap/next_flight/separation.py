@@ -28,10 +28,7 @@ DRAWS, FEW_DRAWS = 200, 8
 class SizedEffect:
     """An effect with a value for each of its numbers.
 
-    Attributes
-    ----------
-    linear : array, shape (coefficient,)
-        1 where everything is in the shape.
+    `linear`, shape (coefficient,): 1 where everything is in the shape.
     """
 
     candidate: Candidate
@@ -42,12 +39,8 @@ class SizedEffect:
 class Question:
     """Whether an effect would be told from a rival, if it is the true one.
 
-    Attributes
-    ----------
-    rival : Effect or None
-        None: whether the effect shows at all, beyond the vehicle's own numbers.
-    besides : tuple of SizedEffect
-        Effects that are there whichever is true; their coefficients are free.
+    `rival`: None: whether the effect shows at all, beyond the vehicle's own numbers.
+    `besides`: effects that are there whichever is true; their coefficients are free.
     """
 
     true: SizedEffect
@@ -59,20 +52,13 @@ class Question:
 class Evidence:
     """What flights would say on a question, by the products of all columns that it takes over each block.
 
-    Attributes
-    ----------
-    gram : array, shape (block, column, column)
-        In squared floors: the true effect, then base columns, then the rival at each point of its grid.
-    base : array of int
-        Places of the columns that are free whichever is true.
-    rivals : tuple of array of int
-        Places of the rival's, one for each point of its grid; one empty array where there is no rival.
-    unit : bool
-        Whether the rival has the coefficient 1.
-    off : float
-        What formulas are off by, see `formulas_off`.
-    known : int
-        Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
+    `gram`, shape (block, column, column): in squared floors: the true effect, then base columns, then the rival at each
+    point of its grid.
+    `base`: places of the columns that are free whichever is true.
+    `rivals`, each : places of the rival's, one for each point of its grid; one empty array where there is no rival.
+    `unit`: whether the rival has the coefficient 1.
+    `off`: what formulas are off by, see `formulas_off`.
+    `known`: blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
     """
 
     gram: Array
@@ -123,14 +109,9 @@ class Evidence:
     def odds(self, noise: float, draw: Array, size: float = 1.0) -> Array:
         """Compute the logarithm of the rival's predictive density less that of the true effect, shape (block,).
 
-        Parameters
-        ----------
-        noise : float
-            See `shared_noise`.
-        draw : array, shape (block,)
-            Of the noise in what the two differ by, in standard deviations.
-        size : float
-            Of the true effect, as a share of its own.
+        `noise`: see `shared_noise`.
+        `draw`, shape (block,): of the noise in what the two differ by, in standard deviations.
+        `size`: of the true effect, as a share of its own.
         """
         error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
         more = size**2 * self.left + error * draw
@@ -140,14 +121,7 @@ class Evidence:
 def formulas_off(hypothesis: System, floor: Array) -> float:
     """Estimate what formulas are off by, by what effects leave above the floor of the flights that they were named in.
 
-    Parameters
-    ----------
-    floor : array, shape (6,), N m and N
-
-    Returns
-    -------
-    float
-        Mean square, as a share of that of what the effects explain.
+    `floor`: shape (6,), N m and N; Result: mean square, as a share of that of what the effects explain.
     """
     plain = system(hypothesis.flights)
     before, left = (float(((each.left(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
@@ -159,13 +133,7 @@ def gathered(
 ) -> Evidence:
     """Gather what flights along known motions would say on a question.
 
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-        Their residuals are not used.
-    floor : array, shape (6,), N m and N
-    off : float
-        See `formulas_off`.
+    `flights`: their residuals are not used; `floor`: shape (6,), N m and N; `off`: see `formulas_off`.
     """
     balance = system(flights)
     free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
@@ -190,12 +158,9 @@ def gathered(
 class Answer:
     """What flights would say on a question.
 
-    Attributes
-    ----------
-    own, likely : float
-        How likely the true effect and the rival are expected to be after them, among all rivals of the true one.
-    sure : float
-        Probability that the rival is then so rare beside the true effect that it is no rival.
+    `own`, `likely`: how likely the true effect and the rival are expected to be after them, among all rivals of the
+    true one.
+    `sure`: probability that the rival is then so rare beside the true effect that it is no rival.
     """
 
     evidence: Evidence
@@ -224,12 +189,7 @@ class Answer:
 def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
     """Foretell the table of how likely each set of effects is where one effect is true, over draws of the noise.
 
-    Parameters
-    ----------
-    evidence : sequence of Evidence
-        On each of its rivals, of the same flights.
-    noise : float
-        See `shared_noise`.
+    `evidence`: on each of its rivals, of the same flights; `noise`: see `shared_noise`.
     """
     tables = _tables(evidence, noise, draws)
     own, *others = tables.mean(axis=0).tolist()

@@ -49,14 +49,10 @@ _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
 class Air:
     """Gusts in flights.
 
-    Attributes
-    ----------
-    found : FoundGusts
-        Of all channels; a bound where nothing tells gusts from what the model lacks.
-    told : array of bool, shape (6,)
-        Channels of which instruments tell that all that is left is gusts and noise.
-    split : array of bool, shape (6,)
-        Channels of which instruments tell how much is; what comes again beside them is a gap above them.
+    `found`: of all channels; a bound where nothing tells gusts from what the model lacks.
+    `told`, shape (6,): channels of which instruments tell that all that is left is gusts and noise.
+    `split`, shape (6,): channels of which instruments tell how much is; what comes again beside them is a gap above
+    them.
     """
 
     found: FoundGusts
@@ -70,14 +66,8 @@ class Air:
         mean square of a Gauss-Markov process of memory m over a time T scatters by ``sqrt(2 m / T)`` of itself: there
         the floor is two such deviations larger, of both, which they exceed in about one flight of twenty.
 
-        Parameters
-        ----------
-        learned, flights : sequence of WeakFlight
-            Those that gusts were found in, and those that the floor is of.
-
-        Returns
-        -------
-        array, shape (6,), N m and N
+        `learned`, `flights`: those that gusts were found in, and those that the floor is of.
+        Result: shape (6,), N m and N.
         """
         windows = learned[0].windows
         weight, noise = windows.weight, self.noise(windows)
@@ -129,18 +119,10 @@ def air(
     either, what is new of a gust goes with nothing that was before, nor does its size; what is new of an effect goes
     with the motion that it comes from.
 
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    block : array of int, shape (window,)
-    given : Instruments
-        Of the same flights.
-
-    Returns
-    -------
-    Air or None
-        None for flights that are too short or of several rates, and for too few of them that instruments know.
+    `linear`, shape (column,): coefficients of its base.
+    `block`: shape (window,).
+    `given`: of the same flights.
+    None for flights that are too short or of several rates, and for too few of them that instruments know.
     """
     residual, known = hypothesis.left(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
@@ -177,12 +159,9 @@ def air(
 class _Left:
     """What a hypothesis leaves of flights, and what is known of them.
 
-    Attributes
-    ----------
-    residual : array, shape (window, 6)
-    block : array of int, shape (window,)
-    moved : array, shape (6,)
-        Mean square, in squared floors of the sensors; 0 of a channel that is not known.
+    `residual`: shape (window, 6).
+    `block`: shape (window,).
+    `moved`, shape (6,): mean square, in squared floors of the sensors; 0 of a channel that is not known.
     """
 
     hypothesis: System
@@ -263,10 +242,7 @@ def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
     Air turns a vehicle about every axis, and pushes it along every one: what is sure of all torques or all forces is
     believed of each of them of which it is more likely than not.
 
-    Parameters
-    ----------
-    moved : array, shape (6,)
-        Mean square of what is left, in squared floors of the sensors.
+    `moved`, shape (6,): mean square of what is left, in squared floors of the sensors.
     """
     own = found.foretold + ERRORS * found.foretold_error < most
     for kind in (slice(3), slice(3, 6)):
@@ -292,10 +268,7 @@ def in_air(flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:
 def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
     """Predict rows of windows over runs, shape (window, ...), from what was asked for; NaN for runs without setpoints.
 
-    Parameters
-    ----------
-    rows : sequence of array, shape (window, ...)
-        Of each run.
+    `rows`, each shape (window, ...): of each run.
     """
     lags = late_by(windows.period, max(1, windows.hop // 2))
     asked = {
@@ -318,9 +291,7 @@ def _growing(
 ) -> BoolArray:
     """Mark channels of which what is left surely grows with how much a signal moves, by ranks over blocks of time.
 
-    References
-    ----------
-    Winkler et al. 2014, permutation inference with the largest statistic.
+    Reference: Winkler et al. 2014, permutation inference with the largest statistic.
     """
     rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
     sizes, moves = (ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)

@@ -33,9 +33,7 @@ _TOLD = 0.2
 class Band(NamedTuple):
     """Windows, and the frequencies that they pass, about.
 
-    Attributes
-    ----------
-    low, high : float, Hz
+    `low`, `high`: Hz.
     """
 
     windows: Windows
@@ -46,10 +44,7 @@ class Band(NamedTuple):
 class Part(NamedTuple):
     """Neighbouring bands in which something comes again.
 
-    Attributes
-    ----------
-    bands : slice
-    low, high : float, Hz
+    `low`, `high`: Hz.
     """
 
     bands: slice
@@ -252,12 +247,7 @@ class ComesAgain:
 class RepeatedRuns:
     """Runs of flights that repeat each other, and which of them are held against which.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the flights.
-    pairs : tuple of (int, int)
-        Numbers of runs.
+    `names`: of the flights; `pairs`: numbers of runs.
     """
 
     names: tuple[str, ...]
@@ -269,18 +259,10 @@ class RepeatedRuns:
     def of(cls, recordings: Sequence[Recording], unseen: int = 0) -> Self | None:
         """Find the runs of a path among flights.
 
-        Parameters
-        ----------
-        recordings : sequence of Recording
-            Of one sampling period.
-        unseen : int
-            How many of them, the last ones, no fit has seen: only pairs with one of these are taken, where there are
-            any.
-
-        Returns
-        -------
-        RepeatedRuns or None
-            None where no flight repeats another.
+        `recordings`: of one sampling period.
+        `unseen`: how many of them, the last ones, no fit has seen: only pairs with one of these are taken, where there
+        are any.
+        None where no flight repeats another.
         """
         different = list(without_copies(recordings))
         flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
@@ -302,21 +284,10 @@ class RepeatedRuns:
     def split(self, hypothesis: System, linear: Array) -> ComesAgain | None:
         """Split what a model leaves of the balance into what comes again and what does not.
 
-        Parameters
-        ----------
-        hypothesis : System
-            Of the flights that the runs are of.
-        linear : array, shape (column,)
-            Coefficients of its base.
-
-        Returns
-        -------
-        ComesAgain or None
-            None where the path is too short to tell an error.
-
-        References
-        ----------
-        Pintelon and Schoukens 2012 (repeated excitation); Efron and Tibshirani 1993, chapter 11 (jackknife).
+        `hypothesis`: of the flights that the runs are of.
+        `linear`, shape (column,): coefficients of its base.
+        None where the path is too short to tell an error.
+        Reference: Pintelon and Schoukens 2012 (repeated excitation); Efron and Tibshirani 1993, chapter 11 (jackknife).
         """
         flights = hypothesis.flights
         sides = [_sides(left_over(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]

@@ -43,21 +43,12 @@ def stretches(
     Windows whose root mean square over their neighbours is above the level and among the largest tenth of the channel;
     runs with short pauses between them are one stretch.
 
-    Parameters
-    ----------
-    residual : array, shape (window, 6), floors
-    centres : array, shape (window,), s
-        Middle of each window.
-    flight_index : array of int, shape (window,)
-    level : float
-        Least root mean square, in floors.
-    most : int
-        Largest number per channel.
-
-    Returns
-    -------
-    tuple of GapStretch
-        Largest first.
+    `residual`: shape (window, 6), floors.
+    `centres`, shape (window,), s: middle of each window.
+    `flight_index`: shape (window,).
+    `level`: least root mean square, in floors.
+    `most`: largest number per channel.
+    Result: largest first.
     """
     largest = []
     for channel in range(residual.shape[1]):
@@ -114,15 +105,9 @@ def heat_map(
     The outer cells also take the half per cent of windows beyond each end of the grid, so that a few windows do not
     stretch it.
 
-    Parameters
-    ----------
-    residual : array, shape (window,)
-        Of the channel.
-    signals : tuple of str
-    states : mapping of str to array, shape (window,)
-        By signal; windows where one is not a number are left out.
-    bins : int
-        Cells along each signal.
+    `residual`, shape (window,): of the channel.
+    `states`, each shape (window,): by signal; windows where one is not a number are left out.
+    `bins`: cells along each signal.
     """
     first, second = (states[name] for name in signals)
     known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
@@ -155,14 +140,9 @@ def _edges(signal: Array, bins: int) -> Array:
 class Whiteness:
     """Autocorrelation of a residual, and the test whether it is that of noise.
 
-    Attributes
-    ----------
-    autocorrelation : array, shape (lag, channel)
-        At lags of 1, 2, ... windows without common samples.
-    p_value : array, shape (channel,)
-        Small where the residual is not noise; 1 for channels that are 0.
-    windows : int
-        Used, over all flights.
+    `autocorrelation`, shape (lag, channel): at lags of 1, 2, ... windows without common samples.
+    `p_value`, shape (channel,): small where the residual is not noise; 1 for channels that are 0.
+    `windows`: used, over all flights.
     """
 
     autocorrelation: Array
@@ -176,18 +156,11 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     ``Q = n (n + 2) sum_k r_k^2 / n_k`` with n_k pairs of windows at lag k, against chi square with as many degrees of
     freedom as lags.
 
-    Parameters
-    ----------
-    residual : array, shape (window, channel)
-    flight_index : array of int, shape (window,)
-    stride : int
-        Windows from one to the next without common samples; 2 at an overlap of a half.
-    lags : int
-        Largest lag; fewer where flights are short.
-
-    References
-    ----------
-    Ljung and Box 1978, equation 1.4.
+    `residual`: shape (window, channel).
+    `flight_index`: shape (window,).
+    `stride`: windows from one to the next without common samples; 2 at an overlap of a half.
+    `lags`: largest lag; fewer where flights are short.
+    Reference: Ljung and Box 1978, equation 1.4.
     """
     flights = [residual[flight_index == number][::stride] for number in np.unique(flight_index)]
     longest = max((len(centred) for centred in flights), default=0)
