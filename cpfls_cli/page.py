@@ -49,7 +49,7 @@ TONES = ("good", "note", "warning", "unsure")
 _MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,3}) (.+)")
-_VERDICT = re.compile(r"([A-Z][A-Z -]+): (.+)")
+_VERDICT = re.compile(r"([A-Z][A-Z ,;:-]*[A-Z]): (.+)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _LONG = 36

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
@@ -127,6 +128,12 @@ class Run(Job):
         Other files that are written with the result.
     said : list of Text
         Of this run alone: its file says none of it again.
+    until_written : ExitStack
+        Contexts that last until the result is written, or it is sure that it will not be.
+    afterwards : list of callable
+        What is done when the result is written.
+    data : callable
+        Gives the config as plain data, with what the command line changes of it.
     """
 
     writes: bool = True
@@ -139,6 +146,9 @@ class Run(Job):
     last_words: str = ""
     texts: dict[Path, str] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
+    until_written: ExitStack = field(default_factory=ExitStack)
+    afterwards: list[Callable[[], object]] = field(default_factory=list)
+    data: Callable[[], dict[str, Any]] = dict
     _taken: dict[str, _Taken] = field(default_factory=dict)
 
     def take(self, roles: Mapping[str, Path], of: str = "") -> Mapping[str, InputFile]:
@@ -195,6 +205,18 @@ class Run(Job):
         return self._taken.setdefault(name, _Taken(self.reads, self.inputs)) if name else self
 
 
+def _would(run: Run, stage: Stage) -> Outcome:
+    """Say of a dry run that it could go on."""
+    where = f"{run.output}: would be {'filled' if stage.folder or stage.fills else 'written'}; "
+    named = {"output": str(run.output)} if run.writes else {}
+    config = "the config and " if run.with_config else ""
+    cautions = run.cautions_of(*(stage.fills.parts if stage.fills else ()))
+    return Outcome(
+        {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
+        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *caution_texts(cautions)),
+    )
+
+
 @dataclass(frozen=True)
 class Stage:
     """A function with everything that makes it a command.
@@ -222,8 +244,12 @@ class Stage:
         Option of its output where it is another than usual; may be left out.
     several : bool
         Whether options that may be repeated take all values that follow.
+    resumes : bool
+        Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
     overrides : callable or None
         Gives overrides of the config that its options stand for.
+    together : callable
+        Gives the sources of a report that show its results: several may be shown as one.
     """
 
     function: Callable[..., Any]
@@ -236,7 +262,9 @@ class Stage:
     study: bool | Callable[[Mapping[str, Any]], bool]
     output: Any
     several: bool
+    resumes: bool
     overrides: Callable[..., list[str]] | None
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Compute, and write nothing."""
@@ -291,36 +319,31 @@ class Stage:
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""
-        if run.writes:
+        if run.writes and not self.resumes:
             self._check(run, run.output)
-        found = self.function(run, **given)
-        if found is None:
-            where = f"{run.output}: would be {'filled' if self.folder or self.fills else 'written'}; "
-            where = where if run.writes else ""
-            named = {"output": str(run.output)} if run.writes else {}
-            config = "the config and " if run.with_config else ""
-            cautions = run.cautions_of(*(self.fills.parts if self.fills else ()))
-            return Outcome(
-                {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
-                (Text(f"{where}{config}all inputs are good"), *caution_texts(cautions)),
-            )
-        if isinstance(found, Outcome):
-            return found
-        streamed = isinstance(found, Parts)
-        if isinstance(found, Parts):
-            # What there is to say is known behind the last part.
-            store.write_parts(run.output, found, found.rows, run.origin(self.name))
-            found = found.last
-        results = dict(found) if self.folder else {"": found}
-        if self.fills and run.writes:
-            run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
-        several = len(results) > 1
-        texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
-        texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-        if run.writes and not streamed:
-            self._write(run, run.output, results)
-        else:
-            write_files(run.texts)
+        with run.until_written:
+            found = self.function(run, **given)
+            if found is None:
+                return _would(run, self)
+            if isinstance(found, Outcome):
+                return found
+            streamed = isinstance(found, Parts)
+            if isinstance(found, Parts):
+                # What there is to say is known behind the last part.
+                store.write_parts(run.output, found, found.rows, run.origin(self.name))
+                found = found.last
+            results = dict(found) if self.folder else {"": found}
+            if self.fills and run.writes:
+                run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
+            several = len(results) > 1
+            texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
+            texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+            if run.writes and not streamed:
+                self._write(run, run.output, results)
+            else:
+                write_files(run.texts)
+        for act in run.afterwards:
+            act()
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
@@ -478,7 +501,9 @@ def stage(
     study: bool | Callable[[Mapping[str, Any]], bool] = False,
     output: Any = None,
     several: bool = False,
+    resumes: bool = False,
     overrides: Callable[..., list[str]] | None = None,
+    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
 ) -> Callable[[Callable[..., Any]], Stage]:
     """Make a function a stage."""
     return lambda function: Stage(
@@ -492,7 +517,9 @@ def stage(
         study,
         output,
         several,
+        resumes,
         overrides,
+        together,
     )
 
 

@@ -14,12 +14,10 @@ import h5py
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from cpfls_cli import rotations
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli import rotations, store
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.config.load import load_study
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix, turning_law
-from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.inertia import six_parameters
 
 FREQUENCY, DAMPING = 2 * np.pi * np.array([1.2, 1.2, 0.5]), 1.0
@@ -63,7 +61,7 @@ def main(config, trajectory, model):
     with h5py.File(trajectory) as file:
         names = ("time", "attitude", "attitude_rate", "attitude_acceleration")
         plan = {name: file[name][:] for name in names}
-    identified = rebuilt(Path(model), read_record(Path(model), IdentifiedRecord)).fuzzy
+    identified = store.read(Path(model), IdentifiedModel)[0].functions
     level = np.diagonal(identified.inertia(np.zeros((1, 3))).value[0])
     laws = {"model": computed_torque(identified), "feedback": lambda _, __, wanted: level * wanted[0]}
     inertia = six_parameters(load_study(Path(config)).vehicle.inertia_kg_m2)

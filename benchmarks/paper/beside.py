@@ -20,12 +20,11 @@ from benchmarks.paper.printed import (
     TABLE_5,
     PrintedColumn,
 )
-from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
-from cpfls_cli.artifacts.sweep import SettingRuns
-from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.sweep import joined_sweeps
+from cpfls_cli.identification.replicates import Setting
+from cpfls_cli.identification.scores import MODEL, TRAINING, Judged
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.stages.sweep import joined_sweeps
 
 _LACKS_SWEEP = Text(
     "Not shown, because no sweep was given: Table 5 with its means over several seeds; made by: cpfls sweep CONFIG "
@@ -39,7 +38,6 @@ _PAPER_NOTE = Text(
     "numbers to a path that it does not define in full.",
     "note",
 )
-_NUMBER = "Table 5. "
 _NUMBERED = re.compile(r"Figure \d")
 """How the caption of a figure begins that has the number of one of the paper."""
 _FLOOR = " is better conditioned than the full set"
@@ -76,10 +74,10 @@ def _blocks(given: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
                 floor = "the paper's floor, that a reduced set cannot be, does not hold"
                 yield Text(f"{text.removesuffix('.')}: {floor}.")
             case Table(name="table-5-identification"):
-                yield replace(block, caption=block.caption.removeprefix(_NUMBER)) if in_sweeps else _all_columns(block)
+                yield block if in_sweeps else _all_columns(block)
                 yield Text(_scale_sentence(sources), "note")
-            case Table(name=name) if name.startswith("table-5-replicates-"):
-                printed = printed_beside(shown[int(name.rpartition("-")[2]) - 1])
+            case Table() if _is_of(block, "sweep", "Quantity"):
+                printed = printed_beside(shown[int(block.name.split("-")[1]) - 1])
                 yield _replicates(block, printed)
                 if any(printed):
                     yield _PAPER_NOTE
@@ -137,7 +135,7 @@ def _scale_sentence(sources: PaperSources) -> str:
     )
 
 
-def _largest_torque(judged: JudgedGroup) -> float:
+def _largest_torque(judged: Judged) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = judged.of_axes("max_error", MODEL, TRAINING) / judged.of_axes("relative_error", MODEL, TRAINING)
     return float(np.max(torque[np.isfinite(torque)], initial=0.0))
@@ -148,11 +146,11 @@ def _replicates(table: Table, printed: Sequence[PrintedColumn | None]) -> Table:
     if not any(printed):
         return table
     rows: list[Sequence[str | Cell]] = []
-    for row in table.rows:
+    for row in table.cells:
         rows.append(row)
-        if (shown := _PRINTED_ROWS.get(str(row[_QUANTITY]))) is not None:
+        if (shown := _PRINTED_ROWS.get(row[_QUANTITY].text)) is not None:
             rows.append(["· paper", *(shown(column) if column else UNKNOWN for column in printed)])
-    return replace(table, caption=f"{_NUMBER}{table.caption}", rows=rows)
+    return replace(table, rows=rows)
 
 
 _PRINTED_ROWS = {
@@ -160,13 +158,13 @@ _PRINTED_ROWS = {
     "training points": lambda p: str(p.samples),
     "population × generations": lambda p: f"{p.population} × {p.generations}",
     "runs": lambda _: "10",
-    f"best run: MSE, {SQUARED_TORQUE}": lambda p: p.mse,
-    f"best run: largest error, {TORQUE}": lambda p: p.max_error,
+    "best run: MSE, (N m)²": lambda p: p.mse,
+    "best run: largest error, N m": lambda p: p.max_error,
     "best run: condition number": lambda p: p.condition_number,
-    f"mean MSE, {SQUARED_TORQUE}": lambda p: p.mse_of_runs[0],
-    f"standard deviation of the MSE, {SQUARED_TORQUE}": lambda p: p.mse_of_runs[1],
-    f"mean largest error, {TORQUE}": lambda p: p.max_error_of_runs[0],
-    f"standard deviation of the largest error, {TORQUE}": lambda p: p.max_error_of_runs[1],
+    "mean MSE, (N m)²": lambda p: p.mse_of_runs[0],
+    "standard deviation of the MSE, (N m)²": lambda p: p.mse_of_runs[1],
+    "mean largest error, N m": lambda p: p.max_error_of_runs[0],
+    "standard deviation of the largest error, N m": lambda p: p.max_error_of_runs[1],
     "mean condition number": lambda p: p.condition_number_of_runs[0],
     "standard deviation of the condition number": lambda p: p.condition_number_of_runs[1],
     "mean relative error": lambda _: RELATIVE_ERROR,
@@ -191,6 +189,6 @@ def printed_beside(settings: Settings) -> list[PrintedColumn | None]:
     return [columns.get(index) for index in range(len(settings))]
 
 
-def _fits(setting: SettingRuns, column: PrintedColumn, exact: bool) -> bool:
+def _fits(setting: Setting, column: PrintedColumn, exact: bool) -> bool:
     keys = ("structure", "samples", "population", "generations") if exact else ("structure", "samples")
     return all(getattr(setting, key) == getattr(column, key) for key in keys)

@@ -19,18 +19,17 @@ from benchmarks.paper.printed import (
     TABLE_4,
 )
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.rebuilt import inertia_functions
-from cpfls_cli.artifacts.scores import MODEL, TRAINING
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
+from cpfls_cli.identification.scores import MODEL, TRAINING
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 
-Settings = Sequence[SettingRuns]
+Settings = Sequence[Setting]
 Searches = Sequence[Settings]
 """Settings with their runs, by sweep."""
 
@@ -127,7 +126,7 @@ class Claim:
     of_searches: Callable[[Searches], Measurement] | None = None
 
 
-def reading_of(setting: SettingRuns) -> tuple[str, str]:
+def reading_of(setting: Setting) -> tuple[str, str]:
     """Name what chose the samples of a setting, and on which of them it was judged."""
     return setting.criterion, setting.judged_on
 
@@ -165,7 +164,7 @@ def _relative_error(sources: Sources) -> Measurement:
     return _small_enough([*_relative_errors(searches(sources)), identified], _elsewhere(sources))
 
 
-def _is_periodic(model: Source[IdentifiedRecord]) -> bool:
+def _is_periodic(model: Source[IdentifiedModel]) -> bool:
     return bool(model.config["identification"]["structure"] == "cpfls")
 
 
@@ -450,13 +449,13 @@ def _continuity(sources: Sources) -> Measurement:
     return decided(worst < _SEAM_JUMP, f"{number(worst, 2)} of the torque there", why)
 
 
-def _jump(model: Source[IdentifiedRecord]) -> float:
+def _jump(model: Source[IdentifiedModel]) -> float:
     """Find by how much torque changes across 2 pi, as a share of the largest there."""
     from cpfls_cli.regressor.motion import Motion
 
     rng = np.random.default_rng(0)
     attitude, rate, acceleration = rng.uniform(-1.0, 1.0, (3, _SEAM_STATES, 3))
-    functions, worst = inertia_functions(model.record.functions), 0.0
+    functions, worst = model.record.functions, 0.0
     for angle in (0, 1):
         before, after = attitude.copy(), attitude.copy()
         before[:, angle], after[:, angle] = 2.0 * np.pi - _SEAM_STEP, _SEAM_STEP

@@ -14,13 +14,13 @@ from benchmarks.paper.claims import Claim, ClaimVerdict, Measurement, Settings, 
 from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColumn
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
+from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting, Sweep, spread
 from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Reading:
         What chose the samples.
     judged_on : str
         What errors are taken over, as the config calls it.
-    settings : sequence of SettingRuns
+    settings : sequence of Setting
         All samples among them.
     """
 
@@ -102,17 +102,17 @@ class Reading:
         yield "largest torque", min(self.fewest.largest_torque, LEAST_TORQUE), LEAST_TORQUE
 
     @property
-    def classic(self) -> SettingRuns | None:
+    def classic(self) -> Setting | None:
         """The classic system on all samples."""
         return next((s for s in self.settings if s.structure == "fls" and s.criterion == ALL_SAMPLES), None)
 
     @property
-    def full(self) -> SettingRuns | None:
+    def full(self) -> Setting | None:
         """The periodic system on all samples."""
         return next((s for s in self.settings if s.structure == "cpfls" and s.criterion == ALL_SAMPLES), None)
 
     @property
-    def fewest(self) -> SettingRuns:
+    def fewest(self) -> Setting:
         """The smallest set that was chosen; of several searches the first."""
         return min((s for s in self.settings if s.criterion != ALL_SAMPLES), key=lambda setting: setting.samples)
 
@@ -121,11 +121,11 @@ class Reading:
         return [claim.of_searches([self.settings]) for claim in claims if claim.of_searches is not None]
 
 
-def _beside(setting: SettingRuns, column: PrintedColumn) -> Iterator[tuple[str, float, float]]:
+def _beside(setting: Setting, column: PrintedColumn) -> Iterator[tuple[str, float, float]]:
     """Pair medians over the runs with what is printed of ten."""
     yield "MSE", _median(setting.errors[:, 0]), float(column.mse_of_runs[0])
     yield "largest error", _median(setting.errors[:, 1]), float(column.max_error_of_runs[0])
-    yield "condition number", _median(setting.condition_number), float(column.condition_number_of_runs[0])
+    yield "condition number", _median(setting.of("condition_number")), float(column.condition_number_of_runs[0])
 
 
 def _median(runs: Array) -> float:
@@ -151,7 +151,7 @@ def readings(sources: Sources) -> list[Reading]:
     return [found[key] for key in sorted(found, key=lambda key: (key[0], key[1]))]
 
 
-def _of_sweep(sweep: Source[SweepRecord]) -> Iterator[Reading]:
+def _of_sweep(sweep: Source[Sweep]) -> Iterator[Reading]:
     settings = sweep.record.settings
     for key in dict.fromkeys(reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES):
         own = [setting for setting in settings if setting.criterion == ALL_SAMPLES or reading_of(setting) == key]
@@ -243,7 +243,7 @@ def _judged_here(sources: Sources) -> Iterator[Text]:
             yield Text(f"The claims below are judged in this one: {reading.name}.{alone} {off}")
 
 
-def _mean_square_noise(sources: Sources, sweep: Source[SweepRecord]) -> float:
+def _mean_square_noise(sources: Sources, sweep: Source[Sweep]) -> float:
     """Find the mean square of the noise that was put on the torque of a sweep's flight; 0 where none is known."""
     flight = sources.by_hash(sweep.made_from("flight"))
     noise = None if flight is None else flight.record.noise
@@ -321,13 +321,13 @@ def _numbers_of(reading: Reading) -> list[str]:
         whole[1],
         number(_mean(fewest, 0), 3),
         number(_mean(fewest, 1), 3),
-        percent(spread(fewest.relative_error[:, 0]).mean, 2),
-        number(spread(fewest.condition_number).mean, 3),
+        percent(fewest.relative_error.mean, 2),
+        number(fewest.condition_number.mean, 3),
         number(reading.factor, 2),
     ]
 
 
-def _mean(setting: SettingRuns, column: int) -> float:
+def _mean(setting: Setting, column: int) -> float:
     return spread(setting.errors[:, column]).mean
 
 

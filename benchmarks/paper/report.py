@@ -48,7 +48,7 @@ def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[Evaluati
 
 def _without_readings(section: Section, sources: PaperSources) -> Section | None:
     """Leave out of the replicates the sweeps over readings of the paper, which stand beside its claims."""
-    if section.name != "replicates":
+    if not section.name.startswith("sweep"):
         return section
     readings = [sweep for sweep in sources.sweeps if compares_readings(sweep.record.settings)]
     others = replace(sources, all=[source for source in sources.all if source not in readings])

@@ -41,9 +41,9 @@ from benchmarks.paper.search_claims import (
     TYPICAL_CONDITION_CLAIM,
     TYPICAL_ERRORS_CLAIM,
 )
-from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.fuzzy.inputs import seesaw
 from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.identification.scores import MODEL, TRAINING
 from cpfls_cli.report.canvas import line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent

@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 from benchmarks.paper.claims import Claim, Measurement, Searches, Settings, decided, not_measured, searches, undecided
 from benchmarks.paper.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
+from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.report.numbers import number, percent
 
 _CONFIDENCE = 0.95
@@ -63,7 +63,7 @@ class PairedRatio:
     p_value: float
 
 
-def paired_ratio(setting: SettingRuns, reference: SettingRuns) -> PairedRatio:
+def paired_ratio(setting: Setting, reference: Setting) -> PairedRatio:
     """Compare the mean squared errors of two settings over the seeds that both were searched with.
 
     With ``d_i = log(mse_i / mse_i')`` over n seeds the ratio is ``exp(mean d)`` and its interval
@@ -97,7 +97,7 @@ def _half_width(logs: Array) -> float:
     return float(quantile * np.std(logs, ddof=1) / np.sqrt(len(logs)))
 
 
-def _as_good(setting: SettingRuns, reference: SettingRuns, reason: str) -> Measurement | None:
+def _as_good(setting: Setting, reference: Setting, reason: str) -> Measurement | None:
     """Judge whether a setting is as good as another; None where they have no finished runs of equal seeds.
 
     Parameters
@@ -136,12 +136,12 @@ def _failed(paired: PairedRatio) -> str:
     return "".join(f" No model in {count} of them with {whose}." for whose, count in counts.items() if count)
 
 
-def _sizes(setting: SettingRuns, reference: SettingRuns) -> str:
+def _sizes(setting: Setting, reference: Setting) -> str:
     sizes = dict.fromkeys(f"{s.population} × {s.generations}" for s in (setting, reference))
     return " against ".join(sizes)
 
 
-_Pairs = Callable[[Settings], Iterator[tuple[SettingRuns, SettingRuns]]]
+_Pairs = Callable[[Settings], Iterator[tuple[Setting, Setting]]]
 _Lacking = Callable[[Searches], str]
 
 
@@ -180,7 +180,7 @@ def _of_searches(
 def _reduced_claim(column: PrintedColumn) -> Claim:
     """Fewer samples, each set of them beside all samples."""
 
-    def pairs(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+    def pairs(settings: Settings) -> Iterator[tuple[Setting, Setting]]:
         for full in settings:
             for reduced in settings:
                 equal = reduced.structure == full.structure == "cpfls" and reduced.size == full.size
@@ -207,12 +207,12 @@ _TIMES_LARGER = 10.0
 """A search that is not ten times the other one tells nothing about the paper's, which is 53 times."""
 
 
-def _alike(one: SettingRuns, other: SettingRuns) -> bool:
+def _alike(one: Setting, other: Setting) -> bool:
     """Tell whether two settings search a periodic system on equally many samples."""
     return one.structure == other.structure == "cpfls" and one.samples == other.samples
 
 
-def _small_beside_large(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+def _small_beside_large(settings: Settings) -> Iterator[tuple[Setting, Setting]]:
     for small in settings:
         for large in settings:
             equal = _alike(small, large) and small.ranking == large.ranking
@@ -240,7 +240,7 @@ SMALLER_SEARCH_CLAIM = _claim(
 )
 
 
-def _periodic_beside_classic(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+def _periodic_beside_classic(settings: Settings) -> Iterator[tuple[Setting, Setting]]:
     for periodic in settings:
         for classic in settings:
             kinds = (periodic.structure, classic.structure) == ("cpfls", "fls")
@@ -262,7 +262,7 @@ CLASSIC_CLAIM = _claim(
 )
 
 
-def _quantity_beside_pareto(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+def _quantity_beside_pareto(settings: Settings) -> Iterator[tuple[Setting, Setting]]:
     for quantity in settings:
         for pareto in settings:
             rankings = quantity.ranking == "quantity-dominance" != pareto.ranking
@@ -282,7 +282,7 @@ RANKING_CLAIM = _claim(
 )
 
 
-def _periodic(found: Searches) -> list[SettingRuns]:
+def _periodic(found: Searches) -> list[Setting]:
     return [setting for setting in chain.from_iterable(found) if setting.structure == "cpfls"]
 
 
@@ -325,7 +325,7 @@ _LEAST_CONDITION, _LARGEST_CONDITION = min(_PRINTED_CONDITIONS), max(_PRINTED_CO
 
 
 def _typical_condition(found: Searches) -> Measurement:
-    conditions = _of_all_runs([setting.condition_number for setting in _periodic(found)])
+    conditions = _of_all_runs([setting.of("condition_number") for setting in _periodic(found)])
     if not len(conditions):
         return _A_SWEEP()
     median = float(np.median(conditions))
@@ -351,8 +351,8 @@ def _convergence(found: Searches) -> Measurement:
     sizes: dict[tuple[int, int], list[IntArray]] = {}
     for setting in _periodic(found):
         large = setting.population >= _SMALL.population and setting.generations >= _SMALL.generations
-        if large and setting.settled is not None:
-            sizes.setdefault(setting.size, []).append(setting.settled)
+        if large:
+            sizes.setdefault(setting.size, []).append(setting.of("settled"))
     if not sizes:
         return not_measured(f"a search of {_SMALL.population} × {_SMALL.generations} or more", "make reproduce")
     medians = {size: float(np.median(np.concatenate(settled))) for size, settled in sorted(sizes.items())}

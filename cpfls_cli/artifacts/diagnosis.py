@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.consistency.audit import Audit
@@ -20,6 +20,7 @@ from cpfls_cli.gap.residual.repeated import ComesAgain
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.inertia import six_parameters
+from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 
@@ -114,7 +115,7 @@ class Diagnosis(Conclusion):
             [len(each.time) for each in in_roles(self.recorded, *roles)] for roles in ([TRAINING], [])
         )
         halved = len(files) == 1 and not any(role.startswith("held-out") for role in inputs)
-        return tuple(map(LearnedFlight, files, training, [sum(everything)] if halved else training))
+        return tuple(map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training))
 
     @property
     def where(self) -> LargestGap | None:

@@ -2,40 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Self
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import dataset, group, group_of, record
-from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, GustAxis, Gusts, gust_axes
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.disturbance import FoundGusts
-
-
-class GustAxis(NamedTuple):
-    """Gusts about or along an axis, with 95 % intervals, in units of acceleration; NaN where not known.
-
-    Attributes
-    ----------
-    name : str
-        roll, pitch, yaw, or x, y, z.
-    """
-
-    name: str
-    size: float
-    low: float
-    high: float
-    memory: float
-    memory_low: float
-    memory_high: float
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is a torque."""
-        return self.name in GUST_AXES[:3]
 
 
 @record
@@ -83,14 +57,9 @@ class DisturbanceGroup:
         """The gusts that are known; none on other axes."""
         return Gusts.known(self.size, self.memory, self.white)
 
-    def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
+    def axes(self, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
-        bodies = np.append(inertia[:3], [mass] * 3)
-        columns = (self.size, self.low, self.high, self.memory, self.memory_low, self.memory_high)
-        for place, name in enumerate(self.name):
-            size, low, high, *memory = (float(column[place]) for column in columns)
-            body = float(bodies[place])
-            yield GustAxis(name, size / body, low / body, high / body, *memory)
+        return gust_axes(self, inertia, mass)
 
     def summary(self, inertia: Array, mass: float) -> dict[str, Any]:
         """Tell the gusts to machines; arguments are those of `axes`."""

@@ -59,6 +59,7 @@ class ExtendedRecord(ModelRecord):
         ("flight", "diagnosis", "model"),
         kind="extended",
     )
+    MADE_BY: ClassVar = "extend"
 
     vehicle: ExtendedVehicleGroup = group()
     inertia: Array = dataset(

@@ -12,11 +12,8 @@ from typing import Any
 from cpfls_cli.artifacts.spec import Record
 
 _RECORDS = {
-    ("cpfls/model", "identified"): "identified.IdentifiedRecord",
     ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
-    ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",
-    ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
 }
 """Every artifact format by its name and kind, and where its record is: it is loaded when a file of it is met."""

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.spec import InputFile, dataset, record
+from cpfls_cli.result import About
 
 MODEL_FLIGHT = "model-flight"
 """Role of a flight that the model of a comparison or diagnosis learned from; of those compared it is ``flight``."""
 
 
 class LearnedFlight(NamedTuple):
-    """A flight that a model learned from.
+    """A flight that a model learned from."""
 
-    Attributes
-    ----------
-    samples, of : int or None
-        Leading samples that it learned from, of all that were used; None where an old file does not say.
-    """
+    name: Annotated[str, About("file name without its folder")]
+    sha256: Annotated[str, About("hash of the file")]
+    format: Annotated[str, About("format of the file, or its ending")]
+    samples: Annotated[int | None, About("leading samples of it that were learned from")] = None
+    of: Annotated[int | None, About("samples of it that were used: learned from or held out")] = None
 
-    file: InputFile
-    samples: int | None = None
-    of: int | None = None
+    @classmethod
+    def in_file(cls, file: InputFile, samples: int | None = None, of: int | None = None) -> Self:
+        """Name a file."""
+        return cls(file.name, file.sha256, file.format, samples, of)
+
+    @property
+    def file(self) -> InputFile:
+        """The file."""
+        return InputFile(self.name, self.sha256, self.format)
 
     @property
     def whole(self) -> bool:
@@ -50,7 +57,7 @@ class LearnedGroup:
     def flights(self, inputs: Mapping[str, InputFile]) -> tuple[LearnedFlight, ...]:
         """List the flights, each with its file among the inputs of the artifact."""
         rows = zip(self.role, self.samples.tolist(), self.of.tolist(), strict=True)
-        return tuple(LearnedFlight(inputs[role], samples, of) for role, samples, of in rows if role in inputs)
+        return tuple(LearnedFlight.in_file(inputs[role], samples, of) for role, samples, of in rows if role in inputs)
 
 
 def as_inputs(role: str, flights: Sequence[LearnedFlight]) -> tuple[dict[str, InputFile], LearnedGroup | None]:
@@ -68,9 +75,9 @@ def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...
     """List flights once each; of one that stands in several groups what was learned from most."""
     kept: dict[str, LearnedFlight] = {}
     for flight in (flight for group in groups for flight in group):
-        known = kept.get(flight.file.sha256)
+        known = kept.get(flight.sha256)
         if known is None or (known.samples or 0) < (flight.samples or 0):
-            kept[flight.file.sha256] = flight
+            kept[flight.sha256] = flight
     return tuple(kept.values())
 
 
@@ -78,9 +85,9 @@ def learned_in(inputs: Mapping[str, InputFile], parts: LearnedGroup | None, role
     """List the flights in a role, with how much of them was learned from where a file says so."""
     told = () if parts is None else parts.flights(inputs)
     files = [file for name, file in inputs.items() if name == role or name.startswith(f"{role}-")]
-    return told or tuple(map(LearnedFlight, files))
+    return told or tuple(map(LearnedFlight.in_file, files))
 
 
 def part_learned(learned: Iterable[LearnedFlight], hashes: Collection[str]) -> LearnedFlight | None:
     """Find what was learned from a flight of these hashes, its file's and its log's; None where nothing was."""
-    return next((flight for flight in learned if flight.file.sha256 in hashes), None)
+    return next((flight for flight in learned if flight.sha256 in hashes), None)

@@ -1,9 +1,10 @@
-"""The artifact of a model: a vehicle, all that is needed to evaluate it, and how it was found."""
+"""What all models answer; and a vehicle as a group of datasets, all that is needed to evaluate it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, fields
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     # Reading a record waits for no numerics; `artifacts/rebuilt.py` makes a model of it again.
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.playback.model import ModelEffect, VehicleModel
-    from cpfls_cli.regressor.structure import ModelStructure
 
 USUAL = "usual"
 """What a command is between samples, where the model does not say: as a flight is usually taken."""
@@ -187,18 +187,6 @@ class GustsGroup:
         torque, force = (np.zeros(3) if own is None else own for own in (self.torque_white, self.force_white))
         return np.append(torque, force)
 
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The gusts for machines."""
-        return {
-            "torque_n_m": self.torque.tolist(),
-            "torque_memory_s": self.torque_memory.tolist(),
-            "force_n": self.force.tolist(),
-            "force_memory_s": self.force_memory.tolist(),
-            "torque_white_n_m_sqrt_s": self.white[:3].tolist(),
-            "force_white_n_sqrt_s": self.white[3:].tolist(),
-        }
-
 
 @record
 class InertiaFunctionsGroup:
@@ -234,18 +222,11 @@ class InertiaFunctionsGroup:
             partition=tuple(names),
             breakpoints=np.concatenate(model.partitions),
             coefficients=model.coefficients,
-            parameter=tuple(_parameter_names(structure)),
+            parameter=tuple(structure.parameter_names),
             rigid_body=model.rigid_body,
             input_range=np.array([[r.minimum, r.maximum] for r in model.ranges]),
             visited=model.visited,
         )
-
-
-def _parameter_names(structure: ModelStructure) -> Iterator[str]:
-    for block in structure.blocks:
-        for rule in range(block.rules):
-            for feature in range(block.features):
-                yield f"{block.function.name} rule {rule + 1} c{feature}"
 
 
 @record
@@ -296,48 +277,36 @@ class VehicleGroup:
             rotor_speed_max_rad_s=self.rotor.speed_max,
         )
 
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The vehicle for machines."""
-        return {
-            "mass_kg": self.mass,
-            "inertia_kg_m2": dict(zip(INERTIA_PARAMETERS, self.inertia.tolist(), strict=True)),
-            "thrust_factor_n_s2": self.rotor.thrust_factor.tolist(),
-            "drag_factor_n_m_s2": self.rotor.drag_factor.tolist(),
-            "thrust_linear": self.rotor.thrust_linear,
-            "response": asdict(self.response.response()),
-            "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
-            "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
-            "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),
-            "gusts": None if self.gusts is None else self.gusts.summary,
-        }
 
-
-def of_no_body(vehicle: VehicleGroup) -> tuple[str, ...]:
+def of_no_body(model: VehicleModel) -> tuple[str, ...]:
     """Name the moments of inertia of a vehicle that are those of no body of its mass between its rotors."""
-    pairs = zip(INERTIA_PARAMETERS[:3], vehicle.inertia.tolist(), strict=False)
+    vehicle = model.vehicle
+    pairs = zip(INERTIA_PARAMETERS[:3], vehicle.inertia_kg_m2, strict=False)
     moments = {f"inertia.{name}": value for name, value in pairs}
     excess = {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
-    wrong = {*beyond_any_body(vehicle.mass, vehicle.rotor.position, moments), *excess}
+    hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
+    wrong = {*beyond_any_body(vehicle.mass_kg, hubs, moments), *excess}
     return tuple(name for name in moments if name in wrong)
 
 
-@record
-class ModelRecord(Record):
-    """What every artifact `cpfls/model` holds, whoever found it."""
+class AnyModel:
+    """What every model of a vehicle answers, whoever found it."""
 
-    FORMAT: ClassVar = Format(
-        "cpfls/model", "a model of a vehicle, and how it was found", "identify, extend, gap, vehicle"
-    )
-
-    vehicle: VehicleGroup = group()
-    learned: LearnedGroup | None = group(default=None)
+    MADE_BY: ClassVar[str]
+    """Command that makes it."""
+    if TYPE_CHECKING:
+        # Of a result it is a field, whose kind the class says that has it.
+        model: VehicleModel
 
     @property
     def learned_from(self) -> tuple[LearnedFlight, ...]:
         """Flights that it was found in, those of what it was built on among them."""
-        # What is not written yet knows no files.
-        return () if self.header is None else learned_in(self.header.inputs, self.learned, "flight")
+        return ()
+
+    @property
+    def chosen_on(self) -> frozenset[str]:
+        """Hashes of the flights that it was chosen on, among several."""
+        return frozenset()
 
     @property
     def trust(self) -> str:
@@ -359,11 +328,30 @@ class ModelRecord(Record):
         """Numbers of it that no such vehicle has, by the names of a fit."""
         return ()
 
+
+@record
+class ModelRecord(Record, AnyModel):
+    """What every artifact `cpfls/model` holds, until it is a result."""
+
+    FORMAT: ClassVar = Format("cpfls/model", "a model of a vehicle, and how it was found", "identify, extend, gap")
+
+    vehicle: VehicleGroup = group()
+    learned: LearnedGroup | None = group(default=None)
+
+    @cached_property
+    def model(self) -> VehicleModel:  # type: ignore[override]
+        """The model."""
+        from cpfls_cli.artifacts.rebuilt import vehicle_model
+
+        return vehicle_model(self.vehicle)
+
+    @property
+    def learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that it was found in, those of what it was built on among them."""
+        # What is not written yet knows no files.
+        return () if self.header is None else learned_in(self.header.inputs, self.learned, "flight")
+
     @property
     def provenance(self) -> dict[str, Any]:
         """How far to trust it and what it learned from, for machines."""
-        flights = [
-            {"name": flight.file.name, "sha256": flight.file.sha256, "samples": flight.samples, "of": flight.of}
-            for flight in self.learned_from
-        ]
-        return {"trust": str(self.trust), "learned_from": flights}
+        return {"trust": str(self.trust), "learned_from": [flight._asdict() for flight in self.learned_from]}

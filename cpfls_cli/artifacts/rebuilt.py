@@ -12,20 +12,14 @@ import numpy as np
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import ObserverGroup, VehicleRecord
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.playback.gusts import RANGES, GustRanges
-from cpfls_cli.playback.history import Observer
-from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.spread import Estimates
 from cpfls_cli.playback.table import Remainder
-from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 
@@ -51,37 +45,6 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
         hold=None if group.response.hold == USUAL else group.response.hold,  # type: ignore[arg-type]
         repairs=None if group.repair is None else audit(group.repair),
         gusts=None if group.gusts is None else group.gusts.gusts(),
-    )
-
-
-def observer(group: ObserverGroup, past_s: float) -> Observer:
-    """Rebuild the observer of a forecast that uses so much of the past."""
-    return Observer(rate=group.rate, memory_s=group.memory, past_s=past_s)
-
-
-def estimates(record: VehicleRecord) -> Estimates:
-    """Rebuild what flights say of the numbers of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If the artifact is of before correlations were written.
-    """
-    if record.correlation is None:
-        raise InputError(
-            "holds intervals of single numbers, but not how they go together: it was made by an earlier version; run "
-            "`cpfls vehicle` again"
-        )
-    # Where instruments tell the constants no loop has widened their intervals.
-    told, gusts = record.instruments is not None, record.disturbance
-    loop = np.ones((2, 3)) if told else np.array([np.fmin(record.loop.low, 1.0), np.fmax(record.loop.high, 1.0)])
-    return Estimates(
-        numbers=[FoundNumber(**row) for row in rows_of(record.found)],
-        correlation=record.correlation,
-        blocks=record.blocks,
-        loop=loop,
-        gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
-        lack=None if gusts is None or gusts.lack is None else Lack(**vars(gusts.lack)),
     )
 
 

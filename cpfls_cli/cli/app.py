@@ -11,27 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cpfls_cli.arguments import (
-    AnywayOption,
     ArtifactsArgument,
-    ChooseOnOption,
     DiagnosisArgument,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
-    FlightsArgument,
-    HeldOutOption,
     LogsArgument,
     ModelOption,
-    ResumeOption,
-    ResumeSweepOption,
-    SchedulerOption,
-    SweepTimeLimitOption,
-    TimeLimitOption,
-    TrainingArgument,
-    ValidateOption,
-    WorkersOption,
-    WriteConfigOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -138,82 +125,6 @@ def init(
         return command.run(job, logs, stated)
 
     _run_without_config("init", output, common, call)
-
-
-@_command()
-def identify(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    selection: Annotated[
-        Path | None,
-        typer.Option(
-            "--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."
-        ),
-    ] = None,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeOption = False,
-    time_limit: TimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify a model from one or more flights and judge it beside its baselines."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, selection, validate or [], options, choose_on or [])
-
-    _run("identify", config, output, common, call)
-
-
-@_command()
-def sweep(
-    config: ConfigArgument,
-    flights: TrainingArgument,
-    output: OutputOption,
-    validate: ValidateOption = None,
-    choose_on: ChooseOnOption = None,
-    resume: ResumeSweepOption = False,
-    time_limit: SweepTimeLimitOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Identify with several settings, and with several seeds each."""
-
-    def call(command: Any, job: Job) -> Any:
-        options = command.SearchOptions(resume, time_limit, workers, scheduler)
-        return command.run(job, flights, validate or [], options, choose_on or [])
-
-    _run("sweep", config, output, common, call)
-
-
-@_command()
-def vehicle(
-    config: ConfigArgument,
-    flights: FlightsArgument,
-    output: OutputOption,
-    held_out: HeldOutOption = None,
-    resume: ResumeOption = False,
-    write_config: WriteConfigOption = None,
-    anyway: AnywayOption = False,
-    *,
-    common: Common,
-) -> None:
-    """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
-    if anyway:
-        # The artifact holds it with its config.
-        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
-
-    def call(command: Any, job: Job) -> Any:
-        copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
-        return command.run(job, flights, held_out or [], copy, resume=resume)
-
-    _run("vehicle", config, output, common, call)
 
 
 @_command()
@@ -365,7 +276,7 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     """Load the study, run one command, given as its module, with a progress bar, and print what it says."""
     with messages_for_errors():
         narration = _narration(title, common)
-        study = common.study(config, sweep=title == "sweep")
+        study = common.study(config)
         narration.reads(config)
 
         def with_numbers(command: Any, job: Job) -> Outcome:

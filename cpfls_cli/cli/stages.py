@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -131,12 +131,13 @@ def run_of(
     from cpfls_cli.config.load import validate
     from cpfls_cli.stage import Run
 
-    study = common.study(config) if config else validate({}, "default")
+    study = common.study(config, sweep=own.name == "sweep") if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
     if config:
         reads(config)
         run.inputs.append(config)
+        run.data = partial(common.data, config)
         run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
         if common.numbers is not None:
             run = import_module("cpfls_cli.commands.numbers").with_numbers_of(run, common.numbers)

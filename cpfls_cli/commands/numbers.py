@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from cpfls_cli.artifacts.job import Job, require_numbers
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import log_formats
-from cpfls_cli.flights.models import is_vehicle, with_found_numbers
+from cpfls_cli.flights.models import any_model, is_found, is_model, is_vehicle, with_found_numbers
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.report.outcome import Command
@@ -23,6 +21,11 @@ J = TypeVar("J", bound=Job)
 
 _ARDUPILOT = "bin"
 """Format of the logs that ArduPilot writes."""
+
+
+def cautions_in(path: Path) -> tuple[str, ...]:
+    """Say what speaks against the use of the model in a file."""
+    return cautions_of(any_model(path), path.name, read_header(path).cautions)
 
 
 def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = False) -> J:
@@ -41,9 +44,9 @@ def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = Fals
         If nobody says what the config leaves open.
     """
     given = None if model is None or is_vehicle(model) or not model.is_file() else model
-    if given is not None and holds(given, ModelRecord):
-        job.cautions.update(dict.fromkeys(cautions_of(read_record(given, ModelRecord), given.name)))
-    if given is not None and job.study.vehicle.unknown and holds(given, VehicleRecord):
+    if given is not None and is_model(given):
+        job.cautions.update(dict.fromkeys(cautions_in(given)))
+    if given is not None and job.study.vehicle.unknown and is_found(given):
         job.found = given
         if not whole:
             return _with_found(job, given)
@@ -59,13 +62,13 @@ def with_numbers_of(job: J, found: Path) -> J:
     InputError
         If it is no vehicle that was found.
     """
-    if not (found.is_file() and holds(found, VehicleRecord)):
+    if not (is_found(found)):
         raise InputError(f"--model {found}: is not a vehicle that `cpfls vehicle` found")
     open_ = [name.replace("_", " ") for name in job.study.vehicle.unknown]
     if not open_:
         job.cautions[f"--model {found.name}: not used; the config states all numbers of the vehicle"] = None
         return job
-    job.cautions.update(dict.fromkeys(cautions_of(read_record(found, VehicleRecord), found.name)))
+    job.cautions.update(dict.fromkeys(cautions_in(found)))
     job.cautions[f"{joined(open_)}: null in the config, taken from {found.name}"] = None
     return _with_found(job, found)
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.store import Outline, findings_of, read_any, read_outline, read_record
+from cpfls_cli.artifacts.store import Outline, findings_of, read_any, read_outline
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.models import any_model, is_model
 from cpfls_cli.pages.trust import stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
@@ -24,7 +24,6 @@ _FINDINGS_SHOWN = 8
 _CAUTION = "caution"
 _PAGES = {
     "cpfls/model": "model",
-    "cpfls/sweep": "sweep",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 
@@ -52,9 +51,7 @@ def info(path: Path) -> Outcome:
     record = read_any(path)
     if not isinstance(record, ModelRecord):
         return Outcome(summary, tuple(_answered(artifact, record, path)), next=followed)
-    gusts = record.vehicle.gusts
-    told = record.provenance | ({} if gusts is None else {"gusts": gusts.summary})
-    return Outcome(summary | told, tuple(_answered(artifact, record, path, trust_facts(record))))
+    return Outcome(summary | record.provenance, tuple(_answered(artifact, record, path, trust_facts(record))))
 
 
 def _answered(artifact: Outline, record: Record, path: Path, more: Sequence[tuple[str, str]] = ()) -> Iterator[Block]:
@@ -117,12 +114,12 @@ def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     if stage := stage_of(path):
         made = import_module("cpfls_cli.stage").loaded(stage).kind
-        name, kind, findings = made.FORMAT, None, findings_in(path, made)
+        name, findings = made.FORMAT, findings_in(path, made)
     else:
         spec, findings = findings_of(path)
-        name, kind = spec.name, None if findings else record_of_format(spec.name, spec.kind)
+        name = spec.name
     summary = {"file": str(path), "format": name, "good": not findings, "findings": findings}
-    stopped = stopped_words(read_record(path, kind)) if kind is not None and issubclass(kind, ModelRecord) else ""
+    stopped = "" if findings or not is_model(path) else stopped_words(any_model(path))
     good = f"keeps to its format ({name}), but its search was {stopped}" if stopped else f"good ({name})"
     summary |= {"stopped": stopped} if stopped else {}
     said = [Text(f"{path}: {finding}") for finding in findings] or [Text(f"{path}: {good}")]

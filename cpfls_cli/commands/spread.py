@@ -7,17 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import write_files
-from cpfls_cli.artifacts.rebuilt import estimates
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
+from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
 from cpfls_cli.pages.export import spread_answer, spread_summary
-from cpfls_cli.playback.spread import drawn, require_sure
+from cpfls_cli.playback.spread import Estimates, drawn, require_sure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
@@ -27,15 +24,15 @@ def run(job: Job, model: Path, count: int, seed: int, *, anyway: bool = False) -
     ending = require_ending(str(job.output), job.output.suffix)
     source = take_inputs(job, {"model": model})["model"]
     check_outputs(job, job.output)
-    record = read_record(model, ModelRecord)
-    if not isinstance(record, VehicleRecord):
+    if is_model(model) and not is_found(model):
         raise InputError(
-            f"{model}: is a model of `cpfls {record.FORMAT.made_by}`, which holds no covariance of its numbers; "
+            f"{model}: is a model of `cpfls {any_model(model).MADE_BY}`, which holds no covariance of its numbers; "
             "`cpfls vehicle` finds a vehicle with one"
         )
+    record = found_vehicle(model)
     sheet = sheet_of(model, identifier(model.stem), source, force=job.force, anyway=anyway)
     with about(model, InputError, ComputationError):
-        require_sure(known := estimates(record))
+        require_sure(known := Estimates.of(record))
         if job.dry_run:
             return _nothing_written(job, model, count)
         spread = drawn(sheet.model, known, count, np.random.default_rng(seed))
@@ -45,8 +42,8 @@ def run(job: Job, model: Path, count: int, seed: int, *, anyway: bool = False) -
         spread=spread,
         numbers=numbers,
         seed=seed,
-        untold=record.untold,
-        held=record.guess or (),
+        untold=record.not_determined,
+        held=record.guessed,
     )
     written = samples.written(ending)
     write_files({job.output: written})

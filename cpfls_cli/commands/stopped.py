@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.errors import ComputationError, CpflsError, StoppedError
 from cpfls_cli.identification.search import StopReason, is_end
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}
 _REMEDY = "the same command with --resume goes on"
 _FROM_SIGNAL = 128
 
 
-def stopped(
-    outcome: Outcome, reason: StopReason, signal: int | None, output: Path, *, unjudged: str | None = None
-) -> Outcome:
-    """Add to what is said of a result that a signal or the time limit came before all was done, and what is kept.
+def stop_note(
+    reason: StopReason, signal: int | None, output: Path, *, unjudged: str | None = None
+) -> tuple[Text | None, int]:
+    """Say that a signal or the time limit came before all was done, and what is kept; None where nothing came.
 
     After a signal the exit code is the one that a shell gives a program that it ended. `unjudged` is the option with
     which the command judges a whole model that the signal left without evidence.
@@ -26,15 +24,14 @@ def stopped(
     if not is_end(reason):
         note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
     elif signal is None:
-        return outcome
+        return None, 0
     elif unjudged is not None:
         note = (
             f"{output}: was found but not judged, because of the interrupt; the same command with {unjudged} judges it"
         )
     else:
         note = f"{output}: is complete; the interrupt came when there was nothing left to stop"
-    code = 0 if signal is None else _FROM_SIGNAL + signal
-    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning", always=True)), exit_code=code)
+    return Text(note, "warning", always=True), 0 if signal is None else _FROM_SIGNAL + signal
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:

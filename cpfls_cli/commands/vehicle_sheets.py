@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
+from cpfls_cli.artifacts.check import Origin
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.spec import InputFile, rows_of
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.model import AnyModel
+from cpfls_cli.artifacts.spec import Header, InputFile, rows_of
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.flights.models import rebuilt
+from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.export import identified_evidence, identified_warnings
 from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -29,8 +30,8 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
 
     Numbers that no vehicle has need `anyway`, which does for the others too.
     """
-    record = read_record(path, ModelRecord)
-    sheet = _bare_sheet(path, record)
+    record = any_model(path)
+    sheet = _bare_sheet(path, record, read_header(path))
     if isinstance(sheet.model.fuzzy, InertiaFunctions):
         _require_usable(sheet.model.fuzzy, path)
     if sheet.impossible and not anyway:
@@ -42,7 +43,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
     if not (sheet.complete or force):
         raise InputError(
             f"{path}: the search for this model did not come to its end ({sheet.stopped}); "
-            f"`cpfls {record.FORMAT.made_by} ... --resume` goes on, --anyway exports the model as it is, marked as "
+            f"`cpfls {record.MADE_BY} ... --resume` goes on, --anyway exports the model as it is, marked as "
             "incomplete"
         )
     if sheet.verdict == "do-not-use" and not force:
@@ -50,48 +51,48 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
     return replace(sheet, name=name, file=path.name, sha256=file.sha256)
 
 
-def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
+def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin | Header) -> Sheet:
     """Put a model on a sheet that has no name yet."""
     return Sheet(
         "",
         model,
         tuple(worth_in_words(record)),
-        record.origin,
+        origin,
         "",
         "",
         verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
         stopped=record.stopped or None,
-        cautions=() if isinstance(record, IdentifiedRecord) else (*record.origin.cautions, *against(record)),
-        evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
+        cautions=() if isinstance(record, IdentifiedModel) else (*origin.cautions, *against(record)),
+        evidence=identified_evidence(record) if isinstance(record, IdentifiedModel) else {},
         impossible=impossible_in_words(record),
     )
 
 
 def _require_usable(functions: InertiaFunctions, path: Path) -> None:
     """Refuse what no other program could evaluate."""
-    where = f"{path}: vehicle/inertia_functions"
+    where = f"{path}: model/fuzzy"
     if functions.visited.shape != (CELLS, CELLS):
         raise InputError(f"{where}/visited: is {functions.visited.shape}, not {(CELLS, CELLS)}; identify it again")
     for partition, peaks in zip(functions.structure.partitions, functions.partitions, strict=True):
         if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
-            raise InputError(f"{where}/breakpoints: those of {partition.name} make no partition; identify it again")
+            raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
 
 
-def _bare_sheet(path: Path, record: ModelRecord) -> Sheet:
+def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
-    model = rebuilt(path, record)
+    model = modelled(path, record)
     beside = model.beside_table
     held = tuple(each for each in model.effects if each.name not in beside)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
-    sheet = bare_sheet(record, still)
-    if isinstance(record, IdentifiedRecord):
-        return replace(sheet, warnings=tuple(identified_warnings(record, path)))
+    sheet = bare_sheet(record, still, origin)
+    if isinstance(record, IdentifiedModel):
+        return replace(sheet, warnings=tuple(identified_warnings(record, origin.config, path)))
     outside = tuple(_missing(record, (*model.filters, *model.along)))
     floor = tuple(record.gap.floor.tolist()) if isinstance(record, ExtendedRecord) else sheet.floor
     return replace(sheet, outside=outside, wind=model.wind, floor=floor)
 
 
-def _missing(record: ModelRecord, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
+def _missing(record: AnyModel, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
     """List effects that no table of weights holds, with their sizes along held-out flights where these are known."""
     left_out = record.left_out if isinstance(record, ExtendedRecord) else None
     known = {} if left_out is None else {row["name"]: row for row in rows_of(left_out)}

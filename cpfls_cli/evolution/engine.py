@@ -27,28 +27,26 @@ from cpfls_cli.evolution.operators import (
 )
 from cpfls_cli.evolution.ranking import rank
 from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most
 
 End = Literal["generations", "converged"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class History:
-    """Course of the search, one row for each generation from the initial population on.
+    """Course of the search, one row for each generation from the initial population on."""
 
-    Attributes
-    ----------
-    evaluations : array of int, shape (generations + 1,)
-        Chromosomes evaluated so far.
-    best : array, shape (generations + 1, objectives)
-        Best of each objective so far; +inf where none had a finite value.
-    front_size : array of int, shape (generations + 1,)
-        Members of the Pareto front so far.
-    """
-
-    evaluations: IntArray
-    best: Array
-    front_size: IntArray
+    evaluations: IntArray = about("chromosomes evaluated so far", "generation", brief=False)
+    best: Array = about(
+        "best of each objective so far; infinite where none had a value",
+        "generation",
+        "3",
+        unit="SI",
+        gaps=True,
+        brief=False,
+    )
+    front_size: IntArray = about("members of the Pareto front so far", "generation", brief=False)
 
     def __len__(self) -> int:
         """Count the rows."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import GustsGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL
@@ -24,8 +23,10 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
 
+_WHITE = ("torque_white_n_m_sqrt_s", "force_white_n_sqrt_s")
 FORMAT, VERSION = "cpfls/model-json", 2
 _ANGLES = ("roll", "pitch")
 
@@ -129,7 +130,7 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "factors_of_products": FACTORS.tolist(),
         "gusts": None
         if sheet.model.gusts is None
-        else {**GustsGroup.of(sheet.model.gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE},
+        else {**_gusts(sheet.model.gusts), "frame": BODY, "how_to_play": GUST_RECIPE},
         "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
         "learned": None
         if learned is None
@@ -155,6 +156,15 @@ def _structure(model: InertiaFunctions) -> dict[str, Any]:
         "base": base_of(model),
         "membership_functions": {p.name: p.functions for p in structure.partitions},
         "parameters": structure.parameters,
+    }
+
+
+def _gusts(gusts: Gusts) -> dict[str, Any]:
+    names = ("torque_n_m", "force_n"), ("torque_memory_s", "force_memory_s"), _WHITE
+    return {
+        name: part.tolist()
+        for pair, values in zip(names, gusts, strict=True)
+        for name, part in zip(pair, values.reshape(2, 3), strict=True)
     }
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
 
-from cpfls_cli.artifacts.scores import TRAINING
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import format_name, read_header
 from cpfls_cli.config.study import Study
@@ -15,6 +14,7 @@ from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.training import flight_roles
 from cpfls_cli.identification.data import TorqueSource, joined
+from cpfls_cli.identification.scores import TRAINING
 from cpfls_cli.logs.formats import is_log
 
 

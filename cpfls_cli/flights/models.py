@@ -1,35 +1,92 @@
-"""Models that are given to a command: read, of the vehicle of the config, and rebuilt."""
+"""Models that are given to a command: which model a file is, read, of the vehicle of the config."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from cpfls_cli import store
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel, require_whole
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.rebuilt import observer, vehicle_model
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.model import AnyModel, ModelRecord
+from cpfls_cli.artifacts.store import format_name, read_record
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError, about
-from cpfls_cli.flights.same_vehicle import read_of_vehicle, with_numbers_of
+from cpfls_cli.effects.registry import effect
+from cpfls_cli.errors import InputError, SettingError, about
+from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
 
 
+def identified_in(path: Path) -> IdentifiedModel:
+    """Read an identified model."""
+    try:
+        made = store.read(path, IdentifiedModel)[0]
+    except SettingError as error:
+        raise InputError(f"{path}: model/fuzzy/structure: {error}") from None
+    require_whole(path, made.functions)
+    return made
+
+
+_READ: Mapping[str, Callable[[Path], AnyModel]] = {
+    ModelRecord.FORMAT.name: lambda path: read_record(path, ModelRecord),
+    Vehicle.FORMAT: lambda path: store.read(path, Vehicle)[0],
+    IdentifiedModel.FORMAT: identified_in,
+}
+"""What reads a model, by the format of its file."""
+MAKERS = "`cpfls identify`, `cpfls extend`, `cpfls gap` or `cpfls vehicle`"
+
+
+def is_model(path: Path) -> bool:
+    """Tell whether a file is a model, whoever found it."""
+    return path.is_file() and format_name(path) in _READ
+
+
+def is_found(path: Path) -> bool:
+    """Tell whether a file is a vehicle that was found in flights."""
+    return path.is_file() and format_name(path) == Vehicle.FORMAT
+
+
+def is_identified(path: Path) -> bool:
+    """Tell whether a file is an identified model."""
+    return path.is_file() and format_name(path) == IdentifiedModel.FORMAT
+
+
+def any_model(path: Path) -> AnyModel:
+    """Read which model a file is: identified, extended, or a vehicle that was found."""
+    held = format_name(path)
+    if held is None or held in _READ:
+        # Of what is no artifact the usual words say why.
+        return _READ.get(held or "", _READ[ModelRecord.FORMAT.name])(path)
+    raise InputError(f"{path}: is a {held}; this command needs a model (made by {MAKERS})")
+
+
+def model_of_vehicle(path: Path, study: Study) -> AnyModel:
+    """Read a model of the vehicle of a study."""
+    record = any_model(path)
+    require_vehicle_of(path, study)
+    return record
+
+
+def found_vehicle(path: Path) -> Vehicle:
+    """Read a vehicle that was found in flights."""
+    return store.read(path, Vehicle)[0]
+
+
 def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleModel:
     """Read any model of the vehicle of a study, or take the vehicle itself for the word `VEHICLE`.
 
-    To forecast along logged rotor speeds, a model for that is taken where the file holds one beside the vehicle.
+    To forecast along logged rotor speeds, a model for that is taken where the file holds one apart from the vehicle.
     """
     if is_vehicle(path):
         return VehicleModel(vehicle=study.vehicle)
-    record = read_of_vehicle(path, ModelRecord, study)
-    apart = record.forecast if forecast and isinstance(record, VehicleRecord) else None
-    return rebuilt(path, record if apart is None else replace(record, vehicle=apart))
+    record = model_of_vehicle(path, study)
+    apart = record.forecast if forecast and isinstance(record, Vehicle) else None
+    return apart or modelled(path, record)
 
 
 def with_found_numbers(study: Study, path: Path) -> Study:
@@ -37,40 +94,38 @@ def with_found_numbers(study: Study, path: Path) -> Study:
 
     They stay among its unknown ones: a flight of the config is one of this vehicle, whatever stands for them.
     """
-    found = read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle()
+    found = model_of_vehicle(path, study).model.vehicle
     return study.model_copy(update={"vehicle": with_numbers_of(study.vehicle, found)})
 
 
 def read_observer(path: Path, past_s: float) -> Observer:
     """Read the observer by which the forecast of a model uses so much of the flight before a start."""
-    known = not is_vehicle(path) and holds(path, VehicleRecord)
-    held = read_record(path, VehicleRecord).history if known else None
+    held = found_vehicle(path).history if is_found(path) else None
     if held is None:
         raise InputError(
             f"{path}: holds no forecast that uses the past, which --history asks for; `cpfls vehicle` finds one if "
             "playback.history_s is above 0 and the past helps on held-out parts of the flights; or leave out "
             "--history"
         )
-    return observer(held, past_s)
+    return replace(held, past_s=past_s)
 
 
 def read_fading(path: Path) -> float | None:
     """Read how fast body rates fade in the flights that a model was found in, s; None where its file does not know."""
-    record = None if is_vehicle(path) else read_record(path, ModelRecord)
+    record = None if is_vehicle(path) else any_model(path)
     if isinstance(record, ExtendedRecord):
         return None if record.playback is None else record.playback.fading_s
-    return record.fading_s if isinstance(record, VehicleRecord) else None
+    return record.fading_s if isinstance(record, Vehicle) else None
 
 
 def holds_forecast(path: Path) -> bool:
-    """Tell whether a model holds a forecast along logged rotor speeds beside the vehicle."""
-    known = not is_vehicle(path) and holds(path, VehicleRecord)
-    return known and read_record(path, VehicleRecord).forecast is not None
+    """Tell whether a model holds a forecast along logged rotor speeds apart from the vehicle."""
+    return is_found(path) and found_vehicle(path).forecast is not None
 
 
 def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
     """List the flights that a model learned from: none by the vehicle of the config."""
-    return () if path is None or is_vehicle(path) else read_record(path, ModelRecord).learned_from
+    return () if path is None or is_vehicle(path) else any_model(path).learned_from
 
 
 def read_base(path: Path | None, study: Study) -> VehicleModel:
@@ -78,15 +133,19 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
     rigid = VehicleModel(vehicle=study.vehicle)
     if path is None:
         return rigid
-    if holds(path, VehicleRecord):
+    if is_found(path):
         return read_model(path, study)
-    return replace(rigid, fuzzy=rebuilt(path, read_of_vehicle(path, IdentifiedRecord, study)).fuzzy)
+    record = identified_in(path)
+    require_vehicle_of(path, study)
+    return replace(rigid, fuzzy=record.functions)
 
 
-def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
-    """Rebuild the model of a record; the path is for messages."""
+def modelled(path: Path, record: AnyModel) -> VehicleModel:
+    """Take the model out of what a file holds; the path is for messages."""
     with about(path, InputError):
-        return vehicle_model(record.vehicle)
+        for each in record.model.effects:
+            effect(each.name)
+        return record.model
 
 
 def is_vehicle(path: Path) -> bool:

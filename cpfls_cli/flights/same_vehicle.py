@@ -35,17 +35,21 @@ def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSett
 def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
     """Read an artifact that must have been made with the vehicle of the config."""
     record = read_record(path, wanted)
-    made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
-    require_same_vehicle(path, made_with, study.vehicle)
+    require_vehicle_of(path, study)
     return record
 
 
 def read_result_of_vehicle(path: Path, wanted: type[T], study: Study) -> tuple[T, Origin]:
     """Read a result that must have been made with the vehicle of the config, and where it comes from."""
     given, origin = read(path, wanted)
-    made_with = _with_what_was_open(_vehicle_of(path, origin), study.vehicle)
-    require_same_vehicle(path, made_with, study.vehicle)
+    require_vehicle_of(path, study)
     return given, origin
+
+
+def require_vehicle_of(path: Path, study: Study) -> None:
+    """Refuse a file that was not made with the vehicle of the config."""
+    made_with = _with_what_was_open(_vehicle_of(path, read_header(path)), study.vehicle)
+    require_same_vehicle(path, made_with, study.vehicle)
 
 
 def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:

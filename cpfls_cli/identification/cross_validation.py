@@ -14,6 +14,7 @@ from cpfls_cli.identification.data import sample_times
 from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import RidgeSettings
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled
 
 SMALLEST_ERROR = 1e-12
@@ -36,24 +37,14 @@ class Blocks:
     left_out: BoolArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RidgeCurve:
-    """Cross-validated error over the ridge weight; other fields are described at `RidgeGroup`.
+    """Cross-validated error over the ridge weight."""
 
-    Attributes
-    ----------
-    weight : array, shape (tried,)
-        Ascending; the last is infinite: the fuzzy part is off.
-    error : array, shape (tried,)
-        Mean squared error of the scaled torque over all blocks.
-    chosen : int
-        The largest weight whose error lies within one standard error of the smallest.
-    """
-
-    weight: Array
-    error: Array
-    standard_error: Array
-    chosen: int
+    weight: Array = about("ridge weights tried; the last is infinite: the fuzzy part is off", "tried", gaps=True)
+    error: Array = about("cross-validated error of the scaled torque", "tried")
+    standard_error: Array = about("its standard error over blocks", "tried")
+    chosen: int = about("index of the largest weight within one standard error of the least error")
 
 
 def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float) -> Blocks:

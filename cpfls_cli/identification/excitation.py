@@ -16,6 +16,7 @@ from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.solver import regressor_blocks
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.result import about
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
 # A rule that never fires by more adds nothing to a torque; half of its directions known are a surface, if a rough one.
@@ -24,13 +25,13 @@ _SILENT_FIRING, _DETERMINED_SHARE = 1e-3, 0.5
 _CLEARLY = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RuleExcitation:
-    """Excitation of each rule by data; its fields are described at `RulesGroup`."""
+    """Excitation of each rule by data."""
 
-    name: tuple[str, ...]
-    firing: Array
-    determined: Array
+    name: tuple[str, ...] = about("inertia function and rule", "rule")
+    firing: Array = about("largest firing strength in training", "rule")
+    determined: Array = about("share of the rule's coefficients that data determine", "rule")
 
     @property
     def excited(self) -> BoolArray:

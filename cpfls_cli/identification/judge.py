@@ -20,7 +20,7 @@ Columns = Callable[[Motion], Array]
 
 @dataclass(frozen=True)
 class Score:
-    """Scores of a torque prediction; other fields are described at `JudgedGroup`.
+    """Scores of a torque prediction; other fields are described at `Judged`.
 
     Attributes
     ----------

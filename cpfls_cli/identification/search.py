@@ -17,6 +17,7 @@ from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import Choice, IdentificationSettings
+from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled
 from cpfls_cli.workers.employ import employ
 from cpfls_cli.workers.workforce import Workforce, gathered
@@ -110,14 +111,22 @@ UNWATCHED = SearchRun()
 """From the start to the end, one chromosome after the other."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Front:
-    """Non-dominated chromosomes of the whole search; its fields are described at `FrontGroup`."""
+    """Non-dominated chromosomes of the whole search."""
 
-    chromosomes: IntArray
-    objectives: Array
-    chosen: int
-    held_out: Array | None = None
+    chromosomes: IntArray = about("16-bit weights", "member", "gene", brief=False)
+    objectives: Array = about(
+        "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
+        "member",
+        "3",
+        unit="SI",
+        brief=False,
+    )
+    chosen: int = about("index of the chosen member")
+    held_out: Array | None = about(
+        "mean squared error on the flights kept for the choice", "member", unit="SI", gaps=True, default=None
+    )
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,13 @@ def load_model(path: str | os.PathLike[str], config: str | os.PathLike[str] | No
     InputError
         If the file is no good model; the message says why.
     """
-    from cpfls_cli.artifacts.model import ModelRecord
+    from cpfls_cli.artifacts.model import AnyModel
     from cpfls_cli.config.load import load_study, validate
+    from cpfls_cli.flights.models import MAKERS
 
     artifact = read(path)
-    if artifact.format != ModelRecord.FORMAT.name:
-        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {ModelRecord.spec().makers}")
+    if not isinstance(artifact._record, AnyModel):
+        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {MAKERS}")
     study = validate(artifact.config, f"{path}: /config") if config is None else load_study(Path(config))
     return Model(artifact.path, study, artifact)
 
@@ -298,13 +299,13 @@ class Model:
     @cached_property
     def _whole(self) -> VehicleModel:
         """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
-        from cpfls_cli.flights.models import rebuilt
+        from cpfls_cli.flights.models import modelled
         from cpfls_cli.playback.model import VehicleModel
 
         if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
-        model = rebuilt(self._path, record)
+        model = modelled(self._path, record)
         if model.beside_table:
             parts = ", ".join(model.beside_table)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")

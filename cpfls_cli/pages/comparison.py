@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter, parameters_of
-from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.model import AnyModel
+from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.load import flat_keys
+from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING
 from cpfls_cli.pages.identification import TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import model_words, trust_words
@@ -52,7 +52,7 @@ _ABSENT = "not there"
 _LEFT_OUT = ("report",)
 _BEYOND = "beyond both intervals"
 
-_Model = Source[IdentifiedRecord]
+_Model = Source[IdentifiedModel]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def judged_on(models: Sequence[_Model]) -> list[JudgedOn]:
 
 def _parts(model: _Model) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
     """Name each part, what tells it from all others, and the flights that it is taken from."""
-    inputs = model.record.origin.inputs
+    inputs = model.header.inputs
     learned = tuple(file.sha256 for role, file in inputs.items() if role.split("-")[0] == "flight")
     others = sorted((role for role in inputs if role.startswith("validate-")), key=lambda role: int(role.split("-")[1]))
     settings = model.config["identification"]
@@ -194,7 +194,7 @@ def _cell(text: str, error: float, least: float) -> Cell:
 
 def _words(model: _Model) -> tuple[str, ...]:
     record = model.record
-    size = (count(record.solve.parameters), number(record.solve.condition_number, 4))
+    size = (count(record.parameters), number(record.condition_number, 4))
     return (model.label, trust_words(record.trust).short, *size)
 
 
@@ -374,7 +374,7 @@ def compared_vehicles_section(sources: Sources) -> Section | None:
 
 def model_verdicts(sources: Sources) -> Iterator[Block]:
     """Say in a word how far to trust each model, and which constants of several vehicles differ."""
-    models = sources.of_kind(ModelRecord)
+    models = sources.of_kind(AnyModel)
     if models:
         yield _judged(models)
     if len(sources.vehicles) > 1:
@@ -387,9 +387,9 @@ def _judged(models: Sequence[Source[Any]]) -> Facts:
     return Facts([(model.label, model_words(model.record).sentence) for model in models])
 
 
-def _constants(vehicles: Sequence[Source[VehicleRecord]]) -> Iterator[list[Parameter | None]]:
+def _constants(vehicles: Sequence[Source[Vehicle]]) -> Iterator[list[Parameter | None]]:
     """Give each constant that one vehicle or more has, of all of them."""
-    listed = [{each.key: each for each in parameters_of(vehicle.record) if each.needed} for vehicle in vehicles]
+    listed = [{key: each for key, each in vehicle.record.parameters.items() if each.needed} for vehicle in vehicles]
     yield from ([own.get(key) for own in listed] for key in FOUND_AS if any(key in own for own in listed))
 
 
@@ -409,6 +409,6 @@ def _with_interval(parameter: Parameter | None) -> str:
         return UNKNOWN
     value = number(parameter.value, 4)
     if parameter.low is None or parameter.high is None:
-        return f"{value} ({parameter.told})"
+        return f"{value} ({parameter.identified})"
     span = f"{value}, {number(parameter.low, 3)} to {number(parameter.high, 3)}"
     return span if parameter.determined else f"({span})"

@@ -2,33 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
-from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
+from cpfls_cli.playback.gusts import GustAxis
+from cpfls_cli.report.content import Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-
-
-def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
-    """Say how large the gusts of the flights are and how long they last, as far as that is known."""
-    if record.disturbance is None:
-        if (record.loop.shown or record.loop.misses) and record.instruments is None:
-            yield Text(
-                "Gusts: their sizes are not known, because the body is not: what its torque leaves unexplained says "
-                "nothing about them."
-            )
-        return
-    axes = list(record.disturbance.axes(record.vehicle.inertia, record.vehicle.mass))
-    yield Text(gust_words(axes, record.disturbance.told_by))
-    if record.vehicle.gusts is not None:
-        yield gust_table(f"vehicle-gusts-{index}", axes, record.disturbance)
 
 
 def still_air_text() -> Text:

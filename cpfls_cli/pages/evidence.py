@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, StructuresGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord, RidgeGroup
-from cpfls_cli.artifacts.scores import AXES, MODEL
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.identification.cross_validation import RidgeCurve
+from cpfls_cli.identification.scores import AXES, MODEL
 from cpfls_cli.pages.identification import TORQUE
 from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.source import Source
@@ -18,6 +18,9 @@ from cpfls_cli.report.canvas import BASELINE, HELD, legend_above, legend_over, p
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import count, number, percent, plain, r_squared
 from cpfls_cli.rounding import at_most
+from cpfls_cli.validation.physical import PeriodErrors, Physics
+from cpfls_cli.validation.replay import StepErrors
+from cpfls_cli.validation.structures import StructureComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +39,7 @@ _STEP_STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def validation_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def validation_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show the verdict on a model and what it rests on."""
     record = model.record
     yield Heading(model.label)
@@ -53,7 +56,7 @@ def validation_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[B
         yield _structures(record.structures, index)
 
 
-def _scores(model: Source[IdentifiedRecord], index: int) -> Table:
+def _scores(model: Source[IdentifiedModel], index: int) -> Table:
     judged = model.record.judged
     rows: list[list[str | Cell]] = []
     for part in judged.parts:
@@ -80,7 +83,7 @@ def _scores(model: Source[IdentifiedRecord], index: int) -> Table:
     return Table(f"scores-{index}", caption, ("Part", "Axis", *_SCORES), rows, frozenset({0, 1}))
 
 
-def _period(record: IdentifiedRecord, period: PeriodGroup, index: int) -> Table:
+def _period(record: IdentifiedModel, period: PeriodErrors, index: int) -> Table:
     rows: list[list[str]] = []
     for part, mse, largest in zip(period.parts, period.mse, period.max_error, strict=True):
         here, largest_here = (record.judged.of_axes(measure, MODEL, part) for measure in ("mse", "max_error"))
@@ -97,7 +100,7 @@ def _period(record: IdentifiedRecord, period: PeriodGroup, index: int) -> Table:
     return Table(f"period-{index}", caption, header, rows, frozenset({0, 1}))
 
 
-def _physics(physics: PhysicsGroup) -> Facts:
+def _physics(physics: Physics) -> Facts:
     roll, pitch = np.degrees(physics.worst_attitude)
     smallest = number(physics.smallest_eigenvalue, 3)
     definite = "in all" if physics.indefinite == 0 else f"not in {physics.indefinite}"
@@ -112,7 +115,7 @@ def _physics(physics: PhysicsGroup) -> Facts:
     )
 
 
-def ridge_sentence(ridge: RidgeGroup) -> str:
+def ridge_sentence(ridge: RidgeCurve) -> str:
     """Say whether the flight holds evidence for an inertia that depends on attitude beyond a rigid body's."""
     off, best = ridge.error[np.isinf(ridge.weight)], int(np.argmin(ridge.error))
     if not off.size:
@@ -135,9 +138,9 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
     return f"{reduction}, {number(ratio, 2)} standard errors: the flight holds evidence for a fuzzy part."
 
 
-def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup) -> Plot:
+def _ridge_figure(name: str, model: Source[IdentifiedModel], ridge: RidgeCurve) -> Plot:
     """Draw the cross-validated error (method.md section 8) over the ridge weight; the last point has no fuzzy part."""
-    weight, error, taken = ridge.weight, ridge.error, model.record.model.ridge_weight
+    weight, error, taken = ridge.weight, ridge.error, model.record.ridge_weight
     finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
     chosen = len(weight) - 1 if np.isinf(taken) else int(np.argmin(np.abs(finite - taken)))
     # The point without a fuzzy part stands a decade beyond the largest weight.
@@ -174,7 +177,7 @@ def _weight_words(weight: float, digits: int) -> str:
     return "fuzzy part off" if np.isinf(weight) else number(weight, digits)
 
 
-def _structures(structures: StructuresGroup, index: int) -> Table:
+def _structures(structures: StructureComparison, index: int) -> Table:
     rows: list[list[str | Cell]] = []
     for candidate, name in enumerate(structures.name):
         error, deviation = float(structures.error[candidate]), float(structures.standard_error[candidate])
@@ -196,7 +199,7 @@ def _structures(structures: StructuresGroup, index: int) -> Table:
     return Table(f"structures-{index}", caption, header, rows, frozenset({0}), frozenset({0}))
 
 
-def steps_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def steps_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show how well a model predicts motion, where that was tried."""
     steps = model.record.steps
     assert steps is not None, "only models that hold them are shown"
@@ -205,7 +208,7 @@ def steps_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]
     yield _steps_table(steps, index)
 
 
-def _steps_figure(name: str, label: str, steps: StepsGroup) -> Plot:
+def _steps_figure(name: str, label: str, steps: StepErrors) -> Plot:
     """Draw errors over the horizon on logarithmic axes, beside the rigid body and beside nothing that moves."""
 
     def draw(figure: Figure) -> None:
@@ -226,7 +229,7 @@ def _steps_figure(name: str, label: str, steps: StepsGroup) -> Plot:
     return plot(name, caption, "Error of predicted attitude and body rate over the horizon, by axis", 4.4, draw)
 
 
-def _draw_steps(panels: list[Axes], steps: StepsGroup, errors: Array) -> None:
+def _draw_steps(panels: list[Axes], steps: StepErrors, errors: Array) -> None:
     from matplotlib.ticker import FuncFormatter
 
     for index, predictor in enumerate(steps.model):
@@ -242,7 +245,7 @@ def _draw_steps(panels: list[Axes], steps: StepsGroup, errors: Array) -> None:
             axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-3)))
 
 
-def _steps_table(steps: StepsGroup, index: int) -> Table:
+def _steps_table(steps: StepErrors, index: int) -> Table:
     last = len(steps.horizon) - 1
     sizes = [scale * np.sqrt(np.sum(getattr(steps, quantity) ** 2, axis=2)) for quantity, _, scale in _STEP_ROWS]
     rows: list[list[str | Cell]] = []

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.parameters import name_of
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.export.samples import Samples
@@ -34,16 +34,16 @@ def export_answer(
     yield from (Text(warning, "warning") for warning in warnings)
 
 
-def identified_evidence(record: IdentifiedRecord) -> dict[str, Any]:
+def identified_evidence(record: IdentifiedModel) -> dict[str, Any]:
     """Say the same for machines."""
     verdict, judged = record.verdict, record.judged
     counts = zip(judged.parts, judged.samples, judged.outside, strict=True)
     stated = None
-    if verdict is not None and verdict.label is not None:
+    if verdict is not None:
         reasons = [{"reason": reason, "speaks": float(speaks)} for reason, speaks in verdict.reasons]
-        stated = {"label": verdict.label, "region": verdict.region or "", "reasons": reasons}
+        stated = {"label": verdict.label, "region": verdict.region, "reasons": reasons}
     return {
-        "stop_reason": record.stop_reason or None,
+        "stop_reason": record.stop_reason,
         "verdict": stated,
         "findings": record.findings,
         "judged": {
@@ -60,12 +60,12 @@ def identified_evidence(record: IdentifiedRecord) -> dict[str, Any]:
     }
 
 
-def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
+def identified_warnings(model: IdentifiedModel, config: str, path: object) -> Iterator[str]:
     """Say what speaks against flying with an identified model."""
     if not model.complete:
         yield "the model is incomplete, and marked as such: do not fly with it"
-    if model.verdict is None or model.verdict.label is None:
-        off = not stored_study(model.origin.config, path).identification.validation.enabled
+    if model.verdict is None:
+        off = not stored_study(config, path).identification.validation.enabled
         why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
         yield (
             f"{path}: holds no verdict ({why}), so nothing says how far to trust it; run `cpfls identify` with "

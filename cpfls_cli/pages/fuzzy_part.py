@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import InertiaFunctionsGroup
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source
@@ -27,7 +27,7 @@ _COLUMNS = 2
 _CLOSE = 0.05
 
 
-def partitions_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def partitions_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show the partitions of a model (Figure 6 of the paper) and its parameters."""
     record = model.record
     if record.fuzzy_part_off:
@@ -39,14 +39,13 @@ def partitions_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[B
     yield Folded(f"Chromosome, breakpoints, inertia and coefficients of {model.label}", list(_tables(record, index)))
 
 
-def _breakpoints(model: InertiaFunctionsGroup) -> dict[str, Array]:
+def _breakpoints(model: InertiaFunctions) -> dict[str, Array]:
     """Group the breakpoints of a model by partition."""
-    names = np.array(model.partition)
-    return {name: model.breakpoints[names == name] for name in dict.fromkeys(model.partition)}
+    return {own.name: peaks for own, peaks in zip(model.structure.partitions, model.partitions, strict=True)}
 
 
-def _tables(record: IdentifiedRecord, index: int) -> Iterator[Table]:
-    weights = [count(weight) for weight in record.model.weights]
+def _tables(record: IdentifiedModel, index: int) -> Iterator[Table]:
+    weights = [count(weight) for weight in record.weights]
     rows = []
     for name, peaks in _breakpoints(record.functions).items():
         genes, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
@@ -55,27 +54,25 @@ def _tables(record: IdentifiedRecord, index: int) -> Iterator[Table]:
     yield Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
     rows = [
         [name, number(float(under)) if record.on_rigid_body else "none", number(float(alone))]
-        for name, under, alone in zip(
-            INERTIA_PARAMETERS, record.functions.rigid_body, record.baselines.rigid_body, strict=True
-        )
+        for name, under, alone in zip(INERTIA_PARAMETERS, record.functions.rigid_body, record.rigid_body, strict=True)
     ]
     header = ("kg m²", "Under the fuzzy part", "Rigid body alone")
     yield Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)
-    coefficients = zip(record.functions.parameter, record.functions.coefficients, strict=True)
+    coefficients = zip(record.functions.structure.parameter_names, record.functions.coefficients, strict=True)
     rows = [[name, number(float(value), 5)] for name, value in coefficients]
     caption = "Coefficients of the rule consequents, kg m²."
     yield Table(f"coefficients-{index}", caption, ("Coefficient", "Value"), rows)
 
 
-def rules_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def rules_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show what of a model the data determine."""
-    rules, solve = model.record.rules, model.record.solve
+    record, rules = model.record, model.record.rules
     yield Heading(model.label)
     yield Facts(
         [
             ("Rules excited", f"{int(np.sum(rules.excited))} of {len(rules.name)}"),
-            ("Rank of the solved system", f"{solve.rank} of {len(solve.singular_values)}"),
-            ("Condition number", f"{number(solve.condition_number, 5)} over the kept singular values"),
+            ("Rank of the solved system", f"{record.rank} of {len(record.singular_values)}"),
+            ("Condition number", f"{number(record.condition_number, 5)} over the kept singular values"),
         ]
     )
     if rules.excited.all():
@@ -94,7 +91,7 @@ def rules_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]
     yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)
 
 
-def partitions_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
+def partitions_figure(name: str, model: Source[IdentifiedModel]) -> Plot:
     """Draw the membership functions (equation 8) of all partitions: Figure 6 of the paper."""
     partitions = _breakpoints(model.record.functions)
     joined = model.config["identification"]["structure"] == "cpfls"

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
+from cpfls_cli import page
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.pages.trust import model_words, stopped_words, trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared, sentence
 from cpfls_cli.validation.trust import Trust
 
@@ -32,7 +33,6 @@ MODELS = {
 }
 """The judged models in words."""
 
-_PARTS_SHOWN = 3
 _SPEAKS = {1: "For it", -1: "Against it"}
 _SIGNS = {1: "for", -1: "against"}
 _SCORES = (
@@ -63,12 +63,12 @@ _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 )
 
 
-def title(record: IdentifiedRecord) -> str:
+def title(record: IdentifiedModel) -> str:
     """Say what an identified model is."""
     return f"an identified model {'on a rigid body' if record.on_rigid_body else 'without a rigid body'}."
 
 
-def grounds(record: IdentifiedRecord) -> Iterator[str]:
+def grounds(record: IdentifiedModel) -> Iterator[str]:
     """Say how far to trust an identified model, where, and why; or how to find out."""
     if not record.validated:
         yield (
@@ -84,33 +84,10 @@ def grounds(record: IdentifiedRecord) -> Iterator[str]:
             yield f"{_SPEAKS.get(speaks, 'To know')}: {sentence(reason)}"
 
 
-def details(model: Source[IdentifiedRecord]) -> Iterator[Block]:
-    """Say what was found, how good it is beside its baselines, and what to distrust."""
-    scores = scores_table(model, 1)
-    yield _short_scores(model.record.judged)
-    errors, shares = scores.part("errors", 0, 1, 2, 3, 4), scores.part("shares", 0, 1, 5, 6, 7)
-    rest: list[Block] = [*solution(model), Text(scores.explained), errors, shares]
-    yield Folded("how it was found, and all errors beside its baselines", rest)
-    yield from (Text(finding, "warning") for finding in model.record.findings)
-
-
-def _short_scores(judged: JudgedGroup) -> Table:
-    """Show what a model explains of the torque of the first flights held out, beside the rigid body."""
-    parts = [part for part in judged.parts if part != TRAINING][:_PARTS_SHOWN] or list(judged.parts[:1])
-    rows: list[list[str | Cell]] = []
-    for part in parts:
-        for name in (name for name in (MODEL, RIGID_BODY) if name in judged.models):
-            judged_on, said, *_, roll, pitch, yaw = _row(judged, part, name)
-            rows.append([judged_on, said, roll, pitch, yaw])
-    header = ("Judged on", "Model", *_SCORES[-len(AXES) :])
-    caption = "Share of the variance of the body torque that is explained."
-    return Table("scores", caption, header, rows, frozenset({0, 1}))
-
-
-def worth(record: IdentifiedRecord) -> Iterator[str]:
+def worth(record: IdentifiedModel) -> Iterator[str]:
     """Say what an identified model is worth that is used elsewhere."""
     verdict, judged = record.verdict, record.judged
-    if verdict is None or verdict.label is None:
+    if verdict is None:
         yield "Verdict: none; the model holds no validation."
     else:
         yield f"Verdict: {verdict.label}. {verdict.region or ''}".rstrip()
@@ -125,14 +102,14 @@ def worth(record: IdentifiedRecord) -> Iterator[str]:
     yield "Rotors, mass and all forces are those of the config."
 
 
-def cautions(record: IdentifiedRecord) -> Iterator[str]:
+def cautions(record: IdentifiedModel) -> Iterator[str]:
     """Say what speaks against an identified model, wherever it is taken."""
     words = trust_words(record.trust)
     if record.verdict is not None and words.tone == "warning":
         yield ": ".join([f"its verdict is: {words.short}", *(reason for reason, _ in record.verdict.reasons[:1])])
 
 
-def unjudged(record: IdentifiedRecord, path: object) -> Iterator[Text]:
+def unjudged(record: IdentifiedModel, path: object) -> Iterator[Text]:
     """Say of an identified model that nothing says how far to trust it."""
     if record.trust == Trust.NOT_JUDGED:
         yield Text(
@@ -141,13 +118,13 @@ def unjudged(record: IdentifiedRecord, path: object) -> Iterator[Text]:
         )
 
 
-def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
+def solution(model: Source[IdentifiedModel]) -> Iterator[Text]:
     """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
     record = model.record
-    solve, evaluations = record.solve, record.history.evaluations
+    evaluations = record.history.evaluations
     yield Text(
-        f"{solve.parameters} parameters from {len(record.training_indices)} samples; rank {solve.rank}, condition "
-        f"number {number(solve.condition_number, 5)}; {evaluations[-1]} evaluations"
+        f"{record.parameters} parameters from {len(record.training_indices)} samples; rank {record.rank}, condition "
+        f"number {number(record.condition_number, 5)}; {evaluations[-1]} evaluations"
     )
     if record.stop_reason == "converged":
         stall = model.config["identification"]["stall_generations"]
@@ -155,18 +132,18 @@ def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
             f"converged after generation {len(evaluations) - 1}: no objective improved enough "
             f"(identification.stall_generations = {stall})"
         )
-    held_out = record.front.held_out
+    held_out = record.pareto_front.held_out
     if held_out is not None:
         yield Text(
             f"chosen among {len(held_out)} on the flights kept for it, mean squared error "
             f"{number(float(np.min(held_out)), 3)}"
         )
-    pairs = zip(INERTIA_PARAMETERS, record.baselines.rigid_body, strict=True)
+    pairs = zip(INERTIA_PARAMETERS, record.rigid_body, strict=True)
     moments = " ".join(f"{name} {number(float(value))}" for name, value in pairs)
     yield Text(f"rigid body that fits best, kg m²: {moments}")
 
 
-def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
+def scores_table(model: Source[IdentifiedModel], index: int) -> Table:
     """Show the errors of a model and its baselines on every part of the data."""
     caption = (
         f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
@@ -181,7 +158,7 @@ def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
     return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}), legend=legend)
 
 
-def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:
+def _row(judged: Judged, part: str, name: str) -> list[str | Cell]:
     relative, axis = judged.worst(name, part)
     return [
         part if name == MODEL else "",
@@ -196,7 +173,7 @@ def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:
     ]
 
 
-def verdict_line(model: Source[IdentifiedRecord]) -> Text:
+def verdict_line(model: Source[IdentifiedModel]) -> Text:
     """Say in one line how far to trust a model, and whether its search came to its end."""
     record = model.record
     incomplete = (
@@ -205,7 +182,7 @@ def verdict_line(model: Source[IdentifiedRecord]) -> Text:
         else f" The search is incomplete ({record.stop_reason or 'stopped'}): this is the best so far, and --resume "
         "goes on."
     )
-    if record.verdict is None or record.verdict.label is None:
+    if record.verdict is None:
         reason = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
         return Text(f"{model.label}: {reason}.{incomplete}", "warning" if incomplete else "note")
     words = trust_words(record.trust)
@@ -239,7 +216,7 @@ def _table(sources: Sources) -> Table:
     return Table("table-5-identification", caption, header, rows, sentences=frozenset(range(1, len(header))))
 
 
-def _column(model: Source[IdentifiedRecord]) -> list[str]:
+def _column(model: Source[IdentifiedModel]) -> list[str]:
     record, settings, judged = model.record, model.config["identification"], model.record.judged
     return [
         {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]] + (" on rigid body" if record.on_rigid_body else ""),
@@ -249,12 +226,12 @@ def _column(model: Source[IdentifiedRecord]) -> list[str]:
         count(record.history.evaluations[-1]),
         number(float(np.mean(judged.of_axes("mse", MODEL, TRAINING))), 3),
         number(float(np.max(judged.of_axes("max_error", MODEL, TRAINING))), 3),
-        number(record.solve.condition_number, 5),
+        number(record.condition_number, 5),
         percent(judged.worst(MODEL, TRAINING)[0]),
     ]
 
 
-def _baselines(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def _baselines(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     judged = model.record.judged
     yield Heading(f"{model.label} and its baselines")
     yield Text(
@@ -275,7 +252,7 @@ def _baselines(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
         )
 
 
-def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell]]:
+def _rows(judged: Judged, part: str, name: str) -> Iterator[list[str | Cell]]:
     for axis, axis_name in enumerate(AXES):
         values = [Cell(shown(float(judged.of_axes(measure, name, part)[axis]))) for measure, _, shown in _MEASURES]
         if name == RIGID_BODY and judged.winner(part, axis) == "rigid-body":
@@ -283,7 +260,7 @@ def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell
         yield [MODELS.get(name, name) if axis == 0 else "", axis_name, *values]
 
 
-def search_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def search_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show how a model was found."""
     if not model.record.searched:
         yield Text(
@@ -301,7 +278,7 @@ def search_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block
     yield front_figure(f"pareto-front-{index}", model)
 
 
-def convergence_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
+def convergence_figure(name: str, model: Source[IdentifiedModel]) -> Plot:
     """Draw the best of each objective found so far, by generation."""
     history = model.record.history
     generation = np.arange(len(history.best))
@@ -328,9 +305,9 @@ def convergence_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
     return plot(name, caption, f"Best {error}, largest error and condition number by generation", 4.6, draw)
 
 
-def front_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
+def front_figure(name: str, model: Source[IdentifiedModel]) -> Plot:
     """Draw the members of the Pareto front and mark the chosen one."""
-    objectives, chosen = model.record.front.objectives, model.record.front.chosen
+    objectives, chosen = model.record.pareto_front.objectives, model.record.pareto_front.chosen
     error, unit = _first_objective(model.record)
     others = np.arange(len(objectives)) != chosen
     mark: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 2}
@@ -356,7 +333,7 @@ def front_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
     return plot(name, caption, f"Scatter of {error} against condition number, the chosen member marked", 3.0, draw)
 
 
-def _first_objective(record: IdentifiedRecord) -> tuple[str, str]:
+def _first_objective(record: IdentifiedModel) -> tuple[str, str]:
     """Name the error that the search minimised, and its unit.
 
     Over a rigid body it is the error on blocks left out in turn, every axis divided by its own scale.
@@ -364,3 +341,23 @@ def _first_objective(record: IdentifiedRecord) -> tuple[str, str]:
     if record.on_rigid_body:
         return "cross-validated error", "scaled torque²"
     return "mean squared error", "(N m)²"
+
+
+def _scores(judged: Judged, parts: Iterable[str], models: Iterable[str], columns: Sequence[int]) -> str:
+    """Tabulate some columns of the errors of some models on some parts, for a template."""
+    rows = [_row(judged, part, name) for part in parts for name in models if name in judged.models]
+    cells = [[row[at] for at in columns] for row in rows]
+    shown = [[page.toned(each.text, each.tone) if isinstance(each, Cell) else each for each in row] for row in cells]
+    return page.table([_SCORES[at] for at in columns], shown, (0, 1))
+
+
+WORDS: Mapping[str, Any] = {
+    "MODEL": MODEL,
+    "RIGID_BODY": RIGID_BODY,
+    "grounds": grounds,
+    "scores": _scores,
+    "stopped_words": stopped_words,
+    "title": title,
+    "words_of": model_words,
+}
+"""What the template of an identified model knows."""

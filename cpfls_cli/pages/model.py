@@ -2,68 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, ResponseGroup
-from cpfls_cli.artifacts.parameters import name_of
-from cpfls_cli.artifacts.rebuilt import model_effects
-from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli import page
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.model import AnyModel
+from cpfls_cli.artifacts.parameters import FOUND_AS, name_of
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import model_words, stopped_words, trust_facts
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Table, impossible, in_short
-from cpfls_cli.report.numbers import number, plain, whole_percent
+from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
+from cpfls_cli.report.content import Block, Box, Heading, Text, impossible
+from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.words import joined
 
 
 class _Kind(NamedTuple):
-    """How the page of a model goes on by who found it: what it is, what its trust rests on, what was found.
+    """Words on a model that was not found as a whole vehicle: what it is, what its trust rests on.
 
     Attributes
     ----------
     title, grounds : callable
         Of a record: what the model is, and the sentences behind the word of trust.
-    details : callable
-        Of a source: what stands below the box.
     worth, cautions : callable
         Of a record: what it is worth that is used elsewhere, and what speaks against that.
     """
 
     title: Callable[[Any], str]
     grounds: Callable[[Any], Iterator[str]]
-    details: Callable[[Source[Any]], Iterator[Block]]
     worth: Callable[[Any], Iterator[str]]
     cautions: Callable[[Any], Iterator[str]]
 
 
-_PAGES = {"identified": "identification", "extended": "extended", "vehicle": "vehicle_model"}
-"""Modules of `pages` by the kind of a model; one is loaded when a model of its kind is met."""
+def _effect_name(name: str) -> str:
+    return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
 
 
-_REASONS = 3
+WORDS: Mapping[str, Any] = {
+    "FOUND_AS": FOUND_AS,
+    "INERTIA_PARAMETERS": INERTIA_PARAMETERS,
+    "effect_name": _effect_name,
+    "impossible": impossible,
+    "learned_words": learned_words,
+    "name_of": name_of,
+    "plain": plain,
+    "stopped_words": stopped_words,
+    "unit_words": unit_words,
+    "words_of": model_words,
+}
+"""What templates of models know (`model_parts.md.j2`)."""
 
 
-def _kind_of(record: ModelRecord) -> _Kind:
-    page = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
-    return _Kind(page.title, page.grounds, page.details, page.worth, page.cautions)
+def _kind_of(record: Any) -> _Kind:
+    own = import_module(f"cpfls_cli.pages.{'identification' if isinstance(record, IdentifiedModel) else 'extended'}")
+    return _Kind(own.title, own.grounds, own.worth, own.cautions)
 
 
 def answer(model: Source[Any]) -> Iterator[Block]:
-    """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
-    box = trust_box(model)
-    # The reasons of a verdict are many.
-    judged = isinstance(model.record, IdentifiedRecord) and model.record.validated
-    yield from in_short(box, _REASONS, "every reason of the verdict") if judged else [box]
-    yield from _kind_of(model.record).details(model)
+    """Say of a model that is no result yet how far to trust it and why, and what was found."""
+    yield trust_box(model)
+    yield from import_module("cpfls_cli.pages.extended").details(model)
 
 
 def trust_box(model: Source[Any]) -> Box:
@@ -75,137 +77,60 @@ def trust_box(model: Source[Any]) -> Box:
     return Box(words.short.upper(), title, list(kind.grounds(record)), words.tone)
 
 
-def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
+def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Say what speaks against the use of a model, wherever it is used; what it rests on itself included.
 
     Parameters
     ----------
     path : Path or str
         As the model is called in the sentences.
+    cautions : tuple of str
+        Of its file.
     """
-    said = [] if record.header is None else list(record.header.cautions)
+    said = list(cautions)
     if record.stopped:
         said.append(f"{path}: is incomplete: its search was {stopped_words(record)}")
     return (*said, *(f"{path}: {each}" for each in against(record)))
 
 
-def against(record: ModelRecord) -> Iterator[str]:
+def vehicle_words(vehicle: object, part: str) -> list[str]:
+    """Say one part of what is said of a vehicle that was found, sentence by sentence (`said_of_vehicle.md.j2`)."""
+    own = import_module("cpfls_cli.stages.vehicle").WORDS
+    blocks = page.blocks(page.words("said_of_vehicle", vehicle, added=own, part=part))
+    return [block.text for block in blocks if isinstance(block, Text)]
+
+
+def slow_words(vehicle: Vehicle) -> str:
+    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster, and how."""
+    return " ".join(vehicle_words(vehicle, "slow"))
+
+
+def against(record: AnyModel) -> list[str]:
     """Say what speaks against a model itself."""
-    return _kind_of(record).cautions(record)
+    return vehicle_words(record, "against") if isinstance(record, Vehicle) else list(_kind_of(record).cautions(record))
 
 
-def impossible_in_words(record: ModelRecord) -> str:
+def impossible_in_words(record: AnyModel) -> str:
     """List the numbers of a model that no such vehicle has, with their values; empty where all can be."""
-    moments = zip(INERTIA_PARAMETERS, record.vehicle.inertia.tolist(), strict=True)
+    moments = zip(INERTIA_PARAMETERS, record.model.vehicle.inertia_kg_m2, strict=False)
     known = {f"inertia.{name}": (value, "kg m^2") for name, value in moments}
-    if isinstance(record, VehicleRecord):
-        known |= {row["name"]: (row["value"], row["unit"]) for row in rows_of(record.found)}
+    if isinstance(record, Vehicle):
+        known |= {name: (own.value, own.unit) for name, own in record.found.items()}
     shown = ((name_of(name), *known[name]) for name in record.impossible)
     return joined(f"{name} {number(value, 3)} {unit}".removesuffix(" 1") for name, value, unit in shown)
 
 
-def worth_in_words(record: ModelRecord) -> Iterator[str]:
+def worth_in_words(record: AnyModel) -> list[str]:
     """Say what a model that is used elsewhere is worth."""
-    return _kind_of(record).worth(record)
+    return vehicle_words(record, "usage") if isinstance(record, Vehicle) else list(_kind_of(record).worth(record))
 
 
 def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[Block]:
     """Say what a model is, part by part."""
-    yield from [Heading(model.label)] if len(sources.of_kind(ModelRecord)) > 1 else []
-    yield Facts(facts(model.record))
-    if model.record.vehicle.effect.name:
-        yield _effects_table(f"model-effects-{index}", model.record)
+    yield from [Heading(model.label)] if len(recorded_models(sources)) > 1 else []
+    yield from page.blocks(page.words("model_part", model.record, added=WORDS), prefix=f"model-{index}-")
 
 
-def facts(record: ModelRecord) -> list[tuple[str, str]]:
-    """Say how far to trust a model, what it learned from, and what it is made of."""
-    vehicle, repair = record.vehicle, record.vehicle.repair
-    moments = zip(INERTIA_PARAMETERS, vehicle.inertia.tolist(), strict=True)
-    rigid = " ".join(_marked(record, f"inertia.{name}", f"{name} {number(value)}") for name, value in moments if value)
-    rows = [
-        *trust_facts(record),
-        ("Mass", f"{plain(vehicle.mass)} kg"),
-        ("Inertia, kg m²", rigid if vehicle.inertia_functions is None else _functions(vehicle.inertia_functions)),
-        ("Rotors", _rotors(record)),
-        ("Their response", _response(vehicle.response)),
-        ("Effects", joined(map(_effect, vehicle.effect.name)) if vehicle.effect.name else "none"),
-    ]
-    if vehicle.remainder is not None:
-        size = vehicle.remainder.coefficients.size
-        rows.append(("Learned, without a name", f"{size} coefficients over the direction of the airflow"))
-    if vehicle.wind is not None:
-        rows.append(("Steady wind of its flights, m/s", " ".join(number(value, 3) for value in vehicle.wind)))
-    if vehicle.gusts is not None:
-        rows.append(("Gusts of its flights, N m", " ".join(number(value, 3) for value in vehicle.gusts.torque)))
-        rows.append(("Their force, N", " ".join(number(value, 3) for value in vehicle.gusts.force)))
-    if repair is not None and (repair.settled or repair.faults):
-        rows.append(("Taken out of the sensors first", " ".join((*repair.settled, *repair.faults))))
-    return rows
-
-
-def _functions(inertia: InertiaFunctionsGroup) -> str:
-    kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[inertia.structure]
-    body = " ".join(
-        f"{name} {number(value)}"
-        for name, value in zip(INERTIA_PARAMETERS, inertia.rigid_body.tolist(), strict=True)
-        if value
-    )
-    under = f"on a rigid body {body}" if body else "alone"
-    visited = whole_percent(float(np.mean(inertia.visited)))
-    return (
-        f"functions of roll and pitch, a {kind} of {len(inertia.coefficients)} coefficients {under}; {visited} of all "
-        "roll and pitch was visited"
-    )
-
-
-def _marked(record: ModelRecord, name: str, shown: str) -> str:
-    """Strike a number through that no vehicle has."""
-    return impossible(shown) if name in record.impossible else shown
-
-
-def _rotors(record: ModelRecord) -> str:
-    rotors = record.vehicle.rotor
-    thrust, drag = (
-        _marked(record, name, _range(values))
-        for name, values in (("thrust_factor", rotors.thrust_factor), ("drag_factor", rotors.drag_factor))
-    )
-    square = "w²" if not rotors.thrust_linear else f"w² + {number(rotors.thrust_linear, 3)} w_h w"
-    return (
-        f"{len(rotors.spin)}; thrust {thrust} N s² and drag {drag} N m s² "
-        f"times {square}, to {plain(rotors.speed_max)} rad/s"
-    )
-
-
-def _range(values: Array) -> str:
-    low, high = number(float(values.min()), 4), number(float(values.max()), 4)
-    return low if low == high else f"{low} to {high}"
-
-
-def _response(response: ResponseGroup) -> str:
-    parts = [("delay", response.delay_s), ("lag", response.lag_s)]
-    told = [f"{name} {number(1e3 * seconds, 3)} ms" for name, seconds in parts if seconds]
-    slow = [("roll and pitch", response.slow_roll_pitch), ("yaw", response.slow_yaw)]
-    told += [
-        f"{whole_percent(abs(share))} of the torque of {axes} {'back' if share > 0 else 'gone'} within "
-        f"{number(response.slow_s, 3)} s"
-        for axes, share in slow
-        if share
-    ]
-    return f"{joined(told)}, behind {'commands alone' if response.commanded else 'any speed'}" if told else "at once"
-
-
-def _effect(name: str) -> str:
-    return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
-
-
-def _effects_table(name: str, record: ModelRecord) -> Table:
-    rows = []
-    for effect in model_effects(record.vehicle.effect):
-        known = {each.name: each for each in effect.known.numbers}
-        for index, (label, value) in enumerate(effect.values.items()):
-            words = f"{label}: {known[label].meaning}" if label in known else label
-            unit = unit_words(known[label].unit) if label in known else ""
-            shown = _marked(record, f"{effect.name}.{label}", number(value))
-            rows.append([_effect(effect.name) if index == 0 else "", words, shown, unit])
-    header = ("Effect", "Number", "Value", "Unit")
-    return Table(name, "The numbers of its effects.", header, rows, frozenset({0, 1, 3}), frozenset({1}))
+def recorded_models(sources: Sources) -> list[Source[Any]]:
+    """List the models that are no results yet: those say themselves what they are."""
+    return [source for source in sources.of_kind(AnyModel) if not isinstance(source.record, Vehicle)]

@@ -7,20 +7,17 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks
+from cpfls_cli.pages.model import model_blocks, recorded_models
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
-from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
@@ -59,7 +56,8 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
-        return [stage_named(name).section(source, number) for number, source in enumerate(own, start=1)]
+        shown = stage_named(name).together(own) if own else ()
+        return [stage_named(name).section(source, number) for number, source in enumerate(shown, start=1)]
 
     return sections
 
@@ -69,11 +67,11 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    _of_each("model", "What the model is", lambda given: given.of_kind(ModelRecord), model_blocks, among=True),
+    _of_each("model", "What the model is", recorded_models, model_blocks, among=True),
     _of_stage("diagnose"),
     _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
-    _of_each("found-vehicle", "The vehicle found in flights", attrgetter("vehicles"), found_vehicle_blocks),
+    _of_stage("vehicle"),
     _of_stage("compare"),
     vehicle_section,
     _of_stage("trajectory"),
@@ -91,7 +89,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
         holds=lambda record: record.uncertainty or record.curves,
     ),
     _of_each("steps", "Prediction by horizon", _MODELS, steps_blocks, holds=attrgetter("steps")),
-    _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
+    _of_stage("sweep"),
     _of_each("search", "Search", _MODELS, search_blocks),
     _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_stage("predict"),

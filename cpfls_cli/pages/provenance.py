@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -66,7 +66,7 @@ _LACKS: tuple[_Lack, ...] = (
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
     (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
-    (IdentifiedRecord, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
+    (IdentifiedModel, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
     (
         AlongFlight,
         "Figure 7 and the inertia matrix along a flight",
@@ -113,8 +113,8 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
 
 def _word(wanted: Any) -> str:
     kind = getattr(wanted.FORMAT, "kind", "")
-    name = getattr(wanted.FORMAT, "name", wanted.FORMAT)
-    return str(name).removeprefix("cpfls/") if kind in ("", "identified") else str(kind)
+    name = str(getattr(wanted.FORMAT, "name", wanted.FORMAT)).removeprefix("cpfls/")
+    return "model" if wanted is IdentifiedModel else str(kind or name)
 
 
 def vehicle_section(sources: Sources) -> Section:
@@ -131,7 +131,7 @@ def vehicle_section(sources: Sources) -> Section:
     other = [source.label for source in sources.all if source.vehicle != sources.vehicle]
     if other:
         blocks.append(Text(f"Made with another vehicle than this one: {', '.join(other)}.", "warning"))
-    return Section("vehicle", "Vehicle", blocks)
+    return Section("stated-vehicle", "Vehicle", blocks)
 
 
 def _vehicle_rows(sources: Sources) -> Iterator[tuple[str, str]]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.evidence import ResidualsGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.identification.scores import AXES
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, probability
+from cpfls_cli.validation.residuals import ResidualAnalysis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ _FILL: dict[str, Any] = {"color": "#9db8d6", "edgecolor": "#1b4f8a", "linewidth"
 _NORMAL: dict[str, Any] = {**BASELINE, "color": "black"}
 
 
-def residual_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def residual_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show what a model leaves of the torque, where it holds that."""
     residuals = model.record.residuals
     assert residuals is not None, "only models that hold them are shown"
@@ -45,9 +45,9 @@ def residual_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Blo
     yield distribution_figure(f"error-distribution-{index}", model.label, residuals)
 
 
-def _whiteness(label: str, residuals: ResidualsGroup, index: int) -> Table:
+def _whiteness(label: str, residuals: ResidualAnalysis, index: int) -> Table:
     samples, available = residuals.samples, residuals.available
-    examined = f"{samples}" if available in (None, samples) else f"the first {samples} of its {available}"
+    examined = f"{samples}" if available == samples else f"the first {samples} of its {available}"
     caption = (
         f"Whether the torque error of {label} is white noise about 0 on {residuals.part}, {examined} samples. Of white "
         "noise 5 % of the lags lie outside the band; p is the chance that white noise has autocorrelations as large "
@@ -59,13 +59,13 @@ def _whiteness(label: str, residuals: ResidualsGroup, index: int) -> Table:
     return Table(f"whiteness-of-errors-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
 
 
-def _whiteness_about(residuals: ResidualsGroup, axis: int) -> list[str | Cell]:
+def _whiteness_about(residuals: ResidualAnalysis, axis: int) -> list[str | Cell]:
     values, chance = residuals.autocorrelation[:, axis], float(residuals.ljung_box[axis])
     known = values[np.isfinite(values)]
     if not known.size:
         return [*[UNKNOWN] * 5, "only rounding is left"]
     outside = float(np.mean(np.abs(known) > residuals.band))
-    mean, mean_chance = _at(residuals.mean, axis), _at(residuals.mean_p, axis)
+    mean, mean_chance = float(residuals.mean[axis]), float(residuals.mean_p[axis])
     white, biased = chance >= _SIGNIFICANT, mean_chance < _SIGNIFICANT
     conclusion = ("white" if white else "not white") + (", not 0 in the mean" if biased else "")
     return [
@@ -78,12 +78,7 @@ def _whiteness_about(residuals: ResidualsGroup, axis: int) -> list[str | Cell]:
     ]
 
 
-def _at(values: Array | None, axis: int) -> float:
-    """Take the value of an axis; NaN in models of before the mean was tested."""
-    return float("nan") if values is None else float(values[axis])
-
-
-def _followed(residuals: ResidualsGroup, index: int) -> Table:
+def _followed(residuals: ResidualAnalysis, index: int) -> Table:
     values, band = residuals.correlation, residuals.band
     rows: list[list[str | Cell]] = [
         [name, *(_strength(values[signal, :, axis], residuals.input_lag, band) for axis in range(len(AXES)))]
@@ -104,7 +99,7 @@ def _strength(values: Array, lag: Array, band: float) -> Cell:
     return Cell(f"{text} ◂", "warning") if abs(values[largest]) > 2 * band else Cell(text)
 
 
-def autocorrelation_figure(name: str, label: str, residuals: ResidualsGroup) -> Plot:
+def autocorrelation_figure(name: str, label: str, residuals: ResidualAnalysis) -> Plot:
     """Draw the correlation of the torque error with itself some time later, by axis, with the band of white noise."""
     values, band = residuals.autocorrelation, residuals.band
     low = min(-0.2, float(np.nanmin(values, initial=0.0)) - 0.05)
@@ -138,7 +133,7 @@ def _by_axis(figure: Figure, rows: int = 1, share_y: Literal["row"] | bool = Fal
     return [list(row) for row in grid]
 
 
-def cross_correlation_figure(name: str, label: str, residuals: ResidualsGroup) -> Plot:
+def cross_correlation_figure(name: str, label: str, residuals: ResidualAnalysis) -> Plot:
     """Draw the correlation of error and inputs over the lag; the strongest three of each axis are named."""
 
     def draw(figure: Figure) -> None:
@@ -173,7 +168,7 @@ def _draw_correlations(axes: Axes, lag: Array, values: Array, inputs: tuple[str,
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_NAMED, borderaxespad=0.1)
 
 
-def distribution_figure(name: str, label: str, residuals: ResidualsGroup) -> Plot:
+def distribution_figure(name: str, label: str, residuals: ResidualAnalysis) -> Plot:
     """Draw histogram and quantiles of the torque error by axis, each beside the normal distribution."""
     normal = residuals.normal_quantile
 

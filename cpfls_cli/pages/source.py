@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.diagnosis import Diagnosis
     from cpfls_cli.artifacts.disagreement import Disagreement
     from cpfls_cli.artifacts.extended import ExtendedRecord
-    from cpfls_cli.artifacts.identified import IdentifiedRecord
-    from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.artifacts.identified import IdentifiedModel
+    from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.changes.results import Changed, Trend
     from cpfls_cli.flights.flight import Flight
     from cpfls_cli.flights.path import PlannedPath
+    from cpfls_cli.identification.replicates import Sweep
     from cpfls_cli.playback.along_flights import Playback
     from cpfls_cli.reduction.selection import Selection
     from cpfls_cli.response.flown import Responses
@@ -63,8 +63,8 @@ class Sources:
     trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
     flights: ClassVar[_OfFormat[Flight]] = _OfFormat("cpfls/flight")
     selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
-    models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
-    sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
+    models: ClassVar[_OfFormat[IdentifiedModel]] = _OfFormat("cpfls/identified")
+    sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[AlongFlight]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
@@ -72,7 +72,7 @@ class Sources:
     gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
-    vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
     trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight, Imported
+from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged, Winner
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
@@ -27,10 +27,9 @@ def summary_section(sources: Sources) -> Section:
         for extended in sources.extensions
         if sources.by_hash(extended.made_from("diagnosis")) is None
     ]
-    blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
-    # A comparison that was diagnosed has its answer there.
+    # A comparison that was diagnosed has its answer there; the verdict on an identified model is a line here.
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
-    told = [source for source in sources.all if source.stage and source.sha256 not in answered]
+    told = [each for each in sources.all if each.stage not in ("", "identify") and each.sha256 not in answered]
     blocks += [box for source in told for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
@@ -63,7 +62,7 @@ def _missing(sources: Sources) -> list[Text]:
     return [Text(sentence, "note") for sentence in missing(sources).values()]
 
 
-def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Iterator[Block]:
+def _model(model: Source[IdentifiedModel], sources: Sources, index: int) -> Iterator[Block]:
     record = model.record
     yield Heading(f"Model {model.label}")
     yield Facts(_facts(model))
@@ -81,7 +80,7 @@ def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Ite
         )
 
 
-def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
+def _facts(model: Source[IdentifiedModel]) -> list[tuple[str, str]]:
     record = model.record
     learned, training = len(record.training_indices), record.judged.samples_of(TRAINING)
     chosen = f", chosen in {model.input_name('selection')}" if model.made_from("selection") else ""
@@ -90,11 +89,11 @@ def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
         ("Structure", _structure(model)),
         ("Parameters", _parameters(record)),
         ("Search", _search(model)),
-        ("Made by", f"cpfls {record.origin.version}, seed {record.origin.seed}"),
+        ("Made by", f"cpfls {model.header.version}, seed {model.header.seed}"),
     ]
 
 
-def _structure(model: Source[IdentifiedRecord]) -> str:
+def _structure(model: Source[IdentifiedModel]) -> str:
     settings = model.config["identification"]
     kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
     functions = settings["membership_functions"]
@@ -108,16 +107,16 @@ def _structure(model: Source[IdentifiedRecord]) -> str:
     )
 
 
-def _parameters(record: IdentifiedRecord) -> str:
+def _parameters(record: IdentifiedModel) -> str:
     fuzzy = f"{len(record.functions.coefficients)} of the fuzzy part"
     if not record.on_rigid_body:
         return fuzzy
     if record.fuzzy_part_off:
         return f"6 of inertia and {fuzzy}, all zero because the fuzzy part is off"
-    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.model.ridge_weight)}"
+    return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.ridge_weight)}"
 
 
-def _search(model: Source[IdentifiedRecord]) -> str:
+def _search(model: Source[IdentifiedModel]) -> str:
     if not model.record.searched:
         return "no search: one chromosome"
     settings = model.config["identification"]
@@ -125,7 +124,7 @@ def _search(model: Source[IdentifiedRecord]) -> str:
     return f"population {settings['population']}, {number} generation{'' if number == 1 else 's'}"
 
 
-def _beside_rigid_body(model: Source[IdentifiedRecord], sources: Sources) -> Iterator[Text]:
+def _beside_rigid_body(model: Source[IdentifiedModel], sources: Sources) -> Iterator[Text]:
     """Compare a model with the rigid body with six inertia parameters, part by part."""
     judged = model.record.judged
     if model.record.fuzzy_part_off:
@@ -159,7 +158,7 @@ def _noise_free(flight: Source[Flight]) -> bool:
     return flight.made_from("trajectory") is not None and not any(added)
 
 
-def _comparison(judged: JudgedGroup, part: str, winners: Sequence[Winner]) -> str:
+def _comparison(judged: Judged, part: str, winners: Sequence[Winner]) -> str:
     ours, axis = judged.worst(MODEL, part)
     rigid, rigid_axis = judged.worst(RIGID_BODY, part)
     where = {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")

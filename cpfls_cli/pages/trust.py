@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from cpfls_cli.artifacts.learned import LearnedFlight, part_learned
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.report.content import Tone
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
@@ -52,7 +52,7 @@ def trust_words(trust: str) -> Words:
     return _WORDS.get(trust, Words(trust, trust, "note"))
 
 
-def model_words(model: ModelRecord) -> Words:
+def model_words(model: AnyModel) -> Words:
     """Put how far to trust a model; of one that is judged as a forecast and as the vehicle both, in the worse tone."""
     words = [trust_words(word) for word in dict.fromkeys(model.judged_as.values())]
     if len(words) == 1:
@@ -66,19 +66,19 @@ def model_words(model: ModelRecord) -> Words:
     )
 
 
-def stopped_words(model: ModelRecord) -> str:
+def stopped_words(model: AnyModel) -> str:
     """Say why the search for a model ended before its end, and how to go on; empty where it did not."""
     reason = model.stopped
     said = reason if reason in ("", "interrupted") else f"stopped ({reason.replace('-', ' ')})"
-    return said and f"{said}, go on with `cpfls {model.FORMAT.made_by.split(',')[0]} ... --resume`"
+    return said and f"{said}, go on with `cpfls {model.MADE_BY} ... --resume`"
 
 
-def trust_facts(model: ModelRecord) -> list[tuple[str, str]]:
+def trust_facts(model: AnyModel) -> list[tuple[str, str]]:
     """Say in a word how far to trust a model, and which flights it learned from."""
     return [("How far to trust it", model_words(model).sentence), ("Learned from", learned_words(model))]
 
 
-def learned_words(model: ModelRecord) -> str:
+def learned_words(model: AnyModel) -> str:
     """Name the flights that a model learned from, each with the part of it."""
     flights = [_with_part(flight) for flight in model.learned_from]
     return joined(flights) if flights else "the file does not say"
@@ -86,10 +86,10 @@ def learned_words(model: ModelRecord) -> str:
 
 def _with_part(flight: LearnedFlight) -> str:
     part = "" if flight.samples is None else f", {_part(flight) if not flight.whole else f'{flight.of} samples'}"
-    return f"{flight.file.name} (sha256 {flight.file.sha256[:12]}{part})"
+    return f"{flight.name} (sha256 {flight.sha256[:12]}{part})"
 
 
-def seen_words(model: ModelRecord, hashes: Collection[str]) -> str:
+def seen_words(model: AnyModel, hashes: Collection[str]) -> str:
     """Say what part of a flight a model learned from, or that it did not.
 
     Parameters
@@ -100,8 +100,7 @@ def seen_words(model: ModelRecord, hashes: Collection[str]) -> str:
     learned = model.learned_from
     flight = part_learned(learned, hashes)
     if flight is None:
-        chosen_on = (file.sha256 for role, file in model.origin.inputs.items() if role.startswith("choose-on"))
-        return "a flight that it was chosen on" if any(sha256 in hashes for sha256 in chosen_on) else NOT_SEEN
+        return "a flight that it was chosen on" if model.chosen_on & set(hashes) else NOT_SEEN
     which = "the flight" if len(learned) == 1 else "one of the flights"
     part = "" if flight.whole else f" ({_part(flight)}; the rest was held out)"
     return f"{which} that it learned from{part}"

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
-from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, UncertaintyGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval
+from cpfls_cli.validation.bootstrap import Draws
+from cpfls_cli.validation.validate import Curves, RoundTrip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +38,7 @@ _SAME = 1e-9
 _BAND = "95 % band of"
 
 
-def uncertainty_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def uncertainty_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
     """Show the bands of a model, where it holds any."""
     record = model.record
     yield Heading(model.label)
@@ -52,9 +53,9 @@ def uncertainty_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[
         yield Text(_round_trip_sentence(record.round_trip))
 
 
-def _parameters(model: Source[IdentifiedRecord], draws: UncertaintyGroup, index: int) -> Table:
+def _parameters(model: Source[IdentifiedModel], draws: Draws, index: int) -> Table:
     record = model.record
-    pairs = [(record.baselines.rigid_body, draws.best_rigid_body)]
+    pairs = [(record.rigid_body, draws.best_rigid_body)]
     pairs += [(record.functions.rigid_body, draws.rigid_body)] if record.on_rigid_body else []
     columns = [(value, *interval(value, drawn, draws.blocks)) for value, drawn in pairs]
     stated = [*model.vehicle.inertia_kg_m2, *[0.0] * 6][:6]
@@ -80,7 +81,7 @@ def _parameters(model: Source[IdentifiedRecord], draws: UncertaintyGroup, index:
     return Table(f"inertia-bands-{index}", caption, header, rows, words, sentences)
 
 
-def _round_trip_sentence(round_trip: RoundTripGroup) -> str:
+def _round_trip_sentence(round_trip: RoundTrip) -> str:
     shares = [(entry, float(_entry_of(round_trip.inside, entry))) for entry in _ENTRIES]
     shown = ", ".join(f"{entry} {percent(share)}" for entry, share in shares if np.isfinite(share))
     return (
@@ -91,9 +92,7 @@ def _round_trip_sentence(round_trip: RoundTripGroup) -> str:
     )
 
 
-def inertia_curves_figure(
-    name: str, label: str, curves: CurvesGroup, curve: int, round_trip: RoundTripGroup | None
-) -> Plot:
+def inertia_curves_figure(name: str, label: str, curves: Curves, curve: int, round_trip: RoundTrip | None) -> Plot:
     """Draw the six entries of D(q) along one curve of attitudes, with what a second identification gave."""
     word = curves.name[curve]
     again = None if round_trip is None else round_trip.inertia[curve]
@@ -131,7 +130,7 @@ def _entry_of(values: Array, entry: str) -> Array:
     return np.asarray(values[..., int(entry[1]) - 1, int(entry[2]) - 1])
 
 
-def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[CurvesGroup]) -> None:
+def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[Curves]) -> None:
     """Show some values in full and no more: a band that opens where training was not would flatten everything."""
     # Of the whole matrices, so that rounding of an entry that is zero is not drawn large.
     largest = max(float(np.abs(each.inertia).max(initial=1e-12)) for each in curves)
@@ -142,7 +141,7 @@ def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[CurvesGroup
         axes.set_ylim(low - room, high + room)
 
 
-def _along(curves: CurvesGroup, curve: int, entry: str) -> tuple[Array, BoolArray, Array, Array, Array, Array]:
+def _along(curves: Curves, curve: int, entry: str) -> tuple[Array, BoolArray, Array, Array, Array, Array]:
     """Give along a curve its angle in degrees, where training was, an entry of D(q), its band and the rigid body's."""
     attitude = np.degrees(curves.attitude[curve])
     angle = attitude[:, int(np.argmax(np.ptp(attitude, axis=0)))]
@@ -151,7 +150,7 @@ def _along(curves: CurvesGroup, curve: int, entry: str) -> tuple[Array, BoolArra
     return angle, ~curves.outside[curve], values, low, high, rigid
 
 
-def _draw_entry(axes: Axes, curves: CurvesGroup, curve: int, entry: str, again: Array | None) -> None:
+def _draw_entry(axes: Axes, curves: Curves, curve: int, entry: str, again: Array | None) -> None:
     from matplotlib.ticker import MaxNLocator
 
     angle, visited, values, low, high, rigid = _along(curves, curve, entry)
@@ -167,7 +166,7 @@ def _draw_entry(axes: Axes, curves: CurvesGroup, curve: int, entry: str, again: 
     _keep_scale(axes, [rigid, values, low[visited], high[visited]], [curves])
 
 
-def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]], word: str) -> Plot:
+def compared_curves_figure(name: str, models: Sequence[tuple[str, Curves]], word: str) -> Plot:
     """Draw the six entries of D(q) of several models along their curves "over roll" or "over pitch"."""
 
     def draw(figure: Figure) -> None:
@@ -186,7 +185,7 @@ def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]],
     return plot(name, caption, f"Six entries of the inertia matrices of several models {word}", 4.6, draw)
 
 
-def _draw_model(axes: Axes, label: str, curves: CurvesGroup, index: int, entry: str, word: str) -> Array:
+def _draw_model(axes: Axes, label: str, curves: Curves, index: int, entry: str, word: str) -> Array:
     """Draw one model; give the values that must be seen in full."""
     curve = curves.name.index(word)
     angle, visited, values, low, high, rigid = _along(curves, curve, entry)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.past import PastBalances
+from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 ENOUGH_BLOCKS = 8
@@ -72,6 +73,56 @@ class Explained(NamedTuple):
     bands_hz: tuple[tuple[float, float], ...]
 
 
+class Repeat(NamedTuple):
+    """Two runs that fly the same path: flights, or parts of one."""
+
+    first: Annotated[int, About("a run that repeats another, counted from 0", least=0)]
+    second: Annotated[int, About("the other", least=0)]
+    correlation: Annotated[float, About("of the two along their path")]
+
+
+class ExplainedBand(NamedTuple):
+    """A band of frequency, and what constants explain of the repeatable rotation in it."""
+
+    low_hz: Annotated[float, About("lower end, about", unit="Hz")]
+    high_hz: Annotated[float, About("upper end, about", unit="Hz")]
+    explained: Annotated[
+        Array, About("share of the repeatable rotation that the constants explain", ("axis",), frame="body (FLU)")
+    ]
+    used: Annotated[bool, About("1 where the constants rest on the band; others lack an effect")]
+
+
+@result
+class UsedInstruments:
+    """What identifies how the flights were moved, apart from gusts: other runs of a path, setpoints, or the past."""
+
+    SHOWN: ClassVar = ("lacks",)
+
+    kind: str = about("repeats, setpoints, or past")
+    setpoints: tuple[str, ...] = about("signals asked for from outside of the loop", "setpoint", default=())
+    repeats: tuple[Repeat, ...] = part(default=())
+    bands: tuple[ExplainedBand, ...] = part()
+    explained: Array = about("the share in all used bands, weighed by what they say", "axis", frame="body (FLU)")
+    explained_error: Array = about("standard error of that", "axis", frame="body (FLU)")
+
+    @property
+    def runs(self) -> int:
+        """Runs that repeat another."""
+        return len({each for pair in self.repeats for each in (pair.first, pair.second)})
+
+    @property
+    def lacks(self) -> bool:
+        """Whether less than 90 % of what is repeatable about roll or pitch is explained, by more than chance."""
+        explained = self.explained + self.explained_error
+        return self.lacks_below is not None or bool((explained < EXPLAINED)[:2].any())
+
+    @property
+    def lacks_below(self) -> float | None:
+        """Frequency in Hz below which the vehicle answers with something that the constants lack; None for nowhere."""
+        used = [band.low_hz for band in self.bands if band.used]
+        return None if len(used) == len(self.bands) else min(used)
+
+
 @dataclass(frozen=True)
 class Constants:
     """Constants that instruments tell.
@@ -107,6 +158,22 @@ class Constants:
         own = np.diag(self.fitted.model.body.inertia)[:2]
         off = np.abs(np.log(np.diag(inertia)[:2] / own))
         return bool((off > np.maximum(self.half[:2], VISIBLE)).any())
+
+
+def used_instruments(given: Instruments, constants: Constants) -> UsedInstruments:
+    """Say of constants which instruments they rest on, and how much of the rotation they explain."""
+    past, explained = constants.told_by == "past", constants.explained
+    return UsedInstruments(
+        kind=constants.told_by,
+        setpoints=() if past else given.names,
+        repeats=() if past else tuple(Repeat(*pair, float(alike)) for pair, alike in given.repeats.likeness.items()),
+        bands=tuple(
+            ExplainedBand(*ends, share, bool(used))
+            for ends, share, used in zip(explained.bands_hz, explained.share, explained.used, strict=True)
+        ),
+        explained=explained.total,
+        explained_error=explained.error,
+    )
 
 
 @dataclass(frozen=True)

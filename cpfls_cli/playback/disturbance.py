@@ -9,10 +9,10 @@ grow with frequency, and that of the rotor speeds.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +22,13 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
+from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
 _Complex = npt.NDArray[np.complex128]
@@ -57,35 +58,36 @@ _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 """Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FoundGusts(GustRanges):
-    """Sizes and memories of gusts by body axis, torque then force, with 95 % intervals.
-
-    Other fields are described at `DisturbanceGroup`.
+    """Gusts in flights, and what told them from what a model lacks; white noise as of `Gusts`.
 
     Attributes
     ----------
-    size, low, high : array, shape (axis,), N m and N
-        Standard deviation; where none is known, NaN, 0, and the size of all that is left. NaN where the body is not
-        known either.
     noise : array, shape (axis, 2)
-        Variance of the white noise beside it, and of that which a derivative is taken of, as of samples.
-    foretold : array, shape (axis,)
-        Share of all that is left which instruments foretell, or the past of what is new in it; NaN where nothing tells.
+        Variance of the white noise with them, and of that which a derivative is taken of, as of samples; in no file.
     foretold_without : array, shape (block, axis)
-        The same without each block, for its errors.
-    white : array, shape (axis,), N m s^0.5 and N s^0.5, or None
-        See `Gusts`; NaN where it is not known.
-    lack : Lack or None
-        What the model lacks; None without instruments, or where no parts were asked for.
+        What is predicted without each block, for its errors; in no file.
     """
 
-    told_by: ToldBy
-    noise: Array
-    foretold: Array
-    foretold_without: Array
-    white: Array | None = None
-    lack: Lack | None = None
+    SHOWN: ClassVar = ("name",)
+
+    told_by: ToldBy = about("what separates gusts from what a model lacks: repeats, setpoints, past, none")
+    foretold: Array = about(
+        "share of the residual that repeats or setpoints predict; by the past, of its innovations", "gust", gaps=True
+    )
+    alone: BoolArray | None = about("whether all that is left of a gap is gusts and noise", "gust", default=None)
+    white: Array | None = about(
+        "white noise with it, as of a step of 1 s, N m s^0.5 or N s^0.5", "gust", unit="SI", gaps=True, default=None
+    )
+    lack: Lack | None = part(default=None)
+    noise: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    foretold_without: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def name(self) -> tuple[str, ...]:
+        """Axes: roll, pitch, yaw, x, y, z."""
+        return GUST_AXES[: len(self.size)]
 
     @property
     def foretold_error(self) -> Array:
@@ -235,9 +237,9 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
         motion = flight.motion
         moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if len(found.size) > 3 else [])]
         signals = np.hstack([flight.speed**2, *moves])
-        for part in (part for part in flight.stretches if seen.count(part.stop - part.start)):
-            left.append(seen.derivative(own[part, 0]) - seen.average(own[part, 1]))
-            told.append(seen.average(signals[part]))
+        for own_part in (each for each in flight.stretches if seen.count(each.stop - each.start)):
+            left.append(seen.derivative(own[own_part, 0]) - seen.average(own[own_part, 1]))
+            told.append(seen.average(signals[own_part]))
     if not left:
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
@@ -312,8 +314,15 @@ def gusts_in(
     foretold, without = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
-    shares = {"foretold": none * foretold, "foretold_without": none * (foretold + shared * (without - foretold))}
-    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares, white=white, lack=lack)
+    return FoundGusts(
+        **ends,
+        told_by=told_by,
+        noise=columns[:, len(RANGES) :],
+        foretold=none * foretold,
+        foretold_without=none * (foretold + shared * (without - foretold)),
+        white=white,
+        lack=lack,
+    )
 
 
 def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
@@ -377,8 +386,8 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
     momentum = np.hstack([motion.rate @ inertia, mass * velocity])
     sides = np.zeros((len(flight), 2, 6))
     sides[:, 0] = momentum
-    for part in flight.stretches:
-        sides[part, 1] = wrench_during(model, flight, part)
+    for stretch in flight.stretches:
+        sides[stretch, 1] = wrench_during(model, flight, stretch)
     sides[:, 1, :3] -= np.cross(motion.rate, momentum[:, :3])
     sides[:, 1, 3:] -= np.cross(motion.rate, momentum[:, 3:])
     sides[:, 1, 3:] -= mass * model.vehicle.gravity_m_s2 * motion.rotation[:, 2]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.filters import recursion
-from cpfls_cli.result import About
+from cpfls_cli.result import About, about
 
 GUST_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 """Torque about the body axes, then force along them."""
@@ -68,24 +68,48 @@ class Gusts(NamedTuple):
         return np.asarray(pushed)
 
 
-@dataclass(frozen=True)
-class GustRanges:
-    """Gusts by body axis, torque then force, with their 95 % intervals.
+class GustAxis(NamedTuple):
+    """Gusts about or along an axis, with 95 % intervals, in units of acceleration; NaN where not known.
 
     Attributes
     ----------
-    size, low, high : array, shape (axis,), N m and N
-        Standard deviation.
-    memory, memory_low, memory_high : array, shape (axis,), s
-        Time in which a gust falls to 37 %.
+    name : str
+        roll, pitch, yaw, or x, y, z.
     """
 
-    size: Array
-    low: Array
-    high: Array
-    memory: Array
-    memory_low: Array
-    memory_high: Array
+    name: str
+    size: float
+    low: float
+    high: float
+    memory: float
+    memory_low: float
+    memory_high: float
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a torque."""
+        return self.name in GUST_AXES[:3]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GustRanges:
+    """Gusts by body axis, torque then force, with their 95 % intervals."""
+
+    size: Array = about("standard deviation, N m or N; not finite where it is not known", "gust", unit="SI", gaps=True)
+    low: Array = about("lower end of its 95 % interval; 0 where it is not known", "gust", unit="SI", gaps=True)
+    high: Array = about(
+        "upper end; where no size is known that of all that is left, and not finite where the body is not known either",
+        "gust",
+        unit="SI",
+        gaps=True,
+    )
+    memory: Array = about("time in which a gust falls to 37 %", "gust", unit="s", gaps=True)
+    memory_low: Array = about("lower end of its 95 % interval", "gust", unit="s", gaps=True)
+    memory_high: Array = about("upper end of it", "gust", unit="s", gaps=True)
+
+    def axes(self, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
+        """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
+        return gust_axes(self, inertia, mass)
 
     @classmethod
     def of_known(cls, *known: Array) -> GustRanges | None:
@@ -96,7 +120,15 @@ class GustRanges:
         columns = [np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
         for values, own in zip(columns, known, strict=True):
             values[: len(there)][there] = own[there]
-        return GustRanges(*columns)
+        return GustRanges(**dict(zip(RANGES, columns, strict=True)))
+
+
+def gust_axes(found: Any, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
+    """Give what has the fields of `GustRanges` as accelerations by axis; other parameters as `GustRanges.axes`."""
+    bodies = np.append(inertia[:3], [mass] * 3)[: len(found.size)]
+    sizes = (found.size / bodies, found.low / bodies, found.high / bodies)
+    columns = (*sizes, found.memory, found.memory_low, found.memory_high)
+    return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
 
 
 RANGES = tuple(each.name for each in fields(GustRanges))

@@ -12,32 +12,25 @@ integrates the disturbance. From the start on nothing is observed: ``d' = exp(-h
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body
+from cpfls_cli.result import about, result
 
 
-@dataclass(frozen=True, kw_only=True)
+@result
 class Observer:
-    """Observes torque and force that a model misses, about and along the body axes.
+    """Observes torque and force that a model misses, about and along the body axes."""
 
-    Attributes
-    ----------
-    rate : array, shape (6,), 1/s
-        At which what is missed is taken up: torque (3), force (3).
-    memory_s : array, shape (6,), s
-        Time constant with which the disturbance fades.
-    past_s : float, s
-        How much of the past is used.
-    """
-
-    rate: Array
-    memory_s: Array
-    past_s: float
+    rate: Array = about(
+        "at which what the model misses is taken up: torque x y z, force x y z", "6", unit="1/s", frame="body (FLU)"
+    )
+    memory_s: Array = about(
+        "time constant with which the disturbance fades", "6", unit="s", frame="body (FLU)", least=0.0
+    )
+    past_s: float = about("how much of the flight before a start is used", unit="s")
 
     def samples(self, period: float) -> int:
         """Count the steps of the past."""

@@ -18,6 +18,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.result import about
 
 _BEGIN_S = (0.15, 0.6)
 """Where the memory begins."""
@@ -69,24 +70,14 @@ class AxisLack(NamedTuple):
     memory: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lack:
-    """What a model lacks by body axis, torque then force.
+    """What a model lacks by body axis, torque then force; not finite where nothing is known. See `AxisLack`."""
 
-    Attributes
-    ----------
-    part : tuple of str
-        Parts of the model, see `VehicleModel.parts`.
-    share : array, shape (axis, part)
-        See `AxisLack`; NaN where nothing is known, as for all others.
-    rest : array, shape (axis,), N m and N
-    memory : array, shape (axis,), s
-    """
-
-    part: tuple[str, ...]
-    share: Array
-    rest: Array
-    memory: Array
+    part: tuple[str, ...] = about("parts of the model", "formula")
+    share: Array = about("share of each part that its size has", "gust", "formula", gaps=True, brief=False)
+    rest: Array = about("size where no part gives anything, N m or N", "gust", unit="SI", gaps=True)
+    memory: Array = about("time in which it falls to 37 %", "gust", unit="s", gaps=True)
 
     @classmethod
     def of(cls, part: Sequence[str], axes: Sequence[AxisLack]) -> Self:

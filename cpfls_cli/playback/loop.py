@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable
+from cpfls_cli.result import About
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
@@ -47,24 +48,31 @@ _MOST_NOISE = 0.1
 """Of the power of a band that may be noise of the sensors: with more, what is left is the noise's error."""
 
 
+_BODY = "body (FLU)"
+
+
+def _by_axis(text: str, unit: str = "1") -> About:
+    return About(text, ("axis",), unit=unit, frame=_BODY, gaps=True)
+
+
 class LoopBounds(NamedTuple):
     """Bounds on moments of inertia, in those of a model, from how its torque and the rotation go together.
 
-    Other fields are described at `LoopGroup`; what is explained may be of a better model than that of the bounds.
-
-    Attributes
-    ----------
-    low, high : array, shape (3,)
-        Factors, body axes; 1 between them where the model is that of the body. NaN where the flights do not tell.
+    What is explained may be of a better model than that of the bounds.
     """
 
-    low: Array
-    high: Array
-    explained: Array
-    band_hz: Array = np.zeros((0, 2))
-    by_band: Array = np.zeros((0, 3))
-    turning: Array = np.full(3, np.nan)
-    missed: Array = np.full(3, np.nan)
+    low: Annotated[Array, _by_axis("least factor on the moment of inertia; 1 lies between both if the model is right")]
+    high: Annotated[Array, _by_axis("largest factor on the moment of inertia")]
+    explained: Annotated[Array, _by_axis("share of the rotation in a band that torque explains, the least")]
+    band_hz: Annotated[Array, About("ends of bands, about", ("loop band", "2"), unit="Hz")] = np.zeros((0, 2))
+    by_band: Annotated[
+        Array, About("share of the rotation that torque explains", ("loop band", "axis"), frame=_BODY, gaps=True)
+    ] = np.zeros((0, 3))
+    turning: Annotated[Array, _by_axis("body rate, root mean square", "rad/s")] = np.full(3, np.nan)
+    missed: Annotated[
+        Array,
+        _by_axis("share explained by the model that was found, where rotors that only lag explain much more"),
+    ] = np.full(3, np.nan)
 
     @property
     def shows_loop(self) -> bool:

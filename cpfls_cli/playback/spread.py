@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -20,12 +21,12 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import GUST_AXES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder
-from cpfls_cli.playback.vehicle import FoundNumber, bodily
+from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle, bodily
 from cpfls_cli.vehicle.rotors import figures_of_vehicle
 from cpfls_cli.vehicle_limits import broken_limits
 
@@ -80,6 +81,21 @@ class Estimates:
     loop: Array
     gusts: GustRanges | None
     lack: Lack | None = None
+
+    @classmethod
+    def of(cls, found: FoundVehicle) -> Self:
+        """Take those of a vehicle that was found."""
+        # Where instruments identify the constants no loop has widened their intervals.
+        own, gusts = found.loop, found.disturbance
+        loop = np.ones((2, 3)) if found.instruments else np.array([np.fmin(own.low, 1.0), np.fmax(own.high, 1.0)])
+        return cls(
+            numbers=found.numbers,
+            correlation=found.correlation,
+            blocks=found.blocks,
+            loop=loop,
+            gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+            lack=None if gusts is None else gusts.lack,
+        )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -125,6 +126,18 @@ class Judged:
         return float(difference.mean()), float(mean_error(difference))
 
 
+class TriedStructure(NamedTuple):
+    """A structure of the Pareto front, or a baseline, judged on the flights kept aside."""
+
+    name: Annotated[str, About("chosen, best, greedy, everything, nothing, or front")]
+    blocks: Annotated[tuple[str, ...], About("its blocks", ("block",))]
+    error: Annotated[float, About("mean error of the windows kept aside; about 1.1 for rates that stay")]
+    worse: Annotated[float, About("error less that of the best")]
+    uncertain: Annotated[float, About("standard error of that difference")]
+    numbers: Annotated[int, About("free numbers")]
+    condition_number: Annotated[float, About("of the numbers in their natural sizes")]
+
+
 @dataclass(frozen=True)
 class Choice:
     """What a search for the structure came to.
@@ -151,6 +164,23 @@ class Choice:
     front: tuple[Judged, ...]
     evaluated: int
     complete: bool
+
+    @property
+    def tried(self) -> tuple[TriedStructure, ...]:
+        """The baselines, then the front."""
+        baselines = [(name, getattr(self, name)) for name in ("chosen", "best", "greedy", "everything", "nothing")]
+        return tuple(
+            TriedStructure(
+                name,
+                each.structure.blocks,
+                each.error,
+                each.worse_than(self.best)[0],
+                each.worse_than(self.best)[1],
+                each.numbers,
+                each.condition_number,
+            )
+            for name, each in [*baselines, *(("front", each) for each in self.front)]
+        )
 
 
 Progress = Callable[[Sequence[Judged], int], None]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import field, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
-from cpfls_cli.playback.constants import Constants, constants_of_past, find_constants
+from cpfls_cli.playback.constants import UsedInstruments, constants_of_past, find_constants, used_instruments
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -25,8 +25,9 @@ from cpfls_cli.playback.loop import LoopBounds, loop_beside_plain
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
+from cpfls_cli.playback.structure import Choice, Kept, Progress, TriedStructure, choose, fitted_to_all
 from cpfls_cli.playback.table import wrench_of
+from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _TRADED = 0.95
@@ -43,116 +44,94 @@ _STEP = 1e-5
 """Of central differences, in natural sizes."""
 
 
-class FoundNumber(NamedTuple):
-    """A number of a vehicle, in SI; other fields are described at `FoundNumbersGroup`.
+_SI = About("estimate", unit="SI")
+_LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
 
-    Attributes
-    ----------
-    determined : bool
-        Whether the flights say more of it than what was believed before: to a factor of two where it cannot be
-        negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
-    possible : bool
-        Whether a vehicle can have it, see `bodily`.
+
+class FoundNumber(NamedTuple):
+    """A number of a vehicle that was free.
+
+    It is determined where the flights say more of it than what was believed before: to a factor of two where it cannot
+    be negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
     """
 
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    stated: float
-    determined: bool
-    at_bound: bool
-    possible: bool = True
+    name: Annotated[str, About("block and number")]
+    unit: Annotated[str, About("empty for a ratio")]
+    value: Annotated[float, _SI]
+    low: Annotated[float, _LOW]
+    high: Annotated[float, _HIGH]
+    stated: Annotated[float, About("in the config; not finite where no config does", unit="SI", gaps=True)]
+    determined: Annotated[bool, About("1 where the flights say more than what was believed before")]
+    at_bound: Annotated[bool, About("1 where it lies on a bound, so the interval says little")]
+    possible: Annotated[bool, About("0 where no such vehicle has the estimate, see `bodily`")] = True
 
 
 class Difference(NamedTuple):
-    """What a configuration has that the vehicle of the config has not, in SI, with a 95 % interval."""
+    """What a configuration has that the vehicle of the config has not."""
 
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
+    name: Annotated[str, About("configuration, and what differs")]
+    unit: Annotated[str, About("of the difference")]
+    value: Annotated[float, _SI]
+    low: Annotated[float, _LOW]
+    high: Annotated[float, _HIGH]
 
 
 class Trade(NamedTuple):
-    """Two numbers that the flights cannot tell apart."""
+    """Two numbers of which the flights identify only a combination."""
 
-    first: str
-    second: str
-    correlation: float
+    first: Annotated[str, About("one number")]
+    second: Annotated[str, About("the other")]
+    correlation: Annotated[float, About("of the two estimates")]
 
 
 class Share(NamedTuple):
-    """How much a part of the model does along the training flights.
+    """How much a part of the model does along the training flights."""
 
-    Attributes
-    ----------
-    name : str
-        ``rotors``, an effect, or ``remainder``.
-    wrench : array, shape (6,), N m and N, body frame
-        Root mean square.
-    """
-
-    name: str
-    wrench: Array
+    name: Annotated[str, About("rotors, an effect, or remainder")]
+    wrench: Annotated[
+        Array, About("root mean square of torque (N m), then force (N)", ("6",), unit="SI", frame="body (FLU)")
+    ]
 
 
-@dataclass(frozen=True)
+@result
 class FoundVehicle:
-    """What was found.
+    """What was found."""
 
-    Attributes
-    ----------
-    shares : tuple of Share
-        Of rotors, named effects and learned remainder.
-    airspeed : float, m/s
-        In the rotor plane; 95 % of the samples are slower.
-    correlation : array, shape (number, number)
-        Of the estimates; of what is positive, of its logarithm.
-    condition_number : float
-        Of the last fit.
-    blocks : int
-        Blocks of windows that the intervals come from.
-    guessed : tuple of str
-        What is not known of the vehicle and no flight tells.
-    others : mapping of str to VehicleModel
-        Other configurations, by name of the group.
-    differences : tuple of Difference
-        What they have that the vehicle of the config has not.
-    loop : LoopBounds
-        How far the loop may have misled the fit.
-    instruments : Instruments
-    constants : Constants or None
-        What instruments tell; the model and its numbers are then these.
-    forecast : VehicleModel or None
-        What forecasts the flights, loop and all, where the model is the vehicle alone.
-    gusts : FoundGusts or None
-        Where the numbers are those of the vehicle; the model holds what is known of them.
-    history : Observer or None
-        By which the forecast uses the past; None where that is no better on flights kept aside, is not asked for, or
-        the search was stopped.
-    """
-
-    model: VehicleModel
-    numbers: tuple[FoundNumber, ...]
-    shares: tuple[Share, ...]
-    airspeed: float
-    trades: tuple[Trade, ...]
-    correlation: Array
-    choice: Choice
-    condition_number: float
-    blocks: int
-    guessed: tuple[str, ...]
-    others: Mapping[str, VehicleModel]
-    differences: tuple[Difference, ...]
-    loop: LoopBounds
-    instruments: Instruments
-    constants: Constants | None = None
-    forecast: VehicleModel | None = None
-    gusts: FoundGusts | None = None
-    history: Observer | None = None
+    model: VehicleModel = part()
+    numbers: tuple[FoundNumber, ...] = part()
+    shares: tuple[Share, ...] = part()
+    """Of rotors, named effects and learned remainder."""
+    airspeed_m_s: float = about("speed in the rotor plane that 95 % of the training samples stay below", unit="m/s")
+    trades: tuple[Trade, ...] = part()
+    correlation: Array = about(
+        "of the estimates; of what is positive, of its logarithm", "number", "number", brief=False
+    )
+    structures: tuple[TriedStructure, ...] = part()
+    evaluated: int = about("structures that were judged")
+    complete: bool = about("1 where the search ran to the end")
+    blocks: int = about("blocks of windows that the intervals come from")
+    guessed: tuple[str, ...] = about(
+        "numbers of the vehicle that are still guesses: no flight determines them", "guess", default=()
+    )
+    differences: tuple[Difference, ...] = part(default=())
+    """What other configurations have that the vehicle of the config has not."""
+    loop: LoopBounds = part()
+    """How far the loop may have misled the fit."""
+    instruments: UsedInstruments | None = part(default=None)
+    """What moved the flights apart from gusts, where the model and its numbers rest on it."""
+    forecast: VehicleModel | None = part(default=None)
+    """What forecasts the flights, loop and all, where the model is the vehicle alone."""
+    disturbance: FoundGusts | None = part(default=None)
+    """Gusts, where the numbers are those of the vehicle; the model holds what is known of them."""
+    history: Observer | None = part(default=None)
+    """By which the forecast uses the past; None where that is no better on flights kept aside, is not asked for, or the
+    search was stopped."""
+    choice: Choice | None = None
+    """How it was chosen; in no file, as all that follows."""
+    sources: Instruments | None = None
+    """All that tells how the flights were moved, apart from gusts."""
+    others: Mapping[str, VehicleModel] = field(default_factory=dict)
+    """Other configurations, by name of the group."""
 
 
 def find_vehicle(
@@ -182,7 +161,7 @@ def find_vehicle(
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
     else:
         solved, spread, forecast = fitted, uncertainty(fitted, windows), None
-    model = solved.model
+    model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     if forecast is None:
         numbers = tuple(beside_loop(numbers, loop))
@@ -190,24 +169,29 @@ def find_vehicle(
     if forecast is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, told=forecast is not None)
+    shares, airspeed = _shares(model, own)
+    used = None if forecast is None or constants is None else used_instruments(given, constants)
     return FoundVehicle(
-        replace(model, gusts=None if gusts is None else gusts.gusts),
-        numbers,
-        *_shares(model, own),
-        tuple(_trades(solved, spread)),
-        _beside(len(sensed), estimate_correlation(solved, spread)),
-        choice,
-        solved.condition_number,
-        spread.blocks,
-        tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
-        {group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
-        tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
-        loop,
-        given,
-        None if forecast is None else constants,
-        forecast,
-        gusts,
-        find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,
+        model=replace(model, gusts=None if gusts is None else gusts.gusts),
+        numbers=numbers,
+        shares=shares,
+        airspeed_m_s=airspeed,
+        trades=tuple(_trades(solved, spread)),
+        correlation=_beside(len(sensed), estimate_correlation(solved, spread)),
+        structures=choice.tried,
+        evaluated=choice.evaluated,
+        complete=choice.complete,
+        blocks=spread.blocks,
+        guessed=tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
+        differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
+        loop=loop,
+        instruments=used,
+        forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
+        disturbance=gusts,
+        history=find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,
+        choice=choice,
+        sources=given,
+        others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
     )
 
 

@@ -143,6 +143,16 @@ class ModelStructure:
 
     settings: StructureSettings = part()
 
+    @property
+    def parameter_names(self) -> list[str]:
+        """Inertia function, rule and feature of each coefficient."""
+        return [
+            f"{block.function.name} rule {rule + 1} c{feature}"
+            for block in self.blocks
+            for rule in range(block.rules)
+            for feature in range(block.features)
+        ]
+
     @cached_property
     def partitions(self) -> tuple[Partition, ...]:
         """In the order of the genes: D13(pitch), D22(roll), D23(roll), D23(pitch), D33(roll), D33(pitch)."""

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.checkpoint import ArchiveGroup, CheckpointRecord, UnfinishedGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
 from cpfls_cli.config.load import flat_keys, parse_config
@@ -23,12 +23,14 @@ from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.engine import EvolutionState, History
 from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import Unfinished
+from cpfls_cli.store import Origin, read
 
 if TYPE_CHECKING:
-    from cpfls_cli.artifacts.sweep import SweepRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+    from cpfls_cli.artifacts.vehicle_model import Vehicle
+    from cpfls_cli.identification.replicates import Sweep
 
 R = TypeVar("R", bound=Record)
+T = TypeVar("T")
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
@@ -52,6 +54,19 @@ class StoppedSearch:
     unfinished: Unfinished
 
 
+class Written(NamedTuple):
+    """The output of a command that was stopped, or was not: whether it is complete, and where it comes from."""
+
+    complete: bool
+    origin: Header | Origin
+
+
+def _same_origin(one: Header | Origin, other: Header | Origin) -> bool:
+    """Tell whether two outputs come from the same config and inputs."""
+    names = ("version", "seed", "config", "inputs", "cautions")
+    return all(getattr(one, name) == getattr(other, name) for name in names)
+
+
 @dataclass(frozen=True)
 class KeptFile:
     """A file beside the output from which a stopped command can go on.
@@ -66,7 +81,7 @@ class KeptFile:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedRecord | SweepRecord | VehicleRecord]]
+    OUTPUT: ClassVar[type[IdentifiedModel | Sweep | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:
@@ -98,7 +113,7 @@ class KeptFile:
     def output_may_be_replaced(self) -> bool:
         """Tell whether the output is what the stopped command left: incomplete, or complete and not tidied up."""
         written = self._written()
-        return written is not None and (not written.complete or written.origin == self.header)
+        return written is not None and (not written.complete or _same_origin(written.origin, self.header))
 
     def remove(self) -> None:
         """Remove what is left, if there is anything."""
@@ -115,14 +130,21 @@ class KeptFile:
             raise
 
     def _read(self, wanted: type[R]) -> R:
-        """Read what is left."""
+        """Read a record that is left."""
+        return self._left(lambda: read_record(self.path, wanted))
+
+    def _read_result(self, wanted: type[T]) -> tuple[T, Origin]:
+        """Read a result that is left."""
+        return self._left(lambda: read(self.path, wanted))
+
+    def _left(self, reading: Callable[[], T]) -> T:
         if not self.path.exists():
             written = self._written()
             if written is not None and written.complete:
                 raise InputError(f"{self.output}: is complete; nothing to resume")
             raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
         try:
-            return read_record(self.path, wanted)
+            return reading()
         except InputError as error:
             raise InputError(f"{error}; {_START_AGAIN}") from None
 
@@ -134,13 +156,17 @@ class KeptFile:
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
 
-    def _written(self) -> IdentifiedRecord | SweepRecord | VehicleRecord | None:
+    def _written(self) -> Written | None:
         """Read the output; None where there is none, or another file."""
-        if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT.name:
+        wanted = getattr(self.OUTPUT.FORMAT, "name", self.OUTPUT.FORMAT)
+        if not self.output.is_file() or format_name(self.output) != wanted:
             return None
-        written = read_any(self.output)
-        assert isinstance(written, self.OUTPUT)
-        return written
+        if issubclass(self.OUTPUT, Record):
+            written = read_any(self.output)
+            assert isinstance(written, self.OUTPUT)
+            return Written(written.complete, written.origin)
+        given, origin = read(self.output, self.OUTPUT)
+        return Written(given.complete, origin)
 
     def _require_same(self, differing: Iterable[str]) -> None:
         """Refuse what is left of another command."""
@@ -158,7 +184,7 @@ class Checkpoint(KeptFile):
 
     WORK: ClassVar = "search"
     SUFFIX: ClassVar = ".checkpoint"
-    OUTPUT: ClassVar = IdentifiedRecord
+    OUTPUT: ClassVar = IdentifiedModel
 
     def write(self, state: EvolutionState) -> None:
         """Replace what was there by this state, or leave it as it was."""
@@ -226,7 +252,7 @@ def keys_of(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, 
 
 
 def differences(
-    then: Header, now: Header, old: Mapping[str, Any], new: Mapping[str, Any], unimportant: str | None = None
+    then: Header | Origin, now: Header, old: Mapping[str, Any], new: Mapping[str, Any], unimportant: str | None = None
 ) -> Iterator[str]:
     """List the keys and inputs that differ between a command that was stopped and the one that is to go on from it.
 

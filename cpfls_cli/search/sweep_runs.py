@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
@@ -13,11 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, header_of
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, SweepRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.overrides import Variant, variants
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -26,14 +22,16 @@ from cpfls_cli.flights.inputs import choosing_source, held_out_parts
 from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
 from cpfls_cli.identification.data import TorqueSource, gathered
 from cpfls_cli.identification.identify import TRAINING, Identification, identify
+from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting, Sweep, replicate
 from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end, require_flights
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
-from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.search.checkpoint import Checkpoint, KeptFile, StoppedSearch, differences
 from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
+from cpfls_cli.store import Origin, write
 
 # Work of an evaluation that does not grow with the samples, in samples.
 _FIXED_WORK = 1000
@@ -132,9 +130,24 @@ class SweptSetting:
         return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), Selection.FORMAT)
 
     @property
-    def genes(self) -> int:
-        """Weights of its chromosomes."""
-        return model_structure(self.variant.study.identification).genes
+    def without_runs(self) -> Setting:
+        """What is known of it before its first run is finished."""
+        settings = self.variant.study.identification
+        return Setting(
+            name=self.variant.name,
+            overrides=self.variant.overrides,
+            structure=settings.structure,
+            samples=len(self.data.learned),
+            criterion=self.criterion,
+            selection=self.selection.sha256,
+            population=settings.population,
+            generations=settings.generations,
+            judged_on=settings.judged_on,
+            ranking=settings.ranking,
+            uniform_condition_number=self.uniform_condition_number,
+            largest_torque=max(float(np.max(np.abs(data.torque))) for data in self.data.training.chunks()),
+            replicates=(),
+        )
 
     @property
     def work(self) -> int:
@@ -175,44 +188,11 @@ class SweepPlan:
         """Give the study of a run."""
         return self.setting(run).variant.study.model_copy(update={"seed": self.seed(run)})
 
-    @property
-    def no_runs(self) -> RunGroup:
-        """Its runs before the first is finished."""
-        return RunGroup.none(self.parts, max(setting.genes for setting in self.settings))
-
-    def record(self, runs: RunGroup) -> SweepRecord:
-        """Arrange the sweep with the runs that are finished."""
-        studies = [setting.variant.study for setting in self.settings]
-        columns = SettingGroup(
-            name=tuple(setting.variant.name for setting in self.settings),
-            overrides=tuple(json.dumps(list(s.variant.overrides), ensure_ascii=False) for s in self.settings),
-            structure=tuple(study.identification.structure for study in studies),
-            samples=np.array([len(setting.data.learned) for setting in self.settings]),
-            criterion=tuple(setting.criterion for setting in self.settings),
-            selection=tuple(setting.selection.sha256 for setting in self.settings),
-            population=np.array([study.identification.population for study in studies]),
-            generations=np.array([study.identification.generations for study in studies]),
-            judged_on=tuple(study.identification.judged_on for study in studies),
-            ranking=tuple(study.identification.ranking for study in studies),
-            uniform_condition_number=np.array([setting.uniform_condition_number for setting in self.settings]),
-        )
-        return SweepRecord(
-            setting=columns,
-            part=self.parts,
-            largest_torque=self._largest_torque,
-            run=runs,
-            complete=len(runs) == self.runs,
-        )
-
     @cached_property
-    def _largest_torque(self) -> Array:
-        """Find the largest torque of each part, in the first setting that is judged on it; shape (parts,), N m."""
-        largest: dict[str, float] = {}
-        for setting in self.settings:
-            for part, source in {TRAINING: setting.data.training, **setting.held_out}.items():
-                if part not in largest:
-                    largest[part] = max(float(np.max(np.abs(data.torque))) for data in source.chunks())
-        return np.array([largest[part] for part in self.parts])
+    def without_runs(self) -> Sweep:
+        """The sweep before its first run is finished."""
+        settings = tuple(setting.without_runs for setting in self.settings)
+        return Sweep(parts=self.parts, complete=False, settings=settings)
 
     def work(self, runs: int) -> int:
         """Tell roughly how long so many runs take."""
@@ -263,39 +243,41 @@ class PartialSweep(KeptFile):
 
     WORK: ClassVar = "sweep"
     SUFFIX: ClassVar = ".partial"
-    OUTPUT: ClassVar = SweepRecord
+    OUTPUT: ClassVar = Sweep
 
-    def take_up(self, *, resume: bool, force: bool) -> SweepRecord | None:
+    def take_up(self, *, resume: bool, force: bool) -> Sweep | None:
         """Read what a stopped sweep left, where it is to go on; None for one that starts, `force` to give it up."""
         Checkpoint.beside(self.output, self.header).require_own()
         if not resume:
             self.require_permission(force=force)
             return None
-        stopped = self._read(SweepRecord)
-        old, new = _keys(stopped.origin), _keys(self.header)
-        self._require_same(differences(stopped.origin, self.header, old, new))
+        stopped, origin = self._read_result(Sweep)
+        self._require_same(differences(origin, self.header, _keys(origin), _keys(self.header)))
         return stopped
 
-    def runs(self, plan: SweepPlan, stopped: SweepRecord | None) -> RunGroup:
+    def begin(self, plan: SweepPlan, stopped: Sweep | None) -> Sweep:
         """Take the runs that are finished, and keep them from here on."""
-        runs = plan.no_runs if stopped is None else stopped.run
+        begun = plan.without_runs
         if stopped is not None:
-            self._require_same_plan(plan, stopped)
-        self.write(plan, runs)
-        return runs
+            self._require_same_plan(plan, stopped, begun)
+            # More seeds than those that are finished may be asked for now.
+            begun = replace(stopped, complete=stopped.runs == plan.runs)
+        self.write(begun)
+        return begun
 
-    def write(self, plan: SweepPlan, runs: RunGroup) -> None:
+    def write(self, sweep: Sweep) -> None:
         """Replace what was there by these finished runs, or leave it as it was."""
-        write_record(self.path, plan.record(runs).with_header(self.header))
+        own = self.header
+        write(self.path, sweep, Origin(stage="sweep", inputs=own.inputs, seed=own.seed, config=own.config))
 
-    def _require_same_plan(self, plan: SweepPlan, stopped: SweepRecord) -> None:
-        differing = [f"{path} differs" for path in stopped.differing_settings(plan.record(plan.no_runs))]
-        if len(stopped.run) > plan.runs:
-            differing.append(f"{_SEEDS} = {len(plan.seeds)}, but {len(stopped.run)} runs are finished")
+    def _require_same_plan(self, plan: SweepPlan, stopped: Sweep, begun: Sweep) -> None:
+        differing = [f"{path} differs" for path in stopped.differing_settings(begun)]
+        if stopped.runs > plan.runs:
+            differing.append(f"{_SEEDS} = {len(plan.seeds)}, but {stopped.runs} runs are finished")
         self._require_same(differing)
 
 
-def _keys(header: Header) -> dict[str, Any]:
+def _keys(header: Header | Origin) -> dict[str, Any]:
     """List the keys that a sweep depends on, with dots; more seeds only add to it."""
     config = parse_config(header.config, "/config")
     return {"seed": config["seed"]} | {
@@ -307,24 +289,24 @@ def _keys(header: Header) -> dict[str, Any]:
 
 
 def finish_runs(
-    job: Job, plan: SweepPlan, runs: RunGroup, partial: PartialSweep, options: SearchOptions, watch: Watch
-) -> tuple[RunGroup, StopReason]:
+    job: Job, plan: SweepPlan, sweep: Sweep, partial: PartialSweep, options: SearchOptions, watch: Watch
+) -> tuple[Sweep, StopReason]:
     """Go on from the first run that is not finished, keep each as soon as it is, and say why no more of them are."""
-    for number in range(len(runs), plan.runs):
+    for number in range(sweep.runs, plan.runs):
         if (reason := watch.should_stop()) is not None:
-            return runs, reason
+            return sweep, reason
         inputs = {**partial.header.inputs, "selection": plan.setting(number).selection}
         checkpoint = Checkpoint.beside(job.output, header_of(plan.study(number), inputs))
         search = Resumable(checkpoint, _left_within_a_run(checkpoint) if options.resume else None)
         with plan.naming(number):
-            result = _identified(job, plan, number, search, options, watch)
-        if not is_end(result.stop_reason):
-            return runs, result.stop_reason
-        model = None if isinstance(result, NothingFoundError) else result
-        runs = runs.with_run(number % len(plan.settings), plan.seed(number), plan.parts, model)
-        partial.write(plan, runs)
-        search.end(result.stop_reason)
-    return runs, _END
+            found = _identified(job, plan, number, search, options, watch)
+        if not is_end(found.stop_reason):
+            return sweep, found.stop_reason
+        run = replicate(plan.seed(number), plan.parts, None if isinstance(found, NothingFoundError) else found)
+        sweep = sweep.with_run(number % len(plan.settings), run, complete=number + 1 == plan.runs)
+        partial.write(sweep)
+        search.end(found.stop_reason)
+    return sweep, _END
 
 
 def _left_within_a_run(checkpoint: Checkpoint) -> StoppedSearch | None:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
-from cpfls_cli.artifacts.job import Job, check_outputs, header_of, take_inputs
+from cpfls_cli.artifacts.job import Job, check_outputs, header_of
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
 from cpfls_cli.search.checkpoint import KeptFile, differences, keys_of
 
@@ -27,7 +26,7 @@ class VehicleCheckpoint(KeptFile):
 
     WORK: ClassVar = "search"
     SUFFIX: ClassVar = ".checkpoint"
-    OUTPUT: ClassVar = VehicleRecord
+    OUTPUT: ClassVar = Vehicle
 
     def write(self, judged: Sequence[Judged]) -> None:
         """Replace what was there by these structures, or leave it as it was."""
@@ -59,16 +58,15 @@ def kept_of(record: VehicleCheckpointRecord) -> Kept:
 
 
 def begin_vehicle_search(
-    job: Job, inputs: Mapping[str, Path], *, resume: bool
-) -> tuple[dict[str, InputFile], VehicleCheckpoint, Kept | None]:
-    """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
+    job: Job, files: Mapping[str, InputFile], *, resume: bool
+) -> tuple[VehicleCheckpoint, Kept | None]:
+    """Check checkpoint and output of a search for the structure of a vehicle before anything is computed.
 
     The solutions that are kept tell where to go on; None to start.
     """
-    files = take_inputs(job, inputs)
     checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
     kept = checkpoint.read() if resume else None
     if kept is None:
         checkpoint.require_permission(force=job.force)
     check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
-    return files, checkpoint, kept
+    return checkpoint, kept

@@ -13,17 +13,14 @@ import numpy as np
 from cpfls_cli.arguments import FlightsArgument, ModelOption
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
-from cpfls_cli.artifacts.store import holds
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
 from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
@@ -201,7 +198,7 @@ def compare(run: Run, flights: FlightsArgument, model: ModelOption = None) -> Di
     roles = numbered_roles("flight", flights)
     inputs = run.take(roles | ({} if model is None else {"model": model}))
     check_ignored(run.study)
-    with_numbers(run, "compare", model, whole=model is not None and holds(model, VehicleRecord))
+    with_numbers(run, "compare", model, whole=model is not None and is_found(model))
     read, learned = read_flights(flights, run.study), learned_by(model)
     base = VehicleModel(vehicle=run.study.vehicle) if model is None else read_model(model, run.study)
     given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))
@@ -233,7 +230,7 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
     """Give the command that names what is missing, from the model on where `cpfls gap` can start from it."""
     if job.found is not None and why_no_body_found(job, job.found):
         return to_fly(job)
-    starts = model is not None and (holds(model, VehicleRecord) or holds(model, IdentifiedRecord))
+    starts = model is not None and (is_found(model) or is_identified(model))
     given: Sequence[str | Path] = ("--model", model) if model is not None and starts else ()
     return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
 

@@ -11,28 +11,23 @@ import numpy as np
 
 from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
-from cpfls_cli.artifacts.evidence import UncertaintyGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.flight_source import FlightStretch, check_file, flight_source, flight_stretches, torque_source_of
 from cpfls_cli.flights.inputs import hashes_of
-from cpfls_cli.flights.models import read_model, rebuilt
+from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
+from cpfls_cli.identification.scores import AXES
 from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.trust import seen_words
@@ -42,7 +37,6 @@ from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, s
 from cpfls_cli.rotations import attitude_rate, generalised_torque
 from cpfls_cli.stage import Parts, Run, stage
 from cpfls_cli.store import count_rows, read_first
-from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.prediction import AlongFlight, Totals
 from cpfls_cli.weak_form.windows import Recording
 
@@ -146,9 +140,9 @@ FIGURES = {
 def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | None:
     """Predict along a flight, some samples at a time."""
     inputs = run.take({"model": model, "flight": flight})
-    with_numbers(run, "predict", model, whole=holds(model, VehicleRecord))
-    record = read_record(model, ModelRecord)
-    identified = record if isinstance(record, IdentifiedRecord) else None
+    with_numbers(run, "predict", model, whole=is_found(model))
+    record = any_model(model)
+    identified = record if isinstance(record, IdentifiedModel) else None
     wrong = contradictions(check_file(flight, run.study, driven=identified is None))
     known: dict[str, Any] = {
         "seen": seen_words(record, hashes_of(flight, inputs["flight"])),
@@ -165,17 +159,15 @@ def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | N
         }
         found = (predicted(stretch).part(stretch.own) for stretch in stretches)
         return _summed(run, found, len(stretches), known)
-    functions = rebuilt(model, identified).fuzzy
-    assert isinstance(functions, InertiaFunctions), "what is identified"
+    functions, draws = identified.functions, identified.uncertainty
     torque = count_rows(flight, Flight, "torque") is not None
     flown = flight_source(flight, torque=torque)
     if run.dry_run:
         return None
-    draws = _draws(identified.uncertainty)
     others = (*model_of_another(model, run.study), *other_vehicles([flight], run.study))
     known |= {
         "begins_s": read_first(flight, Flight)[0].begins,
-        "condition_number": identified.solve.condition_number if identified.known_everywhere else None,
+        "condition_number": identified.condition_number if identified.known_everywhere else None,
         "warnings": (*(each.text for each in unjudged(identified, model.name)), *others),
     }
     chunks = (data[start : start + PART] for data in flown.chunks() for start in range(0, len(data), PART))
@@ -196,13 +188,6 @@ def _summed(run: Run, found: Iterator[AlongFlight], samples: int, known: dict[st
                 run.progress(totals.samples, samples)
 
     return Parts(parts(), samples)
-
-
-def _draws(drawn: UncertaintyGroup | None) -> Draws | None:
-    """Give the bootstrap draws behind the bands of a model; None for a model without."""
-    if drawn is None:
-        return None
-    return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
 
 
 def _of_vehicle(path: Path, flight: Path, study: Study) -> Callable[[FlightStretch], AlongFlight]:

@@ -14,11 +14,9 @@ from cpfls_cli.arguments import FlightsArgument, JudgedOption
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs
 from cpfls_cli.artifacts.output import refuse_own
-from cpfls_cli.artifacts.store import holds
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.models import is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.gap import MEASURED
@@ -170,7 +168,7 @@ def response(
     """Estimate frequency responses with the instruments that the flights hold, and those of a model."""
     roles = numbered_roles("flight", flights)
     inputs = run.take(({} if model is None else {"model": model}) | roles)
-    with_numbers(run, "response", model, whole=model is not None and holds(model, VehicleRecord))
+    with_numbers(run, "response", model, whole=model is not None and is_found(model))
     if table is not None:
         refuse_own(table, run.output)
         check_outputs(run, table)

@@ -13,10 +13,9 @@ import typer
 
 from cpfls_cli.arguments import AutopilotChoice
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
-from cpfls_cli.artifacts.store import format_name, holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST
+from cpfls_cli.artifacts.store import format_name
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -26,7 +25,7 @@ from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flights.flight import Flight, Imported, read_whole
 from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.models import read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
 from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
@@ -34,8 +33,8 @@ from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.look.vibration import Change, vibration_of
+from cpfls_cli.pages.model import slow_words
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.pages.vehicle_model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import (
     BASELINE,
@@ -393,15 +392,15 @@ def _noise_of(autopilot: Autopilot, values: Mapping[str, float], logs: Sequence[
     return noise.before_filters(autopilot.law(values)) if noise is not None and all(behind) else noise
 
 
-def _trusted(run: Run, model: Path) -> VehicleRecord:
+def _trusted(run: Run, model: Path) -> Vehicle:
     """Read a vehicle that is good for simulation and control, and refuse others with the flight that is missing."""
-    if not holds(model, VehicleRecord):
-        what = "an identified model" if holds(model, ModelRecord) else "no model"
+    if not is_found(model):
+        what = "an identified model" if is_model(model) else "no model"
         raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
-    record = read_record(model, VehicleRecord)
+    record = found_vehicle(model)
     if record.verdict is not Trust.SIMULATION:
         good = trust_words(Trust.SIMULATION).short
-        weak = f"; not identified: {joined(record.untold)}" if record.untold else ""
+        weak = f"; not identified: {joined(record.not_determined)}" if record.not_determined else ""
         raise InputError(
             f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good}: a body "
             f"that is too heavy gives gains that are too high. {_missing(run, record)}"
@@ -409,28 +408,28 @@ def _trusted(run: Run, model: Path) -> VehicleRecord:
     return record
 
 
-def _missing(run: Run, record: VehicleRecord) -> str:
+def _missing(run: Run, record: Vehicle) -> str:
     """Say which flight would make a vehicle good."""
     judged = record.held_out is not None or record.instruments is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     planned = command_line(to_fly(run))
-    slow = next(slow_words(record), "")
+    slow = slow_words(record)
     if slow:
         return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
     return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
 
 
-def _spreads(record: VehicleRecord, model: VehicleModel, rotor_lag: float) -> tuple[tuple[Spread, ...], list[str]]:
+def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tuple[Spread, ...], list[str]]:
     """Give what flights leave open of each axis, and say what is assumed where they do not identify it."""
-    known = {each.key: each for each in parameters_of(record)}
+    known = record.parameters
     intervals, stated, assumed = {}, list[str](), list[str]()
     for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
         each = known[key]
         if each.determined and each.value and each.low is not None and each.high is not None:
             # An end at or below zero says no more than that the number is small.
             intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
-        elif key in INERTIA[:3] and FOUND_AS[key] in record.untold:
+        elif key in INERTIA[:3] and FOUND_AS[key] in record.not_determined:
             intervals[key] = _ASSUMED_GAIN
             stated.append(each.name)
     if stated:

@@ -10,10 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.artifacts.job import go_on
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.rebuilt import estimates
-from cpfls_cli.artifacts.store import read_header, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
@@ -21,7 +18,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flights.flight import Imported, read_whole
 from cpfls_cli.flights.inputs import known_by
-from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.pages.disturbance import still_air_text
@@ -32,7 +29,7 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
-from cpfls_cli.playback.spread import drawn
+from cpfls_cli.playback.spread import Estimates, drawn
 from cpfls_cli.report.canvas import (
     BASELINE,
     HELD,
@@ -252,11 +249,10 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
 def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Sequence[VehicleModel], Lack | None]:
     """Draw vehicles that the flights of a model allow, as `cpfls spread` does; of other models there is only one."""
     assert model is not None, "it is the model that holds the gusts"
-    record = read_record(path, ModelRecord)
-    if not isinstance(record, VehicleRecord):
+    if not is_found(path):
         return [model] * DRAWS, None
     with about(path, InputError, ComputationError):
-        spread = drawn(model, estimates(record), DRAWS, generator(study, "spread"))
+        spread = drawn(model, Estimates.of(found_vehicle(path)), DRAWS, generator(study, "spread"))
     return spread.models, spread.lack
 
 

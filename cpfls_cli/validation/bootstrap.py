@@ -15,6 +15,7 @@ from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.identification.solver import Fit
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.result import about
 from cpfls_cli.validation.timeline import time_blocks
 
 POWER = 0.75
@@ -117,21 +118,30 @@ def missed_torque(source: TorqueSource, model: InertiaFunctions) -> OtherTorque:
     return OtherTorque(source, lambda data: data.torque - model.torque(data.motion))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Draws:
     """Bootstrap draws of the parameters of a model: what other flights with the same noise might give.
 
     They scatter about the model's own. A band is wider than their spread by a factor that the number of blocks gives:
     see `cpfls_cli.validation.bands.band`.
-
-    Its fields are described at `UncertaintyGroup`.
     """
 
-    coefficients: Array
-    rigid_body: Array
-    best_rigid_body: Array
-    blocks: int
-    block_duration: float
+    coefficients: Array = about(
+        "of the rule consequents, each draw",
+        "draw",
+        "rule_coefficient",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    rigid_body: Array = about(
+        "under the fuzzy part, each draw", "draw", "6", unit="kg m^2", frame="body (FLU)", brief=False
+    )
+    best_rigid_body: Array = about(
+        "that fits best, each draw", "draw", "6", unit="kg m^2", frame="body (FLU)", brief=False
+    )
+    blocks: int = about("contiguous blocks of samples that were drawn")
+    block_duration: float = about("duration of a block", unit="s")
 
 
 def bootstrap(

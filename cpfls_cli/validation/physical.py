@@ -15,37 +15,30 @@ from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.result import about
 
 _AWAY = 2 * np.pi * np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Physics:
     """Physical plausibility of a model over the cells of roll and pitch that training visited.
 
-    Other fields are described at `PhysicsGroup`.
-
-    Attributes
-    ----------
-    cells : int
-        Cells examined at their centres; those near a pitch of +-90 degrees, where the inertia matrix of every body is
-        all but singular, are left out.
-    energy : float
-        Largest size of ``qd^T (dD/dt - 2 C) qd`` over the sum of the sizes of its terms. Torque that is D and C does
-        work on kinetic energy alone, so that it is rounding for every model with Christoffel symbols.
-    indefinite_anywhere : int
-        Cells of all roll and pitch, visited or not, where D(q) is not positive definite; of `every_cell`.
-    every_cell : int
-        All cells but those near a pitch of +-90 degrees.
+    Torque that is D and C does work on kinetic energy alone: its energy is rounding for every model with Christoffel
+    symbols.
     """
 
-    cells: int
-    indefinite: int
-    smallest_eigenvalue: float
-    worst_attitude: Array
-    energy: float
-    indefinite_anywhere: int
-    every_cell: int
+    cells: int = about("cells of roll and pitch that training visited, those near a pitch of +-90 deg left out")
+    indefinite: int = about("of them where D(q) is not positive definite")
+    smallest_eigenvalue: float = about(
+        "smallest eigenvalue of D(q) over these cells", unit="kg m^2", frame="Euler angles (intrinsic ZYX)", gaps=True
+    )
+    worst_attitude: Array = about(
+        "roll and pitch where it is smallest", "2", unit="rad", frame="Euler angles (intrinsic ZYX)", gaps=True
+    )
+    energy: float = about("largest size of qd^T (dD/dt - 2 C) qd over its own terms: rounding")
+    indefinite_anywhere: int = about("cells of all roll and pitch where D(q) is not positive definite")
+    every_cell: int = about("all cells but those near a pitch of +-90 deg")
 
 
 def physical_sense(model: InertiaFunctions, rng: np.random.Generator) -> Physics:
@@ -119,21 +112,17 @@ def cell_centres(visited: BoolArray) -> Array:
     return np.asarray(attitude[~vertical(attitude)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PeriodErrors:
-    """Torque errors one period away, by part and Euler axis.
+    """Torque errors one period away, the worse of one turn in roll and one turn back in pitch."""
 
-    Attributes
-    ----------
-    mse : array, shape (part, 3), (N m)^2
-        Mean squared error; the worse of one turn in roll and one turn back in pitch.
-    max_error : array, shape (part, 3), N m
-        Largest absolute error; likewise.
-    """
-
-    parts: tuple[str, ...]
-    mse: Array
-    max_error: Array
+    parts: tuple[str, ...] = about("parts judged one period (2 pi in roll and pitch) away", "period_part")
+    mse: Array = about(
+        "mean squared torque error there", "period_part", "axis", unit="(N m)^2", frame="Euler angles (intrinsic ZYX)"
+    )
+    max_error: Array = about(
+        "largest torque error there", "period_part", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)"
+    )
 
 
 def one_period_away(model: InertiaFunctions, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:

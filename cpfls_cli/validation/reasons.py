@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import AXES
+from cpfls_cli.result import About
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.paired import Comparison
 from cpfls_cli.validation.replay import NOTHING_MOVES
@@ -26,18 +27,10 @@ _LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 
 class Reason(NamedTuple):
-    """One sentence on a model, and whether it speaks for or against it.
+    """One sentence on a model, and whether it speaks for or against it."""
 
-    Attributes
-    ----------
-    text : str
-        One sentence with its number.
-    speaks : int
-        1 for the model, -1 against it, 0 neither.
-    """
-
-    text: str
-    speaks: int
+    text: Annotated[str, About("one sentence with its number")]
+    speaks: Annotated[int, About("1 for the model, -1 against it, 0 neither", least=-1)]
 
 
 def numbers(values: Array, shown: BoolArray | None = None) -> str:

@@ -16,6 +16,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, free_runs, turning_law
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.playback.player import rotation_vectors
+from cpfls_cli.result import about
 from cpfls_cli.validation.timeline import sample_period, stretch_numbers
 
 # 40 MB of rotations, rates and torques at a time.
@@ -126,34 +127,50 @@ def _starts(stretch: IntArray, steep: BoolArray, horizon: int) -> IntArray:
     return np.asarray(first[clear], dtype=np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StepErrors:
-    """Root mean square errors of attitude and body rate by horizon; other fields are described at `StepsGroup`.
+    """Root mean square errors of attitude and body rate by horizon.
 
-    Attributes
-    ----------
-    attitude : array, shape (predictor, horizon, 3), rad
-        Of the rotation vector from the measured to the predicted attitude, body axes. NaN from where on a predictor
-        has lost a window: then it has no such error.
-    lost : array of int, shape (predictor, horizon)
-        Windows in which a predictor's inertia was not positive definite, or which it turned faster than any step can
-        follow.
-    window_error : array, shape (predictor, window, 3), (rad/s)^2
-        Mean squared error of the body rate over a window; NaN where lost. To compare predictors window by window.
-    start : array of int, shape (window,)
-        First sample of each window, ascending.
+    A window is lost where a predictor's inertia is not positive definite, or turns faster than any step can follow.
     """
 
-    part: str
-    model: tuple[str, ...]
-    samples: IntArray
-    horizon: Array
-    windows: int
-    attitude: Array
-    body_rate: Array
-    lost: IntArray
-    window_error: Array
-    start: IntArray
+    part: str = about("part that measured torques are replayed on")
+    model: tuple[str, ...] = about("the model, the rigid body, nothing moves", "predictor")
+    samples: IntArray = about("samples replayed", "horizon", brief=False)
+    horizon: Array = about("the same as time", "horizon", unit="s", brief=False)
+    windows: int = about("windows replayed")
+    attitude: Array = about(
+        "root mean square error; not known from where on a window is lost",
+        "predictor",
+        "horizon",
+        "axis",
+        unit="rad",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    body_rate: Array = about(
+        "root mean square error",
+        "predictor",
+        "horizon",
+        "axis",
+        unit="rad/s",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    lost: IntArray = about("windows in which a predictor ran away", "predictor", "horizon", brief=False)
+    window_error: Array = about(
+        "mean squared error of the body rate over a window",
+        "predictor",
+        "window",
+        "axis",
+        unit="(rad/s)^2",
+        frame="body (FLU)",
+        gaps=True,
+        brief=False,
+    )
+    start: IntArray = about("first sample of each window", "window", brief=False)
 
 
 def replay_steps(

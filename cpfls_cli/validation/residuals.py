@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, mean_error
 from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.timeline import lagged_pairs, sample_numbers, sample_period
 
@@ -35,34 +36,50 @@ _FEWEST_SAMPLES = 50
 _CONSTANT = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualAnalysis:
-    """Torque errors, measured minus predicted, on the Euler axes; other fields are described at `ResidualsGroup`.
+    """Torque errors, measured minus predicted, on one part of the data."""
 
-    Attributes
-    ----------
-    exact : array of bool, shape (3,)
-        Axes whose largest error is below a billionth of the largest torque: rounding, which is never white and says
-        nothing of the model.
-    """
-
-    part: str
-    samples: int
-    available: int
-    mean: Array
-    mean_p: Array
-    lag: Array
-    autocorrelation: Array
-    band: float
-    ljung_box: Array
-    input: tuple[str, ...]
-    input_lag: Array
-    correlation: Array
-    histogram_edge: Array
-    histogram_count: IntArray
-    normal_quantile: Array
-    quantile: Array
-    exact: BoolArray
+    part: str = about("part whose residuals are examined")
+    samples: int = about("residuals examined")
+    available: int = about("residuals of the whole part")
+    mean: Array = about(
+        "constant torque that the model lacks", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)", gaps=True
+    )
+    mean_p: Array = about(
+        "p-value of a mean of 0: small where it is not", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True
+    )
+    lag: Array = about("lags of the autocorrelation, from one sample on", "lag", unit="s", brief=False)
+    autocorrelation: Array = about(
+        "of the torque error", "lag", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True, brief=False
+    )
+    band: float = about("1.96 / sqrt(samples): holds 95 % of the lags of white noise")
+    ljung_box: Array = about(
+        "p-value of Ljung and Box: small where not white", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True
+    )
+    input: tuple[str, ...] = about("signals that errors are correlated with", "input", brief=False)
+    input_lag: Array = about("positive: the error follows the input", "input_lag", unit="s", brief=False)
+    correlation: Array = about(
+        "of error and input", "input", "input_lag", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True, brief=False
+    )
+    histogram_edge: Array = about(
+        "edges of the bins", "edge", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)", brief=False
+    )
+    histogram_count: IntArray = about(
+        "errors in each bin", "bin", "axis", frame="Euler angles (intrinsic ZYX)", brief=False
+    )
+    normal_quantile: Array = about("quantiles of the standard normal distribution", "quantile", brief=False)
+    quantile: Array = about(
+        "the same quantiles of the errors",
+        "quantile",
+        "axis",
+        unit="N m",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    exact: BoolArray = about(
+        "1 where errors are rounding, which is never white", "axis", frame="Euler angles (intrinsic ZYX)"
+    )
 
 
 def examine_residuals(

@@ -21,6 +21,7 @@ from cpfls_cli.identification.solver import LARGEST_SQUARE, column_size
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.result import about
 
 # Choices on both sides of those that are usual: the paper's five functions, the second order by default.
 _FUNCTIONS = (1, 3, 5, 7)
@@ -229,26 +230,20 @@ def _fold_error(learned: Products, judged: Products, fold: int, columns: slice, 
     return float(max(square - explained, SMALLEST_ERROR * square) / judged.rows[fold])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StructureComparison:
-    """Structures and the error of each on blocks that it did not learn from.
+    """Structures and the error of each on blocks that it did not learn from; none where samples are too few."""
 
-    Other fields are described at `StructuresGroup`.
-
-    Attributes
-    ----------
-    name : tuple of str
-        The rigid body first; none where the samples are too few for the folds.
-    ridge_weight : array, shape (candidates,)
-        Chosen on the same blocks; 0 without a ridge, infinite where the fuzzy part is off.
-    """
-
-    name: tuple[str, ...]
-    parameters: IntArray
-    error: Array
-    standard_error: Array
-    ridge_weight: Array
-    own: BoolArray
+    name: tuple[str, ...] = about(
+        "structures compared by cross-validation over blocks; the rigid body first", "candidate"
+    )
+    parameters: IntArray = about("linear parameters of the fuzzy part", "candidate")
+    error: Array = about("mean squared error of scaled torque, held-out blocks", "candidate")
+    standard_error: Array = about("its standard error over blocks", "candidate")
+    ridge_weight: Array = about(
+        "chosen on the same blocks; 0 without a ridge, infinite: fuzzy part off", "candidate", gaps=True
+    )
+    own: BoolArray = about("1 for the structure of this model", "candidate")
 
 
 def compare_structures(

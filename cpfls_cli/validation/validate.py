@@ -18,6 +18,7 @@ from cpfls_cli.identification.identify import TRAINING, Identification, model_ev
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
+from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
@@ -44,7 +45,7 @@ class Validation:
         Other structures by cross-validation; None where not asked for.
     residuals : ResidualAnalysis
         What the model leaves of the torque on held-out data, or in training where nothing was held out.
-    draws : Draws
+    uncertainty : Draws
         Of the block bootstrap.
     curves : Curves
         D_ij(q) with their bands.
@@ -58,7 +59,7 @@ class Validation:
 
     structures: StructureComparison | None
     residuals: ResidualAnalysis
-    draws: Draws
+    uncertainty: Draws
     curves: Curves
     round_trip: RoundTrip
     steps: StepErrors
@@ -144,24 +145,65 @@ _LOOKED_AT = 100_000
 _ROUNDING = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curves:
-    """D_ij(q) along curves of attitude; other fields are described at `CurvesGroup`.
+    """D(q) along two curves of attitudes, with its 95 % bands.
 
-    Attributes
-    ----------
-    low, high : array, shape (curves, points, 3, 3), kg m^2
-        Its 95 % band. Of a model without a rigid body below it is, where training was not, what the structure does, not
-        what the vehicle does.
+    Of a model without a rigid body below it a band is, where training was not, what the structure does, not what the
+    vehicle does.
     """
 
-    name: tuple[str, ...]
-    attitude: Array
-    inertia: Array
-    low: Array
-    high: Array
-    rigid_body: Array
-    outside: BoolArray
+    name: tuple[str, ...] = about("over roll, over pitch", "curve", brief=False)
+    attitude: Array = about(
+        "attitudes along each curve",
+        "curve",
+        "point",
+        "axis",
+        unit="rad",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    inertia: Array = about(
+        "D_ij(q) of the model",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    low: Array = about(
+        "lower end of its 95 % band",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    high: Array = about(
+        "upper end of its 95 % band",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    rigid_body: Array = about(
+        "D_ij(q) of the rigid body that fits best",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    outside: BoolArray = about("1 outside the attitudes that training visited", "curve", "point", brief=False)
 
     @property
     def relative_width(self) -> Array:
@@ -230,19 +272,27 @@ def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: Time
     return OtherTorque(source, simulated)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RoundTrip:
-    """The inertia matrix identified from torque that a model gave; other fields are described at `RoundTripGroup`.
+    """D(q) identified again from torque that the model gave."""
 
-    Attributes
-    ----------
-    inside : array, shape (3, 3)
-        Share of the points that training visited where it lies within the model's band; NaN for an entry that is zero
-        everywhere, and where no point was visited.
-    """
-
-    inertia: Array
-    inside: Array
+    inertia: Array = about(
+        "D_ij(q) identified from a simulation of the model",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    inside: Array = about(
+        "share of visited points within the band; not known of an entry that is zero",
+        "axis",
+        "axis",
+        frame="Euler angles (intrinsic ZYX)",
+        gaps=True,
+    )
 
 
 def round_trip(

@@ -12,25 +12,19 @@ from cpfls_cli.consistency.findings import as_contradiction
 from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES, loop_in_words
 from cpfls_cli.playback.loop import LoopBounds
+from cpfls_cli.result import about, part
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.trust import Trust, capped
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Verdict:
-    """Verdict on a model, with its reasons; other fields are described at `VerdictGroup`.
+    """How far to trust a model, and why; what decided comes first."""
 
-    Attributes
-    ----------
-    reason : tuple of str
-        One sentence each; the first is what decided.
-    """
-
-    label: Trust
-    region: str
-    reason: tuple[str, ...]
-    speaks: tuple[int, ...]
+    label: str = about("good-for-control, good-inside-region, shows-the-loop, not-better-than-rigid-body, do-not-use")
+    region: str = about("region of attitudes that the verdict is about, in words")
+    reasons: tuple[Reason, ...] = part()
 
 
 def verdict(grounds: Grounds) -> Verdict:
@@ -61,7 +55,7 @@ def verdict(grounds: Grounds) -> Verdict:
     listed = (decisive, *reasons(grounds))
     everywhere = label == "good-for-control"
     region = "every roll and pitch" if everywhere else region_in_words(grounds.identification.model.visited)
-    return Verdict(label, region, tuple(r.text for r in listed), tuple(r.speaks for r in listed))
+    return Verdict(label, region, listed)
 
 
 def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
@@ -75,10 +69,8 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     if not contradictions:
         return found
     wrong = tuple(as_contradiction(each) for each in contradictions)
-    against = (AGAINST,) * len(wrong)
-    return replace(
-        found, label=capped(found.label, wrong), reason=(*wrong, *found.reason), speaks=(*against, *found.speaks)
-    )
+    against = (Reason(each, AGAINST) for each in wrong)
+    return replace(found, label=capped(Trust(found.label), wrong), reasons=(*against, *found.reasons))
 
 
 def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
@@ -93,13 +85,11 @@ def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = Fals
     """
     if loop is None or not loop.shows_loop:
         return found
-    label = capped(found.label, (), loop=True)
+    label = capped(Trust(found.label), (), loop=True)
     # What decided stays first.
     first = 0 if label is Trust.LOOP else 1
-    reason, speaks = list(found.reason), list(found.speaks)
-    reason.insert(first, loop_in_words(loop, by_past=by_past))
-    speaks.insert(first, AGAINST)
-    return replace(found, label=label, reason=tuple(reason), speaks=tuple(speaks))
+    against = Reason(loop_in_words(loop, by_past=by_past), AGAINST)
+    return replace(found, label=label, reasons=(*found.reasons[:first], against, *found.reasons[first:]))
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:

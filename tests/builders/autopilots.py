@@ -1,22 +1,22 @@
 """A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
-from dataclasses import replace
-
 import numpy as np
 from control import FRD, stability_margins
 
-from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGroup, ResponsesGroup
+from cpfls_cli.artifacts.vehicle_model import ResponseMismatch
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of
 
 
 def crossed(mass, arm, inertia, thrust, drag, speed_max):
@@ -126,39 +126,34 @@ vehicle:
 """Config of `CROSS`."""
 
 
-def found_vehicle(vehicle=CROSS, config=STUDY, *, commanded=True, instrumented=True):
-    """The artifact of a vehicle that is good for simulation and control, as if flights had told it."""
+def found_vehicle(vehicle=CROSS, *, commanded=True, instrumented=True):
+    """A vehicle that is good for simulation and control, as if flights had identified it."""
     model = VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=0.03), commanded=commanded)
     names = ("inertia.Ixx", "inertia.Iyy", "inertia.Izz", "lag.time_constant_s")
-    value = np.array([*vehicle.inertia_kg_m2, 0.03])
-    ends = np.array([0.05, 0.05, 0.08, 0.1]) * value
-    count = len(names)
-    instruments = InstrumentsGroup(
+    values = zip(names, (*vehicle.inertia_kg_m2, 0.03), (0.05, 0.05, 0.08, 0.1), strict=True)
+    instruments = UsedInstruments(
         kind="repeats",
-        setpoint=(),
-        first=np.array([0]),
-        second=np.array([1]),
-        likeness=np.array([0.95]),
-        low=np.array([1.0]),
-        high=np.array([4.0]),
-        explained=np.full((1, 3), 0.98),
-        total=np.full(3, 0.98),
-        error=np.full(3, 0.01),
-        used=np.array([True]),
+        repeats=(Repeat(0, 1, 0.95),),
+        bands=(ExplainedBand(1.0, 4.0, np.full(3, 0.98), True),),
+        explained=np.full(3, 0.98),
+        explained_error=np.full(3, 0.01),
     )
-    responses = ResponsesGroup(name=("roll", "pitch"), cost=np.full(2, 20.0), low=np.ones(2), high=np.full(2, 5.0))
-    return replace(
-        record_of(model, config),
-        found=FoundNumbersGroup(
-            name=names,
-            unit=("kg m^2",) * 3 + ("s",),
-            value=value,
-            low=value - ends,
-            high=value + ends,
-            stated=np.array([*vehicle.inertia_kg_m2, np.nan]),
-            determined=np.ones(count, dtype=bool),
-            at_bound=np.zeros(count, dtype=bool),
+    return vehicle_of(
+        model,
+        numbers=tuple(
+            FoundNumber(
+                name,
+                "s" if "lag" in name else "kg m^2",
+                value,
+                value - share * value,
+                value + share * value,
+                np.nan if "lag" in name else value,
+                True,
+                False,
+            )
+            for name, value, share in values
         ),
+        correlation=np.eye(len(names)),
         instruments=instruments if instrumented else None,
-        responses=responses,
+        responses=tuple(ResponseMismatch(name, 20.0, 1.0, 5.0) for name in ("roll", "pitch")),
     )

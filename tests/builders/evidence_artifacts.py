@@ -1,11 +1,12 @@
 """Evidence on a model with known numbers, as `cpfls identify` stores it."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.stats import norm
 
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.store import read, write
+from cpfls_cli.validation.reasons import Reason
+from tests.builders.identified_models import value_of, with_parts
 
 LAGS, INPUTS, POINTS, DRAWS, STEPS = 40, 7, 91, 60, 50
 REASONS = ("R2 of body torque is 0.97 or more on held-out data", "errors follow roll", "the search was short")
@@ -20,7 +21,7 @@ def residuals(rng):
     correlation[0, :, 0] += follows
     correlation[3] = np.nan
     return {
-        "residuals/part": np.array("held-out rest"),
+        "residuals/part": "held-out rest",
         "residuals/samples": 2500,
         "residuals/available": 7300,
         "residuals/mean": np.array([0.002, 0.125, 1e-20]),
@@ -29,11 +30,13 @@ def residuals(rng):
         "residuals/autocorrelation": 0.7 ** lag[:, None] * np.array([1.0, 0.2, np.nan]),
         "residuals/band": 1.96 / 50,
         "residuals/ljung_box": np.array([1e-30, 0.4, np.nan]),
-        "residuals/input": np.array(["roll", "pitch", "p_dot", "yaw", "p", "q", "a|b <i>"]),
+        "residuals/input": ("roll", "pitch", "p_dot", "yaw", "p", "q", "a|b <i>"),
         "residuals/input_lag": input_lag * 0.01,
         "residuals/correlation": correlation,
         "residuals/histogram_edge": np.linspace(-4, 4, 42)[:, None] * np.array([1e-3, 2e-3, 3e-3]),
-        "residuals/histogram_count": np.round(400 * np.exp(-0.5 * np.linspace(-4, 4, 41)[:, None] ** 2)) * np.ones(3),
+        "residuals/histogram_count": np.int64(400 * np.exp(-0.5 * np.linspace(-4, 4, 41)[:, None] ** 2))
+        * np.ones(3, dtype=int),
+        "residuals/exact": np.array([False, False, True]),
         "residuals/normal_quantile": probability,
         "residuals/quantile": (probability + 0.05 * probability**3)[:, None] * np.array([1e-3, 2e-3, 3e-3]),
     }
@@ -49,29 +52,29 @@ def curves():
     outside = np.abs(angle) > np.deg2rad(40)
     half = (0.01 + 5.0 * np.maximum(np.abs(angle) - np.deg2rad(40), 0) ** 2)[None, :, None, None]
     return {
-        "curves/name": np.array(["over roll", "over pitch"]),
+        "curves/name": ("over roll", "over pitch"),
         "curves/attitude": attitude,
         "curves/inertia": inertia,
         "curves/low": inertia - half,
         "curves/high": inertia + half,
         "curves/rigid_body": np.tile(np.diag([0.61, 0.62, 1.21]), (2, POINTS, 1, 1)),
-        "curves/outside": np.tile(outside, (2, 1)).astype(float),
+        "curves/outside": np.tile(outside, (2, 1)),
         "round_trip/inertia": inertia + 0.004,
         "round_trip/inside": np.where(np.eye(3) > 0, 0.96, np.nan),
     }
 
 
-def uncertainty(artifact, rng):
+def uncertainty(model, rng):
     def around(path, deviation):
-        value = artifact.array(path)
+        value = value_of(model, path)
         return value + deviation * rng.standard_normal((DRAWS, len(value)))
 
     return {
         "uncertainty/blocks": 40,
         "uncertainty/block_duration": 1.25,
-        "uncertainty/coefficients": around("vehicle/inertia_functions/coefficients", 1e-3),
-        "uncertainty/rigid_body": around("vehicle/inertia_functions/rigid_body", 2e-3),
-        "uncertainty/best_rigid_body": around("baselines/rigid_body", 2e-3),
+        "uncertainty/coefficients": around("model/fuzzy/coefficients", 1e-3),
+        "uncertainty/rigid_body": around("model/fuzzy/rigid_body", 2e-3),
+        "uncertainty/best_rigid_body": around("rigid_body", 2e-3),
     }
 
 
@@ -81,51 +84,52 @@ def steps():
     rate = growth.copy()
     rate[1, 30:] = np.nan
     return {
-        "steps/part": np.array("held-out rest"),
-        "steps/model": np.array(["model", "rigid-body", "nothing-moves"]),
+        "steps/part": "held-out rest",
+        "steps/model": ("model", "rigid-body", "nothing-moves"),
         "steps/samples": np.arange(1, STEPS + 1),
         "steps/horizon": horizon,
         "steps/windows": 77,
         "steps/lost": np.zeros((3, STEPS), dtype=int),
         "steps/attitude": 0.01 * growth,
         "steps/body_rate": rate,
+        "steps/window_error": np.zeros((3, 77, 3)),
+        "steps/start": np.arange(77),
     }
 
 
 def verdict(label):
     return {
-        "verdict/label": np.array(label),
-        "verdict/region": np.array("roll and pitch within 32 degrees"),
-        "verdict/reason": np.array(REASONS),
-        "verdict/speaks": np.array([1, -1, 0]),
+        "verdict/label": label,
+        "verdict/region": "roll and pitch within 32 degrees",
+        "verdict/reasons": tuple(map(Reason, REASONS, (1, -1, 0))),
     }
 
 
 def others():
     return {
-        "structures/name": np.array(["rigid body", "5 functions | harmonic", "7 functions"]),
+        "structures/name": ("rigid body", "5 functions | harmonic", "7 functions"),
         "structures/parameters": np.array([0, 60, 120]),
         "structures/error": np.array([0.05, 0.031, 0.033]),
         "structures/standard_error": np.array([0.004, 0.003, 0.003]),
         "structures/ridge_weight": np.array([np.inf, 0.01, 0.1]),
-        "structures/own": np.array([0, 0, 1]),
+        "structures/own": np.array([False, False, True]),
         "physics/cells": 120,
         "physics/indefinite": 3,
         "physics/smallest_eigenvalue": -0.0123,
         "physics/worst_attitude": np.deg2rad([12.0, -34.0]),
         "physics/energy": 3e-16,
-        "period/parts": np.array(["training"]),
+        "physics/indefinite_anywhere": 3,
+        "physics/every_cell": 4000,
+        "period/parts": ("training",),
         "period/mse": np.full((1, 3), 4e-6),
         "period/max_error": np.full((1, 3), 7e-3),
     }
 
 
 def with_evidence(model, output, label="good-inside-region", **changed):
-    """Write a model again, with evidence; a dataset that is changed to None is left out."""
-    artifact = read_artifact(model)
+    """Write a model again, with evidence; a part of which a field is changed to None is left out."""
+    given, origin = read(model, IdentifiedModel)
     rng = np.random.default_rng(4)
-    own = {**residuals(rng), **curves(), **uncertainty(artifact, rng), **steps(), **verdict(label), **others()}
-    data = {**artifact.data, **own, **changed}
-    kept = {path: values for path, values in data.items() if values is not None}
-    write_artifact(output, replace(artifact, data=kept))
+    own = {**residuals(rng), **curves(), **uncertainty(given, rng), **steps(), **verdict(label), **others()}
+    write(output, with_parts(given, own | changed), origin)
     return output

@@ -1,7 +1,7 @@
 """Models of every structure with random coefficients, states that hurt, and sheets to export."""
 
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -9,22 +9,24 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.evidence import VerdictGroup
-from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, IdentifiedVehicleGroup, SearchGroup
-from cpfls_cli.artifacts.scores import JudgedGroup
-from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.check import Origin
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.points import expected, reference_run
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.identification.scores import Judged
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.validation.reasons import Reason
+from cpfls_cli.validation.verdict import Verdict
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-MEASURES = ("mse", "max_error", "relative_error", "r2", "r2_body")
+MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
 PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "input_map": "data-range"}
 RIGID = np.array([0.6, 0.5, 1.2, 0.02, -0.03, 0.01])
 
@@ -122,7 +124,6 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
     given = {
         "name": "vehicle",
         "file": "model.h5",
-        "complete": True,
         "stop_reason": "generations",
         "findings": ("two of five rules are not excited",),
         "verdict": verdict_of("good-inside-region", "up to 30 degrees", ("it predicts other flights", 1)),
@@ -131,31 +132,25 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
         **changes,
     }
     inputs = {"flight": InputFile(given["source"], "0" * 64, "cpfls/flight")}
-    record = IdentifiedRecord(
-        header=Header("0.1.0", 1, yaml.safe_dump(given["config"]), inputs),
-        vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=VEHICLE, fuzzy=model)),
-        model=ChosenGroup(base="rigid-body" if model.rigid_body.any() else "none", weights=None, ridge_weight=None),
-        judged=_judged(),
-        search=SearchGroup(stop_reason=given["stop_reason"], complete=given["complete"]),
-        findings=given["findings"],
-        verdict=given["verdict"],
-        **dict.fromkeys(("solve", "rules", "front", "history", "baselines", "training_indices")),
-    )
     vehicle = VehicleModel(vehicle=VEHICLE, fuzzy=model)
-    return replace(bare_sheet(record, vehicle), name=given["name"], file=given["file"], sha256="a" * 64)
+    others = dict.fromkeys(own.name for own in fields(IdentifiedModel))
+    shown = {"findings": given["findings"], "stop_reason": given["stop_reason"], "verdict": given["verdict"]}
+    made = IdentifiedModel(**others | shown | {"model": vehicle, "judged": _judged()})
+    origin = Origin(stage="identify", seed=1, config=yaml.safe_dump(given["config"]), inputs=inputs, version="0.1.0")
+    sheet = bare_sheet(made, vehicle, origin)
+    return replace(sheet, name=given["name"], file=given["file"], sha256="a" * 64)
 
 
-def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGroup:
-    """Arrange a verdict with its reasons and what they speak for."""
-    texts, speaks = zip(*reasons, strict=True)
-    return VerdictGroup(label=label, region=region, reason=texts, speaks=np.array(speaks, dtype=float))
+def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> Verdict:
+    """Make a verdict with its reasons and what they speak for."""
+    return Verdict(label, region, tuple(Reason(*each) for each in reasons))
 
 
-def _judged() -> JudgedGroup:
+def _judged() -> Judged:
     scores = {"relative_error": [0.1, np.nan, 0.2], "r2": [0.9, -np.inf, 0.5]}
     measures = {name: np.array([[scores.get(name, [1.0, 2.0, 3.0])]]) for name in MEASURES}
     samples, outside = np.array([100]), np.array([0])
-    return JudgedGroup(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
+    return Judged(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
 
 
 def wanted_of(model: InertiaFunctions, motion: Motion, step: int = 1000) -> SimpleNamespace:

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup, LackGroup
-from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, LoopGroup
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.disturbance import FoundGusts
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.lack import Lack
+from cpfls_cli.playback.loop import LoopBounds
+from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import truth
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of
 
 BLOCKS = 30
 RELATIVE = 0.08
@@ -34,13 +36,12 @@ def numbers_of(model):
 
 
 def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, relative=RELATIVE, **changed):
-    """An artifact; Izz and the drag factor go together, and so do the moments about roll and pitch a little.
+    """A vehicle; Izz and the drag factor go together, and so do the moments about roll and pitch a little.
 
     `lack` are the shares of rotors and damping about each axis of torque.
     """
     model = model or truth()
     known = numbers_of(model)
-    values = np.array([value for value, _ in known.values()])
     names = tuple(known)
     correlation = np.eye(len(names))
     for first, second, alike in (
@@ -57,42 +58,44 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, 
     low, high = np.ones(3), np.ones(3)
     if loop is not None:
         low, high = np.asarray(loop)
-    record = record_of(replace(model, gusts=held))
     given = {
-        "found": FoundNumbersGroup(
-            name=names,
-            unit=tuple(unit for _, unit in known.values()),
-            value=values,
-            low=np.where(positive, values / (1 + relative), values * (1 - relative)),
-            high=values * (1 + relative),
-            stated=np.full(len(names), np.nan),
-            determined=np.array([name != "inertia.Izz" for name in names]),
-            at_bound=np.zeros(len(names), dtype=bool),
+        "numbers": tuple(
+            FoundNumber(
+                name,
+                unit,
+                value,
+                value / (1 + relative) if above else value * (1 - relative),
+                value * (1 + relative),
+                np.nan,
+                name != "inertia.Izz",
+                False,
+            )
+            for (name, (value, unit)), above in zip(known.items(), positive, strict=True)
         ),
         "correlation": correlation,
         "blocks": BLOCKS,
-        "loop": LoopGroup(low=low, high=high, explained=np.full(3, 0.99), shown=False),
+        "loop": LoopBounds(low, high, np.full(3, 0.99)),
         "disturbance": None
         if not gusts
-        else DisturbanceGroup(
+        else FoundGusts(
             told_by="repeats",
-            name=GUST_AXES,
             size=size,
             low=0.8 * size,
             high=1.3 * size,
             memory=memory,
             memory_low=0.7 * memory,
             memory_high=1.4 * memory,
+            foretold=np.full(6, np.nan),
             white=white,
-            lack=None if lack is None else lack_group(np.asarray(lack), 0.5 * size),
+            lack=None if lack is None else lack_of(np.asarray(lack), 0.5 * size),
         ),
     }
-    return replace(record, **{**given, **changed})
+    return vehicle_of(replace(model, gusts=held), **{**given, **changed})
 
 
-def lack_group(share, size):
+def lack_of(share, size):
     """What a model lacks, the same about all axes of torque; of forces nothing is known."""
-    return LackGroup(
+    return Lack(
         part=("rotors", "linear_damping"),
         share=np.concatenate([np.tile(share, (3, 1)), np.full((3, 2), np.nan)]),
         rest=np.append(size[:3], [np.nan] * 3),

@@ -5,22 +5,18 @@ from functools import cache
 
 import numpy as np
 
-import cpfls_cli
-from cpfls_cli.artifacts.model import VehicleGroup
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.vehicle_model import (
-    FoundNumbersGroup,
-    LoopGroup,
-    SharesGroup,
-    StructuresTriedGroup,
-    TradesGroup,
-    VehicleRecord,
-)
+from cpfls_cli import store
+from cpfls_cli.artifacts.check import Origin
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.structure import TriedStructure
 from cpfls_cli.playback.table import Remainder
+from cpfls_cli.playback.vehicle import FoundNumber, Share
+from cpfls_cli.report.source import source_of_result
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 QUAD = VehicleSettings(
@@ -92,42 +88,56 @@ def whole(vehicle=QUAD, *, order=2, **changed):
     return replace(model, **changed)
 
 
-def record_of(model, config="seed: 1\n"):
-    """The artifact of a vehicle, as if it had been found by a search over two structures."""
-    none, text = np.zeros(0), ()
+ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n")
+
+
+def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=True, at_bound=False, possible=True):
+    """A number that was found."""
+    return FoundNumber(name, "", value, low, high, stated, determined, at_bound, possible)
+
+
+def vehicle_of(model, **changed):
+    """A vehicle, as if it had been found by a search over two structures."""
     names = ("chosen", "best", "greedy", "everything", "nothing", "front", "front")
-    worse = np.array([0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4])
-    return VehicleRecord(
-        header=Header(cpfls_cli.__version__, 1, config),
-        vehicle=VehicleGroup.of(model),
-        found=FoundNumbersGroup(
-            name=("inertia.Ixx", "linear_damping.d_x"),
-            unit=("kg m^2", "N m s/rad"),
-            value=np.array([0.02, 1e-3]),
-            low=np.array([0.018, 0.0]),
-            high=np.array([0.022, 2e-3]),
-            stated=np.array([0.004, np.nan]),
-            determined=np.array([True, False]),
-            at_bound=np.array([False, True]),
+    rows = zip(names, (0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4), (4, 4, 4, 9, 0, 4, 0), strict=True)
+    given = {
+        "model": model,
+        "numbers": (
+            FoundNumber("inertia.Ixx", "kg m^2", 0.02, 0.018, 0.022, 0.004, True, False),
+            FoundNumber("linear_damping.d_x", "N m s/rad", 1e-3, 0.0, 2e-3, np.nan, False, True),
         ),
-        trade=TradesGroup(first=text, second=text, correlation=none),
-        structure=StructuresTriedGroup(
-            name=names,
-            blocks=tuple("" if name == "nothing" else "inertia linear_damping" for name in names),
-            error=0.5 + worse,
-            worse=worse,
-            uncertain=np.full(len(names), 0.01),
-            numbers=np.array([4, 4, 4, 9, 0, 4, 0], dtype=np.int64),
-            condition_number=np.full(len(names), 30.0),
+        "shares": (Share("rotors", np.ones(6)),),
+        "airspeed_m_s": 4.0,
+        "trades": (),
+        "correlation": np.eye(len(changed.get("numbers", "ab"))),
+        "structures": tuple(
+            TriedStructure(
+                name,
+                () if name == "nothing" else ("inertia", "linear_damping"),
+                0.5 + worse,
+                worse,
+                0.01,
+                numbers,
+                30.0,
+            )
+            for name, worse, numbers in rows
         ),
-        loop=LoopGroup(low=0.99 * np.ones(3), high=1.01 * np.ones(3), explained=0.98 * np.ones(3), shown=False),
-        share=SharesGroup(name=("rotors",), torque=np.ones((1, 3)), force=np.ones((1, 3))),
-        airspeed=4.0,
-        evaluated=2,
-        complete=True,
-        blocks=30,
-        warning=text,
-    )
+        "evaluated": 2,
+        "complete": True,
+        "blocks": 30,
+        "loop": LoopBounds(0.99 * np.ones(3), 1.01 * np.ones(3), 0.98 * np.ones(3)),
+    }
+    return Vehicle(**given | changed)
+
+
+def write_vehicle(path, vehicle, config=ORIGIN.config, **more):
+    """Write a vehicle, as its command would."""
+    store.write(path, vehicle, replace(ORIGIN, config=config, **more))
+
+
+def source_of_vehicle(vehicle, label="vehicle.h5"):
+    """Name a vehicle, as if it had been read."""
+    return source_of_result(vehicle, ORIGIN, label, label, "")
 
 
 def accelerations(model, state, rotor):

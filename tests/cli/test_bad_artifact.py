@@ -179,13 +179,13 @@ def test_flight_of_no_samples(refuse, changed, study, tmp_path):
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        ("model/weights", np.zeros(3)),
-        ("vehicle/inertia_functions/coefficients", np.zeros(5)),
-        ("vehicle/inertia_functions/coefficients", np.full(113, np.nan)),
-        ("vehicle/inertia_functions/rigid_body", np.zeros(2)),
-        ("vehicle/inertia_functions/input_range", np.zeros(2)),
-        ("vehicle/inertia_functions/visited", np.zeros((2, 3))),
-        ("model/base", 3),
+        ("weights", np.zeros((3, 1))),
+        ("model/fuzzy/coefficients", np.zeros(5)),
+        ("model/fuzzy/coefficients", np.full(113, np.nan)),
+        ("model/fuzzy/rigid_body", np.zeros(2)),
+        ("model/fuzzy/ranges/maximum", np.zeros(3)),
+        ("model/fuzzy/visited", np.zeros((2, 3))),
+        ("base", 3),
     ],
 )
 def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path, value):
@@ -196,11 +196,9 @@ def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path
 
 def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline, study, tmp_path):
     def shorten(file):
-        for name in ("coefficients", "parameter"):
-            path = f"vehicle/inertia_functions/{name}"
-            values = file[path][:-1]
-            del file[path]
-            file[path] = values
+        values = file["model/fuzzy/coefficients"][:-1]
+        del file["model/fuzzy/coefficients"]
+        file["model/fuzzy/coefficients"] = values
         draws = file["uncertainty/coefficients"][:, :-1]
         del file["uncertainty/coefficients"]
         file["uncertainty/coefficients"] = draws
@@ -208,7 +206,7 @@ def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline,
     model = changed("model", shorten)
     (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
     assert line == (
-        f"{model}: vehicle/inertia_functions holds [5, 5, 5, 5, 5, 5] breakpoints and 112 coefficients; its structure "
+        f"{model}: model/fuzzy holds [5, 5, 5, 5, 5, 5] breakpoints and 112 coefficients; its structure "
         "needs [5, 5, 5, 5, 5, 5] and 113"
     )
 

@@ -6,12 +6,12 @@ from html import unescape
 
 import pytest
 
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.init import _findings as of_proposal
 from cpfls_cli.commands.init import _parted as parted
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.rotors import meant_unit
+from cpfls_cli.flights.models import found_vehicle
+from cpfls_cli.result import plain
 from tests.builders.closed_loop_flights import COARSE, VEHICLE, flown, signals_of
 from tests.builders.command_line import run, undrawn
 from tests.builders.wrong_logs import WRONG, config_of, log_of
@@ -78,7 +78,7 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     assert label.startswith("DO NOT USE: ")
     assert sentence.startswith(f"  Do not use it. {begins(wrong)}{first.name}: ")
     assert wrong.words in sentence
-    summary = read_record(tmp_path / "vehicle.h5", VehicleRecord).summary
+    summary = plain(found_vehicle(tmp_path / "vehicle.h5"))
     assert summary["verdict"] == "do-not-use"
     assert wrong.words in summary["contradictions"][0]
 

@@ -20,7 +20,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited
 from tests.builders.command_line import undrawn
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG
 
 ROOT = Path(__file__).parents[2]
@@ -66,9 +66,11 @@ def heavy(config, folder):
 def written_vehicle(config, path, inertia):
     path.parent.mkdir(exist_ok=True)
     study = load_study(config)
-    record = record_of(VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=inertia)), resolved_yaml(study))
-    numbers = replace(record.found, value=np.array([inertia[0], 0.0]), determined=np.array([False, True]))
-    write_record(path, replace(record, found=numbers, loop=replace(record.loop, shown=True)))
+    vehicle = vehicle_of(VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=inertia)))
+    first, second = vehicle.numbers
+    numbers = first._replace(value=inertia[0], determined=False), second._replace(value=0.0, determined=True)
+    loop = vehicle.loop._replace(explained=np.full(3, 0.5))
+    write_vehicle(path, replace(vehicle, numbers=numbers, loop=loop), resolved_yaml(study))
     return path
 
 

@@ -121,10 +121,9 @@ def folder(cpfls, tmp_path_factory):
 
 def vehicle_of(stated):
     """A vehicle as if it had been found, with gusts, and good for everything."""
-    good = found_vehicle(stated, CONFIG)
+    good = found_vehicle(stated)
     model = VehicleModel(vehicle=stated, response=RotorResponse(lag_s=0.03))
-    found = found_record(model, instruments=good.instruments, responses=good.responses)
-    return found.with_header(good.header)
+    return found_record(model, instruments=good.instruments, responses=good.responses)
 
 
 def options_of(command):

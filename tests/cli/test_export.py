@@ -92,7 +92,7 @@ def test_equal_models_give_equal_files(cpfls, pipeline, tmp_path):
 
 @pytest.mark.parametrize("form", ENDINGS)
 def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, model, tmp_path, form):
-    change(model, search__complete=np.uint8(0), search__stop_reason=np.array("time-limit"))
+    change(model, stop_reason=np.array("time-limit"))
     output = tmp_path / f"m.{ENDINGS[form]}"
     words = ("export", model, "--format", form, "-o", output)
     (line,) = refuse(*words)
@@ -116,15 +116,15 @@ def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, mod
 @pytest.mark.parametrize("form", ENDINGS)
 def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
     hostile = tmp_path / ("x*" + "' \"; raise SystemExit(8)\n#.h5")
+    with edited(model) as file:
+        texts = file["verdict/reasons/text"]
+        file["verdict/reasons/text"][...] = np.full(texts.shape, HOSTILE.encode()[: texts.dtype.itemsize])
     change(
         model,
         findings=np.array([HOSTILE]),
         verdict__label=np.array(HOSTILE),
         verdict__region=np.array(HOSTILE),
-        verdict__reason=np.array([HOSTILE]),
-        verdict__speaks=np.array([-1]),
-        search__stop_reason=np.array(HOSTILE),
-        search__complete=np.uint8(0),
+        stop_reason=np.array(HOSTILE),
     )
     with edited(model) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
@@ -169,24 +169,24 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     ("values", "message"),
     [
         (
-            {"vehicle__inertia_functions__breakpoints": np.full(30, 2.0)},
-            "vehicle/inertia_functions/breakpoints: those of D13(pitch) make no partition; identify it again",
+            {"model__fuzzy__partitions__values__values": np.full(30, 2.0)},
+            "model/fuzzy/partitions: those of D13(pitch) make no partition; identify it again",
         ),
         (
-            {"vehicle__inertia_functions__breakpoints": np.linspace(1.0, 0.0, 30)},
-            "vehicle/inertia_functions/breakpoints: those of D13(pitch) make no partition; identify it again",
+            {"model__fuzzy__partitions__values__values": np.linspace(1.0, 0.0, 30)},
+            "model/fuzzy/partitions: those of D13(pitch) make no partition; identify it again",
         ),
         (
-            {"vehicle__inertia_functions__visited": np.zeros((71, 71))},
-            "vehicle/inertia_functions/visited: is (71, 71), not (72, 72); identify it again",
+            {"model__fuzzy__visited": np.zeros((71, 71))},
+            "model/fuzzy/visited: is (71, 71), not (72, 72); identify it again",
         ),
         (
-            {"vehicle__inertia_functions__coefficients": np.full(113, np.inf)},
-            "vehicle/inertia_functions/coefficients: 113 samples are not finite",
+            {"model__fuzzy__coefficients": np.full(113, np.inf)},
+            "model/fuzzy/coefficients: 113 of 113 values are not finite",
         ),
         (
-            {"vehicle__inertia_functions__rigid_body": None},
-            "the cpfls/model lacks vehicle/inertia_functions/rigid_body; make it again",
+            {"model__fuzzy__rigid_body": None},
+            "the cpfls/identified lacks /model/fuzzy/rigid_body; make it again",
         ),
     ],
 )

@@ -11,15 +11,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
 from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import truth
-from tests.builders.vehicle_models import HEXA, record_of, whole
+from tests.builders.vehicle_models import HEXA, vehicle_of, whole, write_vehicle
 
 LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
 HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
@@ -28,7 +27,7 @@ HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
 @pytest.fixture
 def vehicle(tmp_path):
     path = tmp_path / "vehicle.h5"
-    write_record(path, record_of(truth()))
+    write_vehicle(path, vehicle_of(truth()))
     return path
 
 
@@ -47,9 +46,9 @@ def read(form, output):
 
 @pytest.mark.parametrize("form", FLYING)
 def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form):
-    header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
+    inputs = {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")}
     path = tmp_path / ("x--" + "' \"; raise SystemExit(8)\n#-->.h5")
-    write_record(path, record_of(replace(truth(), effects=(*truth().effects, LOAD))).with_header(header))
+    write_vehicle(path, vehicle_of(replace(truth(), effects=(*truth().effects, LOAD))), inputs=inputs)
     with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"uav{FORMS[form].ending}"
@@ -176,7 +175,7 @@ def test_a_frame_of_ardupilot_has_its_keys_in_its_order(cpfls, vehicle, tmp_path
 
 def test_an_airframe_says_where_a_range_holds_the_hover_thrust(cpfls, tmp_path):
     light = replace(truth(), vehicle=replace(truth().vehicle, rotor_speed_max_rad_s=6000.0))
-    write_record(tmp_path / "light.h5", record_of(light))
+    write_vehicle(tmp_path / "light.h5", vehicle_of(light))
     assert cpfls("export", tmp_path / "light.h5", "--format", "px4", "-o", tmp_path / "uav.sdf").exit_code == 0
     text = " ".join((tmp_path / "uav.airframe").read_text().replace("#", " ").split())
     assert "param set-default MPC_THR_HOVER 0.1 " in text + " "
@@ -192,7 +191,7 @@ def test_an_identified_model_is_exported_as_a_vehicle(cpfls, pipeline, tmp_path)
 
 def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
     path = tmp_path / "hexa.h5"
-    write_record(path, record_of(replace(whole(HEXA), effects=(), remainder=None)))
+    write_vehicle(path, vehicle_of(replace(whole(HEXA), effects=(), remainder=None)))
     (line,) = refuse("export", path, "--format", "rotorpy", "-o", tmp_path / "uav.py")
     assert line == (
         f"{path.name}: RotorPy allocates thrust and torque to four rotors, but this vehicle has 6; --format mjcf, sdf, "
@@ -209,7 +208,7 @@ def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
 
 @pytest.mark.parametrize("ending", ["xml", "c"])
 def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle, tmp_path, monkeypatch, ending):
-    monkeypatch.setattr(VehicleRecord, "verdict", "do-not-use")
+    monkeypatch.setattr(Vehicle, "verdict", "do-not-use")
     output = tmp_path / f"uav.{ending}"
     (line,) = refuse("export", vehicle, "-o", output)
     assert line == f"{vehicle}: its verdict is do-not-use; --anyway exports it, marked as such"

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.model import ModelEffect
@@ -18,7 +17,7 @@ from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from tests.builders.artifacts import edited
 from tests.builders.compiled_c import build, require_gcc
-from tests.builders.vehicle_models import QUAD, polynomial_effects, record_of, whole
+from tests.builders.vehicle_models import QUAD, polynomial_effects, vehicle_of, whole, write_vehicle
 
 HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
 ENDINGS = {"json": "json", "c": "c"}
@@ -27,7 +26,7 @@ ENDINGS = {"json": "json", "c": "c"}
 @pytest.fixture
 def vehicle(tmp_path):
     path = tmp_path / "vehicle.h5"
-    write_record(path, record_of(whole(effects=polynomial_effects(QUAD)[:2])))
+    write_vehicle(path, vehicle_of(whole(effects=polynomial_effects(QUAD)[:2])))
     return path
 
 
@@ -67,7 +66,7 @@ def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     assert effects == "Effects: linear rotational damping, quadratic rotational damping."
     assert learned == "Learned, without a name: torque x, torque z, force z over the direction of the airflow."
     assert judged == (
-        "NOT JUDGED: not judged as a forecast; its constants are told; 1 of 2 numbers are not determined."
+        "NOT JUDGED: not judged as a forecast; its constants are identified; 1 of 2 numbers are not determined."
     )
     assert whole_of_it == "JAX holds all of it."
     assert effects in (tmp_path / "quad.py").read_text()
@@ -95,10 +94,9 @@ def test_the_same_vehicle_gives_the_same_bytes(cpfls, vehicle, tmp_path):
 
 @pytest.mark.parametrize("form", ENDINGS)
 def test_hostile_text_stays_text(cpfls, tmp_path, form):
-    record = record_of(whole(effects=(), remainder=None))
-    header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
+    inputs = {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")}
     path = tmp_path / ("x*" + "' \"; raise SystemExit(8)\n#.h5")
-    write_record(path, record.with_header(header))
+    write_vehicle(path, vehicle_of(whole(effects=(), remainder=None)), inputs=inputs)
     with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"m.{ENDINGS[form]}"
@@ -116,7 +114,7 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
     none = np.zeros(0)
     beside = ModelEffect("ground_effect", {"G": 1.2}, none), ModelEffect("battery_sag", {"exponent": 1.5}, none)
     model = replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0))
-    write_record(path, record_of(model))
+    write_vehicle(path, vehicle_of(model))
     result = cpfls("export", path, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
     titles = [each["title"] for each in json.loads(result.stdout)["missing"]]
@@ -136,14 +134,14 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
 def test_a_vehicle_of_wrong_content_is_refused(refuse, vehicle, tmp_path):
     with edited(vehicle) as file:
         names = np.char.encode(np.array(["linear_damping", "quadratic_dampin"]), "utf-8")
-        del file["vehicle/effect/name"]
-        file["vehicle/effect/name"] = names
+        del file["model/effects/name"]
+        file["model/effects/name"] = names
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
     assert line.startswith(f"{vehicle}: quadratic_dampin: no such effect (did you mean quadratic_damping")
     with edited(vehicle) as file:
-        file["vehicle/mass"][()] = np.nan
+        file["model/vehicle/mass_kg"][()] = np.nan
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
-    assert line == f"{vehicle}: vehicle/mass: 1 samples are not finite, the first at index 0"
+    assert line == f"{vehicle}: model/vehicle/mass_kg: 1 of 1 values are not finite"
 
 
 PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
@@ -175,7 +173,7 @@ def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
     require_gcc()
     monkeypatch.chdir(tmp_path)
     model = whole(effects=polynomial_effects(QUAD)[:2])
-    write_record(tmp_path / "extended.h5", record_of(model))
+    write_vehicle(tmp_path / "extended.h5", vehicle_of(model))
     (commands,), (code,) = blocks("sh"), blocks("c")
     for line in commands.splitlines():
         assert cpfls(*line.split("#")[0].split()[1:]).exit_code == 0, line

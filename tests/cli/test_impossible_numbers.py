@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from cpfls_cli.artifacts.store import write_record
 from tests.builders.autopilots import STUDY, crossed, found_vehicle
+from tests.builders.vehicle_models import write_vehicle
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -17,7 +17,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("impossible")
     (folder / "study.yaml").write_text(STUDY)
     heavy = crossed(1.2, 0.16, (1.28, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
-    write_record(folder / "vehicle.h5", found_vehicle(heavy))
+    write_vehicle(folder / "vehicle.h5", found_vehicle(heavy), STUDY)
     return folder
 
 

@@ -84,7 +84,7 @@ def imported():
     codes = {
         "the package": "import cpfls_cli",
         "flying": "from cpfls_cli.stages import simulate, trajectory",
-        "searches": "from cpfls_cli.commands import identify, sweep; from cpfls_cli.stages import reduce",
+        "searches": "from cpfls_cli.stages import identify, reduce, sweep",
         "report": "import cpfls_cli.commands.report",
         "all commands and pages": f"import {', '.join(names)}",
     }

@@ -42,22 +42,23 @@ def membership(x, peaks):
     return np.column_stack(degrees)
 
 
+PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
+
+
 class Stored:
     """A model read from its file with nothing of the program."""
 
     def __init__(self, path):
         with h5py.File(path) as file:
-            group = file["vehicle/inertia_functions"]
+            group, settings = file["model/fuzzy"], file["model/fuzzy/structure/settings"]
             texts = ("structure", "input_map", "consequents", "products")
-            self.settings = {name: group[name].asstr()[()] for name in texts}
-            self.settings["harmonic_order"] = int(group["harmonic_order"][()])
-            self.coefficients = file["vehicle/inertia_functions/coefficients"][:]
-            self.rigid_body = file["vehicle/inertia_functions/rigid_body"][:]
-            self.range = file["vehicle/inertia_functions/input_range"][:]
-            names = file["vehicle/inertia_functions/partition"].asstr()[:]
-            self.peaks = {
-                name: file["vehicle/inertia_functions/breakpoints"][names == name] for name in dict.fromkeys(names)
-            }
+            self.settings = {name: settings[name].asstr()[()] for name in texts}
+            self.settings["harmonic_order"] = int(settings["harmonic_order"][()])
+            self.coefficients = file["model/fuzzy/coefficients"][:]
+            self.rigid_body = file["model/fuzzy/rigid_body"][:]
+            self.range = np.column_stack([group[f"ranges/{end}"][:] for end in ("minimum", "maximum")])
+            row, peaks = (group[f"partitions/values/{name}"][:] for name in ("row", "values"))
+            self.peaks = {name: peaks[row == place] for place, name in enumerate(PARTITIONS)}
         self.circular = self.settings["structure"] == "cpfls"
 
     def inputs(self, attitude, axis):
@@ -167,9 +168,9 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
     with edited(model) as file:
         # Other numbers than those identified, or a fuzzy part that is switched off would prove nothing.
         numbers = np.random.default_rng(11)
-        for key in ("vehicle/inertia_functions/coefficients", "vehicle/inertia_functions/rigid_body"):
+        for key in ("model/fuzzy/coefficients", "model/fuzzy/rigid_body"):
             file[key][:] = numbers.uniform(0.5, 1.5, file[key].shape) * (
-                key != "vehicle/inertia_functions/rigid_body" or "rigid" in name
+                key != "model/fuzzy/rigid_body" or "rigid" in name
             )
     assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
     stored = Stored(model)

@@ -8,7 +8,6 @@ import pytest
 from scipy.signal import lfilter
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -224,7 +223,7 @@ def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     model = tmp_path / "vehicle.h5"
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
-    write_record(model, vehicle_models.record_of(whole, config=resolved_yaml(load_study(config))))
+    vehicle_models.write_vehicle(model, vehicle_models.vehicle_of(whole), resolved_yaml(load_study(config)))
     result = cpfls("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5", "--json")
     assert result.exit_code == 0, result.stderr
     told = json.loads(result.stdout)

@@ -67,7 +67,7 @@ def test_an_identification_chooses_and_says_the_same(cpfls, pipeline, shaken, st
         result = cpfls(*words, *FASTER, "--force", "--json")
         assert result.exit_code == 0, result.stderr
         with h5py.File(tmp_path / "m.h5") as file:
-            chosen = file["model/weights"][()].tolist()
+            chosen = file["weights"][()].tolist()
         verdict = json.loads(result.stdout)["verdict"]
         summaries.append((chosen, verdict["label"], NUMBER.sub("#", json.dumps(verdict["reasons"])), result.stderr))
     assert summaries[0] == summaries[1]

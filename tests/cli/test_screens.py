@@ -11,7 +11,6 @@ import pytest
 import typer
 import yaml
 
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.cli import terminal
 from cpfls_cli.cli.app import app
 from cpfls_cli.config.load import load_study
@@ -26,7 +25,7 @@ from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
@@ -136,9 +135,9 @@ def _of_logs(show, folder):
 
 def _of_autopilots(show, folder):
     (folder / "cross.yaml").write_text(STUDY)
-    write_record(folder / "cross.h5", found_vehicle())
+    write_vehicle(folder / "cross.h5", found_vehicle(), STUDY)
     show("tune", "tune", "cross.yaml", "cross.h5", "--autopilot", "px4", output="gains.h5")
-    write_record(folder / "several.h5", found_record())
+    write_vehicle(folder / "several.h5", found_record())
     show("spread", "spread", "several.h5", "-n", "20", output="spread.json")
 
 
@@ -147,9 +146,9 @@ def _of_open_numbers(show, folder):
     config, data = folder / "open.yaml", yaml.safe_load(CONFIG + VEHICLE)
     study = load_study(folder / "gap.yaml")
     (folder / "own").mkdir(exist_ok=True)
-    write_record(folder / "own" / "vehicle.h5", record_of(VehicleModel(vehicle=study.vehicle), resolved_yaml(study)))
+    write_vehicle(folder / "own" / "vehicle.h5", vehicle_of(VehicleModel(vehicle=study.vehicle)), resolved_yaml(study))
     wide = VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=(3.0, 0.6, 1.2)))
-    write_record(folder / "own" / "wide.h5", record_of(wide, resolved_yaml(study)))
+    write_vehicle(folder / "own" / "wide.h5", vehicle_of(wide), resolved_yaml(study))
     data["vehicle"]["inertia_kg_m2"] = None
     for rotor in data["vehicle"]["rotors"]:
         rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}

@@ -38,7 +38,7 @@ def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
     model = tmp_path / "model.h5"
     run(cpfls, "identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
     lengths = [len(stored(path, "time")[0]) for path in (pipeline.flight, second)]
-    (indices, samples) = stored(model, "training/indices", "judged/samples")
+    (indices, samples) = stored(model, "training_indices", "judged/samples")
     np.testing.assert_array_equal(indices, np.arange(sum(lengths)))
     assert samples[0] == sum(lengths)
     with h5py.File(model) as file:
@@ -90,7 +90,7 @@ def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study
     # Of each flight only the leading part trains.
     assert not np.any((indices >= round(0.6 * first)) & (indices < first))
     run(cpfls, "identify", study, pipeline.flight, second, "--selection", selection, "-o", model, *share)
-    learned, parts = stored(model, "training/indices", "judged/parts")
+    learned, parts = stored(model, "training_indices", "judged/parts")
     np.testing.assert_array_equal(learned, np.sort(indices))
     assert parts.tolist() == [
         b"training",

@@ -8,11 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "configs" / "simulators.yaml"
@@ -22,9 +21,9 @@ def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):
     pytest.importorskip("mujoco", reason="needs the package mujoco, of the extra simulators")
     study = load_study(CONFIG)
     offset = ModelEffect("com_offset", {}, np.array([0.01, -0.006]))
-    record = record_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)), resolved_yaml(study))
+    vehicle = vehicle_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)))
     model, uav, log, flight = (tmp_path / name for name in ("model.h5", "uav.xml", "log.h5", "flight.h5"))
-    write_record(model, record)
+    write_vehicle(model, vehicle, resolved_yaml(study))
     assert cpfls("export", model, "-o", uav).exit_code == 0
     script = runpy.run_path(str(ROOT / "examples" / "fly_mujoco.py"))
     script["main"].__globals__.update(BEGIN_S=2.0, END_S=4.0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.flights.models import found_vehicle
+from cpfls_cli.result import plain
 from tests.builders.unknown_logs import flight, ulog_of_flight
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -51,7 +51,7 @@ def test_vehicle_says_it_first_and_fits_only_what_can_be_told(cpfls, slow):
     assert (result.stdout.count("SDLOG_PROFILE"), result.stderr.count("SDLOG_PROFILE")) == (1, 0)
     assert "Fly in still air" not in result.stdout
     assert "cpfls trajectory" not in result.stdout
-    told = read_record(output, VehicleRecord).summary
+    told = plain(found_vehicle(output))
     assert told["verdict"] == "shows-the-loop"
     assert told["evaluated"] <= 2
     assert set(told["not_determined"]) == {"drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz"}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.validation.trust import Trust
 from tests.builders.spread_vehicles import found_record
+from tests.builders.vehicle_models import write_vehicle
 
 COUNT = 20
 
@@ -17,7 +17,7 @@ COUNT = 20
 @pytest.fixture
 def vehicle(tmp_path):
     path = tmp_path / "vehicle.h5"
-    write_record(path, found_record())
+    write_vehicle(path, found_record())
     return path
 
 
@@ -76,15 +76,15 @@ def test_the_first_screen(cpfls, vehicle):
 
 
 def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicle, monkeypatch):
-    monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
+    monkeypatch.setattr(Vehicle, "verdict", Trust.LACKING)
     result, output = written(cpfls, vehicle, "json")
     assert "the model lacks, so the spread is too narrow" in result.stderr
     assert json.loads(output.read_text())["verdict"] == Trust.LACKING
 
 
 def test_what_the_model_lacks_is_in_the_file_with_the_parameters_of_its_parts(cpfls, vehicle, monkeypatch):
-    monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
-    write_record(vehicle, found_record(lack=[0.3, 0.2]))
+    monkeypatch.setattr(Vehicle, "verdict", Trust.LACKING)
+    write_vehicle(vehicle, found_record(lack=[0.3, 0.2]))
     result, output = written(cpfls, vehicle, "npz")
     assert "the model lacks: the file holds how large that is" in result.stderr
     with np.load(output, allow_pickle=False) as arrays:
@@ -105,7 +105,7 @@ def test_what_the_model_lacks_is_in_the_file_with_the_parameters_of_its_parts(cp
 
 def test_guesses_are_held_and_named(cpfls, tmp_path):
     path = tmp_path / "vehicle.h5"
-    write_record(path, found_record(guess=("drag_factor",), disturbance=None, gusts=False))
+    write_vehicle(path, found_record(guessed=("drag_factor",), disturbance=None, gusts=False))
     result, output = written(cpfls, path, "json")
     assert "Not drawn, because it is a guess and no flight tells it: drag factor." in result.stderr
     assert (
@@ -135,10 +135,6 @@ def test_what_is_refused(refuse, vehicle, pipeline, tmp_path, monkeypatch):
     assert line.endswith("s.csv: its suffix names no form; give the name one of the suffixes .yaml, .json, .npz")
     (line,) = refuse("spread", pipeline.model, "-o", tmp_path / "s.json", "--force")
     assert "is a model of `cpfls identify`, which holds no covariance of its numbers; `cpfls vehicle` finds" in line
-    old = tmp_path / "old.h5"
-    write_record(old, found_record(correlation=None))
-    (line,) = refuse("spread", old, "-o", tmp_path / "s.json")
-    assert line.startswith(f"{old}: holds intervals of single numbers, but not how they go together")
-    monkeypatch.setattr(VehicleRecord, "verdict", "do-not-use")
+    monkeypatch.setattr(Vehicle, "verdict", "do-not-use")
     (line,) = refuse("spread", vehicle, "-o", tmp_path / "s.json")
     assert "its verdict is do-not-use" in line

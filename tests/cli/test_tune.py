@@ -9,7 +9,6 @@ import pytest
 import yaml
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
 from cpfls_cli.stage import loaded
@@ -18,6 +17,7 @@ from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.looked import PLANTS, looked_flight, looked_plant
+from tests.builders.vehicle_models import write_vehicle
 
 ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazyflie": ".yaml"}
 
@@ -26,7 +26,7 @@ ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazy
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tune")
     (folder / "study.yaml").write_text(STUDY)
-    write_record(folder / "vehicle.h5", found_vehicle())
+    write_vehicle(folder / "vehicle.h5", found_vehicle(), STUDY)
     return folder
 
 
@@ -119,20 +119,16 @@ def test_rotors_in_another_order_are_told(gains):
 
 
 def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_missing(refuse, folder, tmp_path):
-    record = found_vehicle(instrumented=False)
-    loop = replace(record.loop, shown=True)
+    vehicle = found_vehicle(instrumented=False)
+    loop = vehicle.loop._replace(explained=np.full(3, 0.5))
+    wide = tuple(each._replace(determined=False) for each in vehicle.numbers)
     for name, own, words, missing in (
-        ("loop", replace(record, loop=loop), "the flights show the loop", "cpfls trajectory"),
-        ("playback", record, "not judged", "one that is kept aside"),
-        (
-            "wide",
-            replace(found_vehicle(), found=replace(record.found, determined=np.zeros(4, dtype=bool))),
-            "not identified",
-            "cpfls trajectory",
-        ),
+        ("loop", replace(vehicle, loop=loop), "the flights show the loop", "cpfls trajectory"),
+        ("playback", vehicle, "not judged", "one that is kept aside"),
+        ("wide", replace(found_vehicle(), numbers=wide), "not identified: ", "cpfls trajectory"),
     ):
         path = tmp_path / f"{name}.h5"
-        write_record(path, own)
+        write_vehicle(path, own, STUDY)
         message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
         assert words in " ".join(message)
         assert f"The flight that is missing: {missing}" in " ".join(message)
@@ -186,7 +182,7 @@ import:
 
 def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
     (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
-    write_record(tmp_path / "vehicle.h5", found_vehicle(config=STUDY + LOGGED))
+    write_vehicle(tmp_path / "vehicle.h5", found_vehicle(), STUDY + LOGGED)
     rng = np.random.default_rng(1)
     line = 0.06 * np.sin(2 * np.pi * 95 * np.arange(3200) / 400)
     rates = 0.02 * rng.standard_normal((3200, 3)) + line[:, None]
@@ -243,7 +239,7 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls
 
 def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
     (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
-    write_record(tmp_path / "vehicle.h5", found_vehicle(config=STUDY + LOGGED))
+    write_vehicle(tmp_path / "vehicle.h5", found_vehicle(), STUDY + LOGGED)
     rates = 0.02 * np.random.default_rng(1).standard_normal((1600, 3))
     rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
     today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "INS_HNTCH_ENABLE": 0.0}

@@ -1,14 +1,12 @@
 """`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
 
 import json
-from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -18,6 +16,7 @@ from tests.builders import blackbox_logs, ulogs
 from tests.builders.autopilots import CROSS
 from tests.builders.spread_vehicles import found_record
 from tests.builders.twins import LOOP, PERIOD, flown
+from tests.builders.vehicle_models import write_vehicle
 
 STATED = {
     "mass_kg": CROSS.mass_kg,
@@ -126,12 +125,11 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
     assert "pixhawk" in said
 
 
-def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, refuse, logged, monkeypatch):
+def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, monkeypatch):
     monkeypatch.setattr("cpfls_cli.stages.twin.DRAWS", 3)
     model = VehicleModel(vehicle=CROSS, effects=(ModelEffect("linear_damping", {}, np.full(3, 0.01)),))
     found = found_record(model, lack=[0.3, 0.2])
-    header = replace(found.origin, config=resolved_yaml(load_study(logged / "study.yaml")))
-    write_record(logged / "vehicle.h5", found.with_header(header))
+    write_vehicle(logged / "vehicle.h5", found, resolved_yaml(load_study(logged / "study.yaml")))
 
     def flown(name, *options):
         words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
@@ -157,10 +155,6 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, refuse, lo
     assert not roll["beyond"]
     assert roll["inside_share"] > 0.5
     assert roll["rms"] < roll["rms_in_gusts"][0]
-    write_record(logged / "older.h5", replace(found, correlation=None).with_header(header))
-    words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / "none.h5")
-    (message,) = refuse(*words, "--model", logged / "older.h5", "--gusts", "--dry-run")
-    assert "older.h5: holds intervals of single numbers" in message
     again = cpfls("info", logged / "gusty.h5").stdout
     assert "No farther off than 3 flights in the gusts of vehicle.h5" in again
     assert "In gusts" in again

@@ -10,10 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import read_config
-from cpfls_cli.report.outcome import as_json
+from cpfls_cli.flights.models import found_vehicle
+from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
 from tests.builders.command_line import undrawn
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
@@ -51,18 +50,19 @@ def found(cpfls, config, flights):
     output = config.parent / "vehicle.h5"
     result = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
-    return SimpleNamespace(output=output, told=json.loads(result.stdout), record=read_record(output, VehicleRecord))
+    return SimpleNamespace(output=output, told=json.loads(result.stdout), record=found_vehicle(output))
 
 
 def test_it_finds_what_was_put_in(found):
-    numbers, truth = found.told["numbers"], dict.fromkeys("xyz", DAMPING)
+    numbers, truth = {each["name"]: each for each in found.told["numbers"]}, dict.fromkeys("xyz", DAMPING)
     for axis, value in truth.items():
         number = numbers[f"linear_damping.d_{axis}"]
         assert number["value"] == pytest.approx(value, rel=0.15)
         assert number["low"] < number["value"] < number["high"]
         assert (number["stated"], number["determined"], number["at_bound"]) == (None, True, False)
-    assert found.told["effects"]["linear_damping"] == pytest.approx([DAMPING] * 3, rel=0.15)
-    assert found.told["mass_kg"] == 0.8
+    (damping,) = [each for each in found.told["model"]["effects"] if each["name"] == "linear_damping"]
+    assert damping["coefficients"] == pytest.approx([DAMPING] * 3, rel=0.15)
+    assert found.told["model"]["vehicle"]["mass_kg"] == 0.8
 
 
 @pytest.mark.decides
@@ -75,20 +75,21 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
     assert set(names[5:]) == {"front"}
     errors = {row["name"]: row["error"] for row in told["structures"][:5]}
     assert errors["best"] <= errors["chosen"] < 0.1 * errors["nothing"]
-    assert set(told["structures"][3]["blocks"].split()) == set(TRIED)
+    assert set(told["structures"][3]["blocks"]) == set(TRIED)
     assert told["held_out"]["flights"] == ["flight-2.h5"]
     models = told["held_out"]["models"]
     assert models["model"]["body_rate"]["sum"] < 0.2 * models["stated"]["body_rate"]["sum"]
     better = told["held_out"]["better"]
     assert better["share"] > 0.9
     assert 0 <= better["speed_m_s"][0] < better["speed_m_s"][1] < 10
-    assert set(told["shares"]) == {"rotors", *told["effects"]}
+    shares = {each["name"] for each in told["shares"]}
+    assert shares == {"rotors", *(each["name"] for each in told["model"]["effects"])}
 
 
 def test_the_file_keeps_to_its_format_and_says_the_same(cpfls, found):
     assert cpfls("check", found.output).exit_code == 0
-    assert as_json(found.record.summary) == found.told
-    assert "a vehicle found in flights" in cpfls("info", found.output).stdout
+    assert plain(found.record) == found.told
+    assert "GOOD FOR SIMULATION AND CONTROL" in cpfls("info", found.output).stdout
 
 
 def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path):
@@ -98,7 +99,7 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
     assert output.read_bytes() == found.output.read_bytes()
     first, *lines = result.stdout.splitlines()
     assert first.startswith("GOOD FOR SIMULATION AND CONTROL: vehicle.h5: predicts motion ")
-    assert first.endswith(" s ahead; its constants are told.")
+    assert first.endswith(" s ahead; its constants are identified.")
     assert len(lines) < 15, "verdicts, numbers, next commands"
     whole = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--force", "-v").stdout
     for words in ("Body rate: better than “rate fades” at every horizon", "linear damping d_x", "stated vehicle"):
@@ -140,7 +141,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     with undrawn():
         page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
     told = json.loads(page.stdout)
-    assert told["sections"] == ["summary", "model", "found-vehicle", "vehicle", "provenance"]
+    assert told["sections"] == ["summary", "vehicle", "stated-vehicle", "provenance"]
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
     assert "Not shown, because" not in text
@@ -168,7 +169,7 @@ def interrupt_at(monkeypatch):
     """Send this very process an interrupt when so many structures were judged."""
 
     def at(number):
-        from cpfls_cli.commands import vehicle
+        from cpfls_cli.stages import vehicle
 
         find = vehicle.find_vehicle
 
@@ -241,7 +242,7 @@ def test_an_interrupted_search_goes_on_to_the_same_end(
 
 def test_a_search_is_killed_and_goes_on(cpfls, config, flights, found, tmp_path, monkeypatch):
     """Whatever ends the program, some structures before are kept."""
-    from cpfls_cli.commands import vehicle
+    from cpfls_cli.stages import vehicle
 
     monkeypatch.setattr(vehicle, "_KEPT_EVERY", 4)
     written, write = [], vehicle.VehicleCheckpoint.write

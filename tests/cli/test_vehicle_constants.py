@@ -5,9 +5,9 @@ import json
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.models import found_vehicle
+from cpfls_cli.result import plain
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 SEARCH = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
@@ -126,7 +126,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     result = cpfls(*words)
     assert result.exit_code == 0, result.stderr
     assert f"{copy}: written, the config with these constants" in result.stdout
-    parameters = read_record(folder / "v.h5", VehicleRecord).summary["parameters"]
+    parameters = plain(found_vehicle(folder / "v.h5"))["parameters"]
     assert set(parameters) == KEYS
     told = {"value", "unit", "low", "high", "stated", "determined", "reason", "possible"}
     assert set(parameters["motor_lag_s"]) == told

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.flights.flight import Flight, Simulated
 from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.store import read
@@ -21,7 +20,7 @@ from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
-from tests.builders.vehicle_models import record_of, remainder
+from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
 
 CONFIG = f"""\
 seed: 1
@@ -66,8 +65,7 @@ def written(config, folder):
     """Write the file of a vehicle model, as if it had been found in flights of the config's vehicle."""
 
     def call(name, model=WHOLE, **changed):
-        record = record_of(model, resolved_yaml(load_study(config)))
-        write_record(folder / name, replace(record, **changed))
+        write_vehicle(folder / name, vehicle_of(model, **changed), resolved_yaml(load_study(config)))
         return folder / name
 
     return call
@@ -331,7 +329,7 @@ def open_config(tmp_path, written_log):
 def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
     left_open, log = open_config
     vehicle = tmp_path / "vehicle.h5"
-    write_record(vehicle, record_of(WHOLE, config=resolved_yaml(load_study(left_open))))
+    write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
     assert cpfls("import", left_open, log, "-o", tmp_path / "f.h5").exit_code == 0
     told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
     assert min(told["r2_body"]) > 0.999
@@ -416,7 +414,7 @@ def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
 def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     cpfls, refuse, config, written, noisy, vehicle, tmp_path
 ):
-    history = ObserverGroup(past=0.5, rate=np.full(6, 20.0), memory=np.full(6, 0.2))
+    history = Observer(past_s=0.5, rate=np.full(6, 20.0), memory_s=np.full(6, 0.2))
     model, told = written("remembers.h5", history=history), []
     for options in ((), ("--history", "0.5")):
         output = tmp_path / f"{len(told)}.h5"

@@ -190,6 +190,7 @@ def test_tests_import_from_shared_builders_alone():
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to, a form of the report.
 ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
 SMALL_ALL_THE_SAME = {
+    "artifacts/rebuilt.py": "a record is read without numerics; it goes with the last records of models",
     "cli/command_lines.py": "reads sources",
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",

@@ -1,17 +1,12 @@
 """Which column of the paper a setting stands beside."""
 
-import numpy as np
-
 from benchmarks.paper.beside import printed_beside
 from benchmarks.paper.printed import TABLE_5
-from cpfls_cli.artifacts.sweep import SettingRuns
+from tests.builders.sweeps import setting_of
 
 
-def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):
-    runs = np.arange(len(mse))
-    errors = np.array(mse)[:, None]
-    sizes = (samples, population, generations)
-    return SettingRuns("x", structure, "D", *sizes, runs, runs, errors, errors, errors, runs)
+def setting(structure="cpfls", samples=685, population=500, generations=200):
+    return setting_of([1.0], structure, samples, (population, generations))
 
 
 def test_the_papers_own_settings_find_their_columns():

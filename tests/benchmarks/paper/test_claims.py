@@ -32,23 +32,15 @@ from benchmarks.paper.search_claims import (
     paired_ratio,
 )
 from cpfls_cli.artifacts.spec import Header, Record
-from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Source
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.sweeps import setting_of, sweep_of
 
 NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 """What a seed does to all settings alike."""
-
-
-def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
-    values = np.asarray(mse, dtype=float)
-    seeds = np.arange(len(values)) if seeds is None else np.asarray(seeds)
-    criterion = "all" if samples == 5487 else "KD-exchange"
-    errors = values[:, None]
-    return SettingRuns("x", structure, criterion, samples, *size, seeds, seeds, errors, errors, errors, seeds)
 
 
 def sources(*records, times=()):
@@ -58,25 +50,15 @@ def sources(*records, times=()):
     return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 
-def sweep(*settings):
-    columns = {
-        name: np.array([getattr(s, name) for s in settings]) for name in ("samples", "population", "generations")
-    }
-    texts = {name: tuple(getattr(s, name) for s in settings) for name in ("name", "structure", "criterion")}
-    empty = ("[]",) * len(settings)
-    runs = {name: np.concatenate([getattr(s, name) for s in settings]) for name in MEASURES}
-    places = np.concatenate([np.full(s.runs, place) for place, s in enumerate(settings)])
-    seeds = np.concatenate([s.seeds for s in settings])
-    chromosome = np.zeros((len(seeds), 1), dtype=np.int32)
-    return SweepRecord(
-        setting=SettingGroup(**texts, **columns, overrides=empty, selection=empty),
-        part=("training",),
-        run=RunGroup(setting=places, seed=seeds, generations=seeds, chromosome=chromosome, **runs),
-        complete=True,
-    )
-
-
-MEASURES = ("evaluations", "mse", "max_error", "relative_error", "condition_number")
+def with_runs(setting, **values):
+    """Give the runs of a setting other numbers: one for all of them, or one for each."""
+    each = {name: np.broadcast_to(value, len(setting.replicates)).tolist() for name, value in values.items()}
+    errors = ("mse", "max_error", "relative_error")
+    runs = [
+        replace(run, **{name: np.array([own[at]]) if name in errors else own[at] for name, own in each.items()})
+        for at, run in enumerate(setting.replicates)
+    ]
+    return replace(setting, replicates=tuple(runs))
 
 
 def measured(*sweeps):
@@ -86,14 +68,14 @@ def measured(*sweeps):
 
 
 def claims(*settings):
-    return [measurement.verdict for measurement in measured(*([sweep(*settings)] if settings else []))]
+    return [measurement.verdict for measurement in measured(*([sweep_of(*settings)] if settings else []))]
 
 
 def test_a_ratio_is_that_of_a_t_test_on_logarithms_of_pairs():
     rng = np.random.default_rng(8)
     one, other = np.exp(rng.normal(0.3, 0.5, (2, 9)))
     shuffled = rng.permutation(9)
-    found = paired_ratio(setting(one), setting(other[shuffled], seeds=shuffled))
+    found = paired_ratio(setting_of(one), setting_of(other[shuffled], seeds=shuffled))
     test = stats.ttest_1samp(np.log(one / other), 0.0).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((np.exp(test.low), np.exp(test.high)))
     assert found.ratio == pytest.approx(stats.gmean(one) / stats.gmean(other))
@@ -101,28 +83,28 @@ def test_a_ratio_is_that_of_a_t_test_on_logarithms_of_pairs():
 
 
 def test_only_seeds_of_both_are_paired():
-    found = paired_ratio(setting([2.0, 4.0, 8.0], seeds=[1, 2, 3]), setting([9.0, 2.0, np.nan], seeds=[5, 2, 3]))
+    found = paired_ratio(setting_of([2.0, 4.0, 8.0], seeds=[1, 2, 3]), setting_of([9.0, 2.0, np.nan], seeds=[5, 2, 3]))
     assert (found.seeds, found.failed, found.reference_failed, found.ratio) == (2, 0, 1, 2.0)
     assert np.isnan(found.low)
-    assert paired_ratio(setting([1.0]), setting([1.0], seeds=[7])).seeds == 0
+    assert paired_ratio(setting_of([1.0]), setting_of([1.0], seeds=[7])).seeds == 0
 
 
 @pytest.mark.parametrize("failed", [[4], [1, 2, 3, 4, 5, 6, 7]])
-def test_a_seed_without_a_model_is_a_failure_of_its_setting(failed):
+def test_a_seed_without_a_model_is_a_failure_of_its_setting_of(failed):
     """Left out, it would let a setting pass that fails often."""
     lost = NOISE.copy()
     lost[failed] = np.nan
-    found = paired_ratio(setting(lost), setting(NOISE))
+    found = paired_ratio(setting_of(lost), setting_of(NOISE))
     assert (found.seeds, found.failed, found.ratio, found.low) == (10, len(failed), np.inf, np.inf)
-    own = measured(sweep(setting(NOISE), setting(lost, samples=685)))[2]
+    own = measured(sweep_of(setting_of(NOISE), setting_of(lost, samples=685)))[2]
     assert (own.verdict, own.ours) == (ClaimVerdict.FAIL, f"no model for {len(failed)} of 10 seeds")
-    beside = measured(sweep(setting(lost), setting(NOISE, samples=685)))[2]
+    beside = measured(sweep_of(setting_of(lost), setting_of(NOISE, samples=685)))[2]
     assert f"No model in {len(failed)} of them with the one beside it" in beside.why
 
 
 def test_a_seed_without_a_model_in_both_is_told_and_decides_nothing():
     lost = np.where(np.arange(10) == 4, np.nan, NOISE)
-    judged = measured(sweep(setting(lost), setting(lost, samples=685)))[2]
+    judged = measured(sweep_of(setting_of(lost), setting_of(lost, samples=685)))[2]
     assert judged.verdict == ClaimVerdict.PASS
     assert "No model in 1 of them with this setting." in judged.why
 
@@ -142,32 +124,32 @@ def test_the_margin_is_the_largest_that_the_paper_prints_and_calls_no_difference
 )
 def test_reduced_sets_against_the_full_one(factor, scatter, verdict):
     own = np.exp(scatter * np.array([1, -1, 1, -1, 1, -1, 1, -1, 1, -1]))
-    reduced = [setting(factor * NOISE * own, samples=samples) for samples in (2743, 1170, 685)]
-    assert claims(setting(NOISE), *reduced)[:3] == [verdict] * 3
+    reduced = [setting_of(factor * NOISE * own, samples=samples) for samples in (2743, 1170, 685)]
+    assert claims(setting_of(NOISE), *reduced)[:3] == [verdict] * 3
 
 
 def test_one_seed_decides_nothing_and_unequal_searches_are_not_compared():
-    assert claims(setting([1.0]), setting([9.0], samples=685))[2] == ClaimVerdict.UNDECIDED
-    assert claims(setting(NOISE), setting(NOISE, samples=685, size=(75, 25)))[2] == ClaimVerdict.NOT_MEASURED
+    assert claims(setting_of([1.0]), setting_of([9.0], samples=685))[2] == ClaimVerdict.UNDECIDED
+    assert claims(setting_of(NOISE), setting_of(NOISE, samples=685, size=(75, 25)))[2] == ClaimVerdict.NOT_MEASURED
     assert claims() == [ClaimVerdict.NOT_MEASURED] * 5
 
 
 def test_a_smaller_search_needs_a_much_larger_one_beside_it():
-    small = setting(1.05 * NOISE, samples=685, size=(75, 25))
-    assert claims(small, setting(NOISE, samples=685, size=(40, 10)))[3] == ClaimVerdict.NOT_MEASURED
-    assert claims(small, setting(NOISE, samples=685, size=(500, 200)))[3] == ClaimVerdict.PASS
-    assert claims(small, setting(NOISE / 3, samples=685, size=(500, 200)))[3] == ClaimVerdict.FAIL
-    assert claims(small, setting(NOISE, samples=1170, size=(500, 200)))[3] == ClaimVerdict.NOT_MEASURED
+    small = setting_of(1.05 * NOISE, samples=685, size=(75, 25))
+    assert claims(small, setting_of(NOISE, samples=685, size=(40, 10)))[3] == ClaimVerdict.NOT_MEASURED
+    assert claims(small, setting_of(NOISE, samples=685, size=(500, 200)))[3] == ClaimVerdict.PASS
+    assert claims(small, setting_of(NOISE / 3, samples=685, size=(500, 200)))[3] == ClaimVerdict.FAIL
+    assert claims(small, setting_of(NOISE, samples=1170, size=(500, 200)))[3] == ClaimVerdict.NOT_MEASURED
 
 
 def test_the_periodic_system_against_the_classic_one():
-    assert claims(setting(3 * NOISE), setting(NOISE, "fls"))[4] == ClaimVerdict.FAIL
-    assert claims(setting(NOISE), setting(3 * NOISE, "fls"))[4] == ClaimVerdict.PASS
+    assert claims(setting_of(3 * NOISE), setting_of(NOISE, "fls"))[4] == ClaimVerdict.FAIL
+    assert claims(setting_of(NOISE), setting_of(3 * NOISE, "fls"))[4] == ClaimVerdict.PASS
 
 
 def test_the_larger_search_decides():
     small, large = (
-        sweep(setting(factor * NOISE, size=size), setting(NOISE, "fls", size=size))
+        sweep_of(setting_of(factor * NOISE, size=size), setting_of(NOISE, "fls", size=size))
         for factor, size in ((3.0, (40, 10)), (1.0, (500, 200)))
     )
     assert [measured(*order)[4].verdict for order in ([small, large], [large, small])] == [ClaimVerdict.PASS] * 2
@@ -252,41 +234,40 @@ def verdict(claim, *settings):
 )
 def test_typical_errors_need_torques_that_are_larger(mse, largest, torque, expected):
     """Where no torque reaches 0.2 N m, a model of nothing passes too."""
-    ours = replace(setting([mse] * 3), max_error=np.full((3, 1), largest), largest_torque=torque)
+    ours = replace(with_runs(setting_of([mse] * 3), max_error=largest), largest_torque=torque)
     assert verdict(TYPICAL_ERRORS_CLAIM, ours) == expected
 
 
 @pytest.mark.parametrize(("condition", "passes"), [(2600, False), (2800, True), (7300, True), (7400, False)])
 def test_a_typical_condition_number_lies_between_those_of_the_table(condition, passes):
-    ours = replace(setting(NOISE), condition_number=np.full(10, float(condition)))
+    ours = with_runs(setting_of(NOISE), condition_number=float(condition))
     assert (verdict(TYPICAL_CONDITION_CLAIM, ours) == ClaimVerdict.PASS) == passes
-    classic = replace(setting(NOISE, "fls"), condition_number=np.full(10, 1e9))
+    classic = with_runs(setting_of(NOISE, "fls"), condition_number=1e9)
     assert verdict(TYPICAL_CONDITION_CLAIM, ours, classic) == verdict(TYPICAL_CONDITION_CLAIM, ours)
 
 
 def test_a_search_has_converged_where_its_last_fifth_brings_nothing():
-    small, large = setting(NOISE, size=(75, 25)), setting(NOISE, size=(500, 200))
-    early = [replace(s, settled=np.full(10, generation)) for s, generation in ((small, 20), (large, 160))]
+    small, large = setting_of(NOISE, size=(75, 25)), setting_of(NOISE, size=(500, 200))
+    early = [with_runs(s, settled=generation) for s, generation in ((small, 20), (large, 160))]
     assert verdict(CONVERGENCE_CLAIM, *early) == ClaimVerdict.PASS
-    assert verdict(CONVERGENCE_CLAIM, replace(small, settled=np.full(10, 21)), early[1]) == ClaimVerdict.FAIL
-    assert verdict(CONVERGENCE_CLAIM, setting(NOISE), small) == ClaimVerdict.NOT_MEASURED
-    at_once = CONVERGENCE_CLAIM.of_searches([[replace(small, settled=np.zeros(10, dtype=int))]])
+    assert verdict(CONVERGENCE_CLAIM, with_runs(small, settled=21), early[1]) == ClaimVerdict.FAIL
+    assert verdict(CONVERGENCE_CLAIM, setting_of(NOISE)) == ClaimVerdict.NOT_MEASURED
+    at_once = CONVERGENCE_CLAIM.of_searches([[with_runs(small, settled=0)]])
     assert "The random start is there already" in at_once.why
 
 
 def test_ranking_by_quantity_beside_a_classical_one():
-    quantity, pareto = setting(NOISE, samples=685), replace(setting(NOISE, samples=685), ranking="pareto-fronts")
+    quantity, pareto = setting_of(NOISE, samples=685), replace(setting_of(NOISE, samples=685), ranking="pareto-fronts")
     assert verdict(RANKING_CLAIM, quantity, pareto) == ClaimVerdict.PASS
-    assert verdict(RANKING_CLAIM, replace(quantity, mse=2 * quantity.mse), pareto) == ClaimVerdict.FAIL
+    assert verdict(RANKING_CLAIM, with_runs(quantity, mse=2 * quantity.of("mse")), pareto) == ClaimVerdict.FAIL
     assert verdict(RANKING_CLAIM, quantity, replace(pareto, samples=1170)) == ClaimVerdict.NOT_MEASURED
     assert verdict(RANKING_CLAIM, quantity, replace(quantity, population=75)) == ClaimVerdict.NOT_MEASURED
 
 
 @pytest.mark.parametrize(("torque", "passes"), [(np.cos, True), (np.sin, True), (np.asarray, False)])
-def test_torque_goes_on_across_a_full_turn(torque, passes, monkeypatch):
+def test_torque_goes_on_across_a_full_turn(torque, passes):
     functions = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
-    monkeypatch.setattr("benchmarks.paper.claims.inertia_functions", lambda _: functions)
-    record = SimpleNamespace(functions=None)
+    record = SimpleNamespace(functions=functions)
     model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
     measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
     assert (measured.verdict == ClaimVerdict.PASS) == passes
@@ -294,9 +275,9 @@ def test_torque_goes_on_across_a_full_turn(torque, passes, monkeypatch):
 
 
 def chosen(criterion, judged_on, factor, condition, size=(20, 5)):
-    ours = setting(factor * NOISE, samples=685, size=size)
-    learned = np.stack([0.1 * NOISE] * 3, axis=1)
-    reading = {"criterion": criterion, "judged_on": judged_on, "learned": learned}
+    ours = setting_of(factor * NOISE, samples=685, size=size)
+    ours = with_runs(ours, **{f"learned_{name}": 0.1 * NOISE for name in ("mse", "max_error", "relative_error")})
+    reading = {"criterion": criterion, "judged_on": judged_on}
     return replace(ours, uniform_condition_number=condition, **reading)
 
 
@@ -307,7 +288,8 @@ def reading_sources(*flights):
         SimpleNamespace(
             label="s.h5",
             config={"trajectory": path, "simulation": {"relative_noise": {"torque": noise} if noise else {}}},
-            record=SimpleNamespace(settings=settings, joins=lambda _: False),
+            record=SimpleNamespace(settings=settings, joined=lambda _: None),
+            header=SimpleNamespace(inputs={}),
             made_from=lambda _: "flown",
         )
         for noise, settings in flights
@@ -317,7 +299,7 @@ def reading_sources(*flights):
     return SimpleNamespace(sweeps=made, by_hash=lambda _: flight)
 
 
-FULL = replace(setting(NOISE, size=(20, 5)), uniform_condition_number=100.0, largest_torque=1.9)
+FULL = replace(setting_of(NOISE, size=(20, 5)), uniform_condition_number=100.0, largest_torque=1.9)
 
 
 def test_every_reading_is_judged_on_its_own_samples_and_errors():
@@ -340,10 +322,8 @@ def test_every_reading_is_judged_on_its_own_samples_and_errors():
 
 def test_the_flight_that_is_nearest_to_the_printed_numbers_is_named():
     """Ten times the printed mean squared error on the chosen samples of one of two otherwise equal flights."""
-    printed = replace(FULL, mse=np.full((10, 1), 9e-4))
-    near, far = (
-        [printed, replace(chosen("D", "training", 1.0, 100.0), mse=np.full((10, 1), mse))] for mse in (1.2e-3, 1.2e-2)
-    )
+    printed = with_runs(FULL, mse=9e-4)
+    near, far = ([printed, with_runs(chosen("D", "training", 1.0, 100.0), mse=mse)] for mse in (1.2e-3, 1.2e-2))
     given = reading_sources((0.0, far), (0.05, near))
     answer = [block.text for block in readings_blocks(given, CLAIMS)[0]]
     assert "3 × 64 m at P = 1 s with 5 % noise" in answer[1]

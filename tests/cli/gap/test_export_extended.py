@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.extended import ExtendedRecord, ExtendedVehicleGroup, LeftOutGroup
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.model import InertiaFunctionsGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.store import read
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 
@@ -63,9 +65,9 @@ def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extende
 
 
 def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path):
-    record, identified = read_record(extended, ExtendedRecord), read_record(pipeline.model, IdentifiedRecord)
+    record, identified = read_record(extended, ExtendedRecord), read(pipeline.model, IdentifiedModel)[0]
     path = tmp_path / "over.h5"
-    vehicle = replace(record.vehicle, inertia_functions=identified.functions)
+    vehicle = replace(record.vehicle, inertia_functions=InertiaFunctionsGroup.of(identified.functions))
     write_record(path, replace(record, vehicle=vehicle))
     said = cpfls("export", path, "--format", "casadi", "-o", tmp_path / "over_casadi.py").stdout
     assert said.splitlines()[-1] == "CasADi holds all of it."
@@ -88,9 +90,9 @@ def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
 
 
 def test_an_identified_model_holds_the_stated_vehicle(pipeline):
-    record = read_record(pipeline.model, IdentifiedRecord)
-    assert record.vehicle.vehicle() == stored_study(record.origin.config, pipeline.model).vehicle
-    assert record.vehicle.effect.name == ()
+    made, origin = read(pipeline.model, IdentifiedModel)
+    assert made.model.vehicle == stored_study(origin.config, pipeline.model).vehicle
+    assert made.model.effects == ()
 
 
 def test_the_json_of_an_extended_model_says_what_it_is_worth(cpfls, extended, tmp_path):

@@ -20,7 +20,7 @@ def answer(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
 def test_artifacts_carry_the_model(answer, pipeline):
     folder, _ = answer
     with h5py.File(folder / "diagnosis.h5") as file, h5py.File(pipeline.model) as model:
-        functions = model["vehicle/inertia_functions/coefficients"][()]
+        functions = model["model/fuzzy/coefficients"][()]
         assert (file["base/fuzzy/coefficients"][()] == functions).all()
 
 

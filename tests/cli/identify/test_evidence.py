@@ -8,13 +8,14 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.report.numbers import sentence
+from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
-from tests.builders.artifacts import edited
+from tests.builders.identified_models import write_changed
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
-VALIDATION = [spec for spec in IdentifiedRecord.spec().datasets if spec.path.split("/")[0] in EVIDENCE]
+VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
 WORDS = {
     "good-for-control": "Good for control",
     "good-inside-region": "Good inside the region that training visited, and only there",
@@ -43,7 +44,7 @@ def validated(cpfls, study, pipeline, tmp_path_factory):
 def test_every_dataset_is_there_and_good(validated, cpfls):
     with h5py.File(validated[0]) as file:
         # The input map of the study is data-range: one period away there is nothing to judge.
-        missing = {spec.path for spec in VALIDATION if spec.path not in file}
+        missing = {path for path in VALIDATION if path not in file}
         assert missing == {"period/parts", "period/mse", "period/max_error"}
         assert file["judged/vaf"].shape == file["judged/r2"].shape
         assert file["steps/part"][()] == file["residuals/part"][()] == b"held-out rest"
@@ -106,8 +107,8 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
     result = cpfls(*words, "--set", "identification.validation.enabled=false", "-o", model, "--json")
     assert json.loads(result.stdout)["verdict"] is None
     with h5py.File(model) as plain, h5py.File(validated[0]) as whole:
-        assert not any(spec.path in plain for spec in VALIDATION)
-        for name in ("vehicle/inertia_functions/coefficients", "model/weights", "judged/mse", "history/best"):
+        assert not any(path in plain for path in VALIDATION)
+        for name in ("model/fuzzy/coefficients", "weights", "judged/mse", "history/best"):
             np.testing.assert_array_equal(plain[name][()], whole[name][()])
     assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
     with h5py.File(prediction) as file:
@@ -138,11 +139,9 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
     assert f"{output}: was found but not judged" in result.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.h5", "model.h5.checkpoint"]
     with h5py.File(output) as plain, h5py.File(validated[0]) as whole:
-        assert plain["search/complete"][()] == 1
+        assert plain["stop_reason"][()] == b"generations"
         assert "verdict/label" not in plain
-        np.testing.assert_array_equal(
-            plain["vehicle/inertia_functions/coefficients"][()], whole["vehicle/inertia_functions/coefficients"][()]
-        )
+        np.testing.assert_array_equal(plain["model/fuzzy/coefficients"][()], whole["model/fuzzy/coefficients"][()])
     monkeypatch.undo()
     assert "the same command with --resume judges it\n" in result.stderr
     assert cpfls(*words, "--resume").exit_code == 0
@@ -152,15 +151,10 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
 
 def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
     for number, (label, told) in enumerate(
-        ((None, "has no verdict and no bands"), (b"do-not-use", "do not use"), (b"good-for-control", None))
+        ((None, "has no verdict and no bands"), ("do-not-use", "do not use"), ("good-for-control", None))
     ):
         model, output = tmp_path / f"{number}.h5", tmp_path / f"prediction-{number}.h5"
-        model.write_bytes(validated[0].read_bytes())
-        with edited(model) as file:
-            attributes = dict(file["verdict/label"].attrs)
-            del file["verdict/label"]
-            if label is not None:
-                file["verdict/label"] = np.bytes_(label)
-                file["verdict/label"].attrs.update({k: attributes[k] for k in ("units", "frame", "description")})
+        given = {"verdict": None} if label is None else {"verdict__label": label}
+        write_changed(validated[0], model, **given)
         stderr = cpfls("predict", study, model, pipeline.flight, "-o", output).stderr
         assert (told in stderr) if told else ("verdict" not in stderr)

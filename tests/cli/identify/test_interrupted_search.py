@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.search.resumable import Watch
+from cpfls_cli.store import read
 
 NOTE = "cpfls: note: "
 
@@ -24,8 +24,7 @@ def stored(path, name):
 
 
 def test_search_that_comes_to_its_end_says_so(whole):
-    assert stored(whole, "search/stop_reason") == b"generations"
-    assert stored(whole, "search/complete") == 1
+    assert stored(whole, "stop_reason") == b"generations"
 
 
 @pytest.mark.parametrize("evaluations", [20, 33, 48])
@@ -43,8 +42,7 @@ def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
     assert result.stderr.splitlines()[-1] == (
         f"{NOTE}{output}: is incomplete, because the search was interrupted; the same command with --resume goes on"
     )
-    assert check_artifact(read_artifact(output)) == []
-    assert stored(output, "search/complete") == 0
+    assert read(output, IdentifiedModel)[0].stopped == "interrupted"
     monkeypatch.undo()
     result = cpfls(*words, "-o", output, "--resume")
     assert result.exit_code == 0, result.stderr
@@ -129,7 +127,7 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
     result = cpfls(*words, "-o", output, "--time-limit", "10m")
     assert result.exit_code == 0
-    assert stored(output, "search/stop_reason") == b"time-limit"
+    assert stored(output, "stop_reason") == b"time-limit"
     assert stored(output, "history/evaluations")[-1] == 40
     assert result.stderr.splitlines()[-1] == (
         f"{NOTE}{output}: is incomplete, because --time-limit ended the search; the same command with --resume goes on"
@@ -154,7 +152,7 @@ def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, 
             seen.append(time_limit_s)
             super().__init__(job, time_limit_s)
 
-    monkeypatch.setattr("cpfls_cli.commands.identify.Watch", Seeing)
+    monkeypatch.setattr("cpfls_cli.stages.identify.Watch", Seeing)
     quick = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
     assert cpfls(*words, "-o", tmp_path / "model.h5", *quick, "--time-limit", text).exit_code == 0
     assert seen == [limit]

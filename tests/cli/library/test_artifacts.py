@@ -89,11 +89,11 @@ def test_another_dimension_counts_where_it_has_no_numbers_of_its_own(pipeline):
 def test_single_values_are_numbers_and_words(pipeline):
     model = cpfls_cli.read(pipeline.model)
     assert model["model/base"] == "none"
-    assert isinstance(model["solve/rank"], int)
-    assert model.summary["rank"] == model["solve/rank"] == pipeline.summaries["model"]["rank"]
+    assert isinstance(model["rank"], int)
+    assert model.summary["rank"] == model["rank"] == pipeline.summaries["model"]["rank"]
     assert model.config["identification"]["membership_functions"] == 5
-    with pytest.raises(KeyError, match="solve/rang"):
-        model["solve/rang"]
+    with pytest.raises(KeyError, match="rang"):
+        model["rang"]
 
 
 def test_it_prints_what_info_prints(cpfls, pipeline):

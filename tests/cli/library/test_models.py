@@ -1,18 +1,17 @@
 """Models in Python: what the commands write, and steps as the exports take them."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.store import file_sha256, read_record, write_record
+from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders import vehicle_models
 from tests.builders.exported_vehicles import flat, on_numpy
+from tests.builders.identified_models import write_changed
 from tests.builders.playback_flights import STATED
 
 PERIOD = 0.01
@@ -23,7 +22,7 @@ HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 fo
 def whole(tmp_path_factory):
     """A vehicle with every part that a model can have."""
     path = tmp_path_factory.mktemp("library") / "vehicle.h5"
-    write_record(path, vehicle_models.record_of(vehicle_models.whole()))
+    vehicle_models.write_vehicle(path, vehicle_models.vehicle_of(vehicle_models.whole()))
     return cpfls_cli.load_model(path)
 
 
@@ -46,7 +45,7 @@ def test_a_prediction_and_a_replay_are_what_the_commands_write(cpfls, pipeline, 
 
 def test_what_a_command_notes_is_a_warning_of_the_caller(cpfls, pipeline, study, tmp_path):
     unjudged = tmp_path / "unjudged.h5"
-    write_record(unjudged, replace(read_record(pipeline.model, IdentifiedRecord), verdict=None))
+    write_changed(pipeline.model, unjudged, verdict=None)
     noted = cpfls("predict", study, unjudged, pipeline.flight, "-o", tmp_path / "p.h5").stderr
     model = cpfls_cli.load_model(unjudged)
     with pytest.warns(UserWarning, match="has no verdict") as warned:
@@ -140,8 +139,8 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
     with pytest.raises(InputError, match="at least one flight"):
         whole.replay()
     partial = tmp_path / "partial.h5"
-    write_record(
-        partial, vehicle_models.record_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
+    vehicle_models.write_vehicle(
+        partial, vehicle_models.vehicle_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
     )
     with pytest.raises(InputError, match="holds wind, which depends on more than the state"):
         cpfls_cli.load_model(partial).step(whole.state(), [HOVER] * 4, PERIOD)

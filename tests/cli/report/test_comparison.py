@@ -7,21 +7,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cpfls_cli import store
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import read_artifact, write_artifact, write_record
 from cpfls_cli.pages.comparison import differences
 from cpfls_cli.pages.source import unique_labels
+from cpfls_cli.store import read
 from tests.builders.evidence_artifacts import curves, steps, verdict
-from tests.builders.vehicle_models import record_of, whole
+from tests.builders.identified_models import EVIDENCE_PARTS, with_parts
+from tests.builders.vehicle_models import vehicle_of, whole, write_vehicle
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
 def bare(pipeline):
-    artifact = read_artifact(pipeline.model)
-    optional = {spec.path for spec in artifact.spec.datasets if not spec.required}
-    return replace(artifact, data={path: own for path, own in artifact.data.items() if path not in optional})
+    """A model without evidence, and where it comes from."""
+    given, origin = read(pipeline.model, IdentifiedModel)
+    return with_parts(given, dict.fromkeys((*EVIDENCE_PARTS, "ridge"))), origin
 
 
 @pytest.fixture
@@ -29,19 +32,17 @@ def write(bare, tmp_path):
     """Write a model whose errors are scaled, with another flight or another config where that is asked for."""
 
     def make(name, scale=(1.0, 1.0, 1.0), flight=None, config=None, **data):
-        index = bare.texts("judged/models").index("model")
-        mse = bare.array("judged/mse").copy()
-        mse[index] *= np.square(scale)
-        header = bare.header
+        given, origin = bare
+        mse = given.judged.mse.copy()
+        mse[given.judged.models.index("model")] *= np.square(scale)
         if flight:
-            inputs = {role: replace(file, sha256=flight) for role, file in header.inputs.items() if role == "flight"}
-            header = replace(header, inputs={**header.inputs, **inputs})
+            inputs = {role: replace(file, sha256=flight) for role, file in origin.inputs.items() if role == "flight"}
+            origin = replace(origin, inputs={**origin.inputs, **inputs})
         if config:
-            assert config[0] in header.config
-            header = replace(header, config=header.config.replace(*config))
-        path = tmp_path / name
-        write_artifact(path, replace(bare, header=header, data={**bare.data, "judged/mse": mse, **data}))
-        return path
+            assert config[0] in origin.config
+            origin = replace(origin, config=origin.config.replace(*config))
+        store.write(tmp_path / name, with_parts(given, {"judged/mse": mse, **data}), origin)
+        return tmp_path / name
 
     return make
 
@@ -92,12 +93,12 @@ def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is
 
 
 def test_among_models_the_smaller_error_is_marked(compared, write, bare):
-    mse = bare.array("judged/mse").copy()
-    mse[bare.texts("judged/models").index("rigid-body")] = 1.0
+    mse = bare[0].judged.mse.copy()
+    mse[bare[0].judged.models.index("rigid-body")] = 1.0
     paths = []
     for name, scale in (("one.h5", (1.0, 4.0, 1.0)), ("two.h5", (4.0, 1.0, 1.0))):
         own = mse.copy()
-        own[bare.texts("judged/models").index("model")] *= np.square(scale)
+        own[bare[0].judged.models.index("model")] *= np.square(scale)
         paths.append(write(name, **{"judged/mse": own}))
     rows = named(compared(*paths)[1], "comparison-axes-1")["rows"]
     places = range(1, 4)
@@ -121,10 +122,10 @@ def test_models_of_different_flights_are_not_ranked(compared, write):
 
 def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared, write):
     path = write("two.h5")
-    artifact = read_artifact(path)
-    flight = artifact.header.inputs["flight"]
-    renamed = {**artifact.header.inputs, "flight": InputFile("other.h5", flight.sha256, flight.format)}
-    write_artifact(path, replace(artifact, header=replace(artifact.header, inputs=renamed)))
+    given, origin = read(path, IdentifiedModel)
+    flight = origin.inputs["flight"]
+    renamed = {**origin.inputs, "flight": InputFile("other.h5", flight.sha256, flight.format)}
+    store.write(path, given, replace(origin, inputs=renamed))
     _, blocks = compared(write("one.h5"), path)
     assert len(named(blocks, "comparison-1")["rows"]) == 3
 
@@ -138,8 +139,8 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
 
 
 def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write, bare):
-    mse = bare.array("judged/mse").copy()
-    mse[bare.texts("judged/models").index("rigid-body")] = 1.0
+    mse = bare[0].judged.mse.copy()
+    mse[bare[0].judged.models.index("rigid-body")] = 1.0
     _, blocks = compared(write("one.h5"), write("two.h5", **{"judged/mse": mse}))
     names = ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
     assert [row[0] for row in named(blocks, "comparison-1")["rows"]] == names
@@ -152,10 +153,10 @@ def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
 
 @pytest.mark.usefixtures("data_of_figures")
 def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale(compared, write, bare):
-    mse = bare.array("judged/mse").copy()
-    mse[bare.texts("judged/models").index("rigid-body")] = 1e-32
+    mse = bare[0].judged.mse.copy()
+    mse[bare[0].judged.models.index("rigid-body")] = 1e-32
     two = mse.copy()
-    two[bare.texts("judged/models").index("model")] *= 1.21
+    two[bare[0].judged.models.index("model")] *= 1.21
     paths = write("one.h5", **{"judged/mse": mse}), write("two.h5", **{"judged/mse": two})
     series = named(compared(*paths)[1], "comparison-errors")["panels"][0]["series"]
     assert [own["label"] for own in series] == ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
@@ -237,12 +238,15 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
 
 
 def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, tmp_path):
-    record = record_of(whole())
+    vehicle = vehicle_of(whole())
     paths = [tmp_path / folder / "vehicle.h5" for folder in ("still", "gusty")]
     for path, factor in zip(paths, (1.0, 2.0), strict=True):
         path.parent.mkdir()
-        numbers = {name: factor * getattr(record.found, name) for name in ("value", "low", "high")}
-        write_record(path, replace(record, found=replace(record.found, **numbers)))
+        numbers = (
+            each._replace(**{name: factor * getattr(each, name) for name in ("value", "low", "high")})
+            for each in vehicle.numbers
+        )
+        write_vehicle(path, replace(vehicle, numbers=tuple(numbers)))
     output = tmp_path / "report.html"
     result = cpfls("report", study, *paths, "-o", output)
     assert result.exit_code == 0, result.stderr

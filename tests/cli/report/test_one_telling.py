@@ -16,11 +16,11 @@ from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
-from tests.builders import gap_artifacts, vehicle_models
+from tests.builders import gap_artifacts
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("model", "sweep")
-FORMATS = (*FROM_COMMANDS, "extended", "vehicle")
+FORMATS = (*FROM_COMMANDS, "extended")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -58,9 +58,6 @@ def answered(told):
     def of(name):
         if name in told:
             return told[name].source, told[name].outcome.blocks
-        if name == "vehicle":
-            source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
-            return source, tuple(model.answer(source))
         made = gap_artifacts.extended()
         source = source_of(ExtendedRecord.of_data(made.header, made.data), f"{name}.h5")
         return source, tuple(model.answer(source))

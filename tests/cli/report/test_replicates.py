@@ -6,8 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.identification.replicates import Sweep
 from cpfls_cli.report.numbers import number
+from cpfls_cli.store import read
 from tests.builders.pages import table_cells
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -21,13 +22,12 @@ def page(cpfls, swept, *options, sweep="sweep.h5"):
 
 def test_table_shows_means_and_deviations_of_the_runs(cpfls, swept):
     summary, html = page(cpfls, swept)
-    assert "table-5-replicates-1" in summary["tables"]
-    rows = table_cells(html, "table-5-replicates-1")
-    sweep = read_artifact(swept / "sweep.h5")
-    mse, setting = sweep.array("run/mse")[:, 0], sweep.array("run/setting")
+    assert "sweep-1-table-2" in summary["tables"]
+    rows = table_cells(html, "sweep-1-table-2")
+    settings = read(swept / "sweep.h5", Sweep)[0].settings
     assert rows[0] == ["Quantity", "few", "all of them"]
     shown = {row[0].replace("\N{NO-BREAK SPACE}", " "): row[1:] for row in rows}
-    groups = [mse[setting == place] for place in range(2)]
+    groups = [own.of("mse") for own in settings]
     assert shown["runs"] == ["3", "3"]
     assert shown["best run: MSE, (N m)²"] == [number(min(group), 3) for group in groups]
     assert shown["mean MSE, (N m)²"] == [number(sum(group) / 3, 3) for group in groups]
@@ -40,10 +40,9 @@ def test_table_shows_means_and_deviations_of_the_runs(cpfls, swept):
 
 def test_held_out_part_has_its_table(cpfls, swept):
     _, html = page(cpfls, swept)
-    rows = table_cells(html, "held-out-1-1")
+    rows = table_cells(html, "sweep-1-table-3")
     assert [row[:2] for row in rows[1:]] == [["few", "3"], ["all of them", "3"]]
-    mse = read_artifact(swept / "sweep.h5").array("run/mse")[:, 1]
-    few = mse[::2]
+    few = read(swept / "sweep.h5", Sweep)[0].settings[0].of("mse", 1)
     assert rows[1][2] == f"{number(float(np.mean(few)), 3)} ± {number(float(np.std(few, ddof=1)), 2)}"
 
 
@@ -54,6 +53,6 @@ def test_unfinished_sweep_says_so(cpfls, swept, monkeypatch):
     monkeypatch.setattr(Watch, "should_stop", lambda _: next(stops))
     words = ("sweep", swept / "study.yaml", swept / "flight.h5", "-o", swept / "unfinished.h5")
     assert cpfls(*words).exit_code == 0
-    assert read_artifact(swept / "unfinished.h5").number("complete") == 0
+    assert not read(swept / "unfinished.h5", Sweep)[0].complete
     _, html = page(cpfls, swept, sweep="unfinished.h5")
     assert re.search(r"Unfinished: \d of 6 runs of unfinished\.h5", html)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.report import paper_page
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.store import read
 from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import run
 from tests.builders.studies import VEHICLE
@@ -36,8 +37,8 @@ report: {title: "<script>alert(1)</script> & a study"}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "comparison", "models", "model", "vehicle", "trajectory", "simulate", "simulate-2", "reduce",
-    "identification", "validation", "replicates", "search", "partitions", "predict", "rules", "provenance",
+    "summary", "comparison", "models", "model", "stated-vehicle", "trajectory", "simulate", "simulate-2", "reduce",
+    "identification", "validation", "sweep", "search", "partitions", "predict", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -143,7 +144,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 @pytest.mark.usefixtures("undrawn")
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
-    assert summary["sections"] == ["summary", "vehicle", "simulate", "provenance"]
+    assert summary["sections"] == ["summary", "stated-vehicle", "simulate", "provenance"]
     assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html
@@ -191,11 +192,11 @@ def test_hostile_titles_and_file_names_stay_text(study, tmp_path):
 def test_the_headline_says_who_wins_and_on_what(study, full):
     assert "the rigid body is better about every axis" in full.page.text
     assert "simulated without noise" in full.page.text
-    model = read_artifact(study.model)
+    model, ridge = (read(path, IdentifiedModel)[0] for path in (study.model, study.ridge))
     assert "On the held-out rest" in full.page.text
-    worst = 100 * float(np.max(model.array("judged/relative_error")[0, 0]))
+    worst = 100 * float(np.max(model.judged.relative_error[0, 0]))
     assert f"{worst:.3g} %" in full.page.text
-    for finding in model.texts("findings") + read_artifact(study.ridge).texts("findings"):
+    for finding in model.findings + ridge.findings:
         assert finding[1:] in full.page.text
 
 
@@ -250,7 +251,7 @@ def test_the_provenance_names_hashes_and_no_folder(study, full):
     for path in full.given:
         assert subprocess.check_output(["sha256sum", path], text=True)[:64] in full.page.text
     assert str(study.folder) not in full.html
-    assert read_artifact(study.model).header.config in full.page.text
+    assert read(study.model, IdentifiedModel)[1].config in full.page.text
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -4,12 +4,12 @@ import json
 import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from benchmarks.paper.claims import EvaluationTime
 from benchmarks.paper.report import paper_page
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.identification.replicates import Sweep
+from cpfls_cli.store import read, write
 from tests.builders.pages import table_cells
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -42,14 +42,14 @@ def page(folder, *names, times=()):
 def test_parts_of_a_sweep_stand_as_the_whole(folder):
     _, whole = page(folder, "whole.h5")
     summary, parts = page(folder, "first.h5", "rest.h5")
-    assert [name for name in summary.tables if "replicates" in name] == ["table-5-replicates-1"]
-    assert table_cells(parts, "table-5-replicates-1") == table_cells(whole, "table-5-replicates-1")
+    assert [name for name in summary.tables if name.startswith("sweep")] == ["sweep-1-table-1", "sweep-1-table-2"]
+    assert table_cells(parts, "sweep-1-table-2") == table_cells(whole, "sweep-1-table-2")
     assert "first.h5 and rest.h5" in parts
 
 
 def test_sweeps_that_share_a_seed_stand_apart(folder):
     summary, _ = page(folder, "whole.h5", "first.h5")
-    assert [n for n in summary.tables if "replicates" in n] == ["table-5-replicates-1", "table-5-replicates-2"]
+    assert {name[:7] for name in summary.tables if name.startswith("sweep")} == {"sweep-1", "sweep-2"}
 
 
 def test_every_claim_and_every_figure_has_its_line(folder):
@@ -80,26 +80,25 @@ def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, folder):
 
 def with_settings(folder, name, **values):
     """Write a sweep that claims other settings."""
-    artifact = read_artifact(folder / "whole.h5")
-    data = {path.replace("__", "/"): np.array(value) for path, value in values.items()}
-    write_artifact(folder / name, replace(artifact, data={**artifact.data, **data}))
+    sweep, origin = read(folder / "whole.h5", Sweep)
+    rows = (dict(zip(values, each, strict=True)) for each in zip(*values.values(), strict=True))
+    settings = tuple(replace(own, **given) for own, given in zip(sweep.settings, rows, strict=True))
+    write(folder / name, replace(sweep, settings=settings), origin)
     return name
 
 
 def test_paper_stands_beside_settings_of_equal_structure_and_samples(folder):
-    claimed = with_settings(folder, "paper.h5", setting__samples=[685, 5487], setting__structure=["cpfls", "fls"])
+    claimed = with_settings(folder, "paper.h5", samples=[685, 5487], structure=["cpfls", "fls"])
     _, html = page(folder, claimed)
-    rows = table_cells(html, "table-5-replicates-1")
+    rows = table_cells(html, "sweep-1-table-2")
     places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
     assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
     assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
     assert rows[places["mean condition number"] + 1] == ["· paper", "5368.1", "3815.5"]
     assert rows[places["mean condition number"] + 3] == ["· paper", "2434.5", "1701.2"]
-    assert "Table 5. Results of paper.h5" in html
     assert "standard deviation: a variance" in html
 
 
 def test_other_settings_stand_alone(folder):
     _, html = page(folder, "whole.h5")
-    assert "· paper" not in [row[0] for row in table_cells(html, "table-5-replicates-1")]
-    assert "Table 5. Results" not in html
+    assert "· paper" not in [row[0] for row in table_cells(html, "sweep-1-table-2")]

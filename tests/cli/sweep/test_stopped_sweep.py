@@ -5,12 +5,10 @@ import random
 import signal
 import time
 
-import h5py
-import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.identification.replicates import Sweep
+from cpfls_cli.store import read
 from tests.builders.forked import Forked
 
 PARTIAL, CHECKPOINT = "sweep.h5.partial", "sweep.h5.checkpoint"
@@ -20,9 +18,12 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+def sweep_in(path):
+    return read(path, Sweep)[0]
+
+
 def finished(path):
-    with h5py.File(path) as file:
-        return len(file["run/seed"])
+    return sweep_in(path).runs
 
 
 def wait_for_change(process, path):
@@ -113,13 +114,12 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on(
         "the same command with --resume goes on"
     )
     assert names(tmp_path) == ["sweep.h5", CHECKPOINT, PARTIAL]
-    incomplete = read_artifact(output)
-    assert check_artifact(incomplete) == []
-    assert incomplete.number("complete") == 0
+    incomplete = sweep_in(output)
+    assert not incomplete.complete
     assert finished(output) == finished(tmp_path / PARTIAL) < 6
     assert (finished(output) > 0) == (evaluations > 1)
-    whole_mse = read_artifact(whole).array("run/mse")
-    assert np.array_equal(incomplete.array("run/mse"), whole_mse[: finished(output)])
+    for own, all_runs in zip(incomplete.settings, sweep_in(whole).settings, strict=True):
+        assert own.of("mse").tolist() == all_runs.of("mse")[: own.runs].tolist()
     monkeypatch.undo()
     assert cpfls(*words, "-o", output, "--resume").exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
@@ -132,7 +132,7 @@ def test_what_is_finished_or_evaluated_is_not_searched_again(
     output, evaluated = tmp_path / "sweep.h5", []
     interrupt_at(50)
     assert cpfls(*words, "-o", output).exit_code == 130
-    total = int(read_artifact(whole).array("run/evaluations").sum())
+    total = int(sum(own.of("evaluations").sum() for own in sweep_in(whole).settings))
     at_evaluation(total - 50, lambda: evaluated.append("last"))
     assert cpfls(*words, "-o", output, "--resume").exit_code == 0
     assert evaluated == ["last"]
@@ -144,7 +144,7 @@ def test_time_limit_is_for_all_runs_together(cpfls, words, whole, tmp_path, at_e
     monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 200.0))
     assert cpfls(*words, "-o", output, "--time-limit", "90s").exit_code == 0
-    assert read_artifact(output).number("complete") == 0
+    assert not sweep_in(output).complete
     monkeypatch.undo()
     assert cpfls(*words, "-o", output, "--resume").exit_code == 0
     assert output.read_bytes() == whole.read_bytes()

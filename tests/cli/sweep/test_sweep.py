@@ -6,36 +6,34 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.identification.replicates import Sweep
+from cpfls_cli.result import column
+from cpfls_cli.store import read
 
 SETTINGS = 3
 
 
-def numbers(path, *names):
-    with h5py.File(path) as file:
-        return [np.asarray(file[name][()], dtype=float) for name in names]
+def sweep_in(path):
+    return read(path, Sweep)[0]
 
 
-def test_artifact_keeps_to_its_format(whole):
-    sweep = read_artifact(whole)
-    assert check_artifact(sweep) == []
-    assert sweep.texts("setting/name") == ["classic, all samples", "fewer samples", "more functions"]
-    assert sweep.texts("setting/criterion") == ["all", "D", "D"]
-    assert sweep.array("setting/samples").tolist() == [275, 40, 60]
-    assert sweep.array("setting/population").tolist() == [8, 8, 12]
-    assert sweep.array("run/setting").tolist() == [0, 1, 2, 0, 1, 2]
-    assert sweep.array("run/seed").tolist() == [5, 5, 5, 6, 6, 6]
-    assert sweep.number("complete") == 1
-    assert len(set(sweep.texts("setting/selection"))) == SETTINGS
+def test_file_holds_every_setting_with_its_runs(whole):
+    sweep = sweep_in(whole)
+    assert column(sweep.settings, "name") == ["classic, all samples", "fewer samples", "more functions"]
+    assert column(sweep.settings, "criterion") == ["all", "D", "D"]
+    assert column(sweep.settings, "samples") == [275, 40, 60]
+    assert column(sweep.settings, "population") == [8, 8, 12]
+    assert [setting.seeds.tolist() for setting in sweep.settings] == [[5, 6]] * 3
+    assert sweep.complete
+    assert len(set(column(sweep.settings, "selection"))) == SETTINGS
 
 
 @pytest.mark.parametrize(("setting", "seed"), [(0, 6), (1, 6), (2, 5)])
 def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
     cpfls, whole, sweep, sweep_flight, tmp_path, setting, seed
 ):
-    artifact = read_artifact(whole)
-    texts = json.loads(artifact.texts("setting/overrides")[setting])
+    own = sweep_in(whole).settings[setting]
+    texts = own.overrides
     asked = [text for text in texts if text != "reduction.size=null"]
     # No evidence: a sweep gathers none, and none of it is compared.
     overrides = [word for text in (*asked, "identification.validation.enabled=false") for word in ("--set", text)]
@@ -46,18 +44,13 @@ def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
         options = ["--selection", selection]
     result = cpfls("identify", sweep, sweep_flight, *options, "-o", model, *overrides, "--seed", seed, "--json")
     assert result.exit_code == 0, result.stderr
-    run = (seed - 5) * SETTINGS + setting
-    found = json.loads(result.stdout)
-    weights = numbers(model, "model/weights")[0]
-    chromosome = artifact.array("run/chromosome")[run]
-    assert chromosome[: len(weights)].tolist() == weights.tolist()
-    assert (chromosome[len(weights) :] == -1).all()
-    assert artifact.array("run/mse")[run, 0] == found["mse"]
-    assert artifact.array("run/max_error")[run, 0] == found["max_error"]
-    assert artifact.array("run/relative_error")[run, 0] == found["relative_error"]
-    assert artifact.array("run/condition_number")[run] == found["condition_number"]
-    assert artifact.array("run/evaluations")[run] == found["evaluations"]
-    assert artifact.array("setting/samples")[setting] == found["learned"]
+    run, found = own.replicates[seed - 5], json.loads(result.stdout)
+    with h5py.File(model) as file:
+        assert list(run.chromosome) == file["weights"][()].tolist()
+    for name in ("mse", "max_error", "relative_error"):
+        assert getattr(run, name)[0] == found[name]
+    assert (run.condition_number, run.evaluations) == (found["condition_number"], found["evaluations"])
+    assert own.samples == found["learned"]
 
 
 def test_printed_means_and_variances_are_those_of_the_runs(cpfls, words, whole, tmp_path):
@@ -65,13 +58,12 @@ def test_printed_means_and_variances_are_those_of_the_runs(cpfls, words, whole, 
     assert (tmp_path / "again.h5").read_bytes() == whole.read_bytes()
     summary = json.loads(result.stdout)
     assert (summary["runs"], summary["runs_in_all"], summary["complete"]) == (6, 6, True)
-    mse, condition, setting = numbers(whole, "run/mse", "run/condition_number", "run/setting")
-    for place, said in enumerate(summary["settings"]):
-        first, second = mse[setting == place, 0]
+    for own, said in zip(sweep_in(whole).settings, summary["settings"], strict=True):
+        first, second = own.of("mse")
         assert said["mse"]["mean"] == pytest.approx((first + second) / 2)
         assert said["mse"]["variance"] == pytest.approx((first - second) ** 2 / 2)
         assert said["mse"]["smallest"] == min(first, second)
-        assert said["condition_number"]["mean"] == pytest.approx(sum(condition[setting == place]) / 2)
+        assert said["condition_number"]["mean"] == pytest.approx(sum(own.of("condition_number")) / 2)
         assert said["seeds"] == [5, 6]
     table = cpfls(*words, "-o", tmp_path / "table.h5").stdout.splitlines()
     assert table[0] == "6 of 6 runs, 3 settings; mean and standard deviation of the training part"
@@ -82,10 +74,8 @@ def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
     output = tmp_path / "sweep.h5"
     options = ("--set", "sweep.settings=[]", "--set", "sweep.seeds=1", "--seed", 9)
     assert cpfls(*words, "-o", output, *options).exit_code == 0
-    sweep = read_artifact(output)
-    assert sweep.texts("setting/name") == ["as configured"]
-    assert sweep.array("run/seed").tolist() == [9]
-    assert sweep.array("setting/population").tolist() == [8]
+    (own,) = sweep_in(output).settings
+    assert (own.name, own.seeds.tolist(), own.population) == ("as configured", [9], 8)
 
 
 def test_held_out_parts_and_other_flights_are_judged(cpfls, words, sweep, sweep_flight, tmp_path):
@@ -95,10 +85,10 @@ def test_held_out_parts_and_other_flights_are_judged(cpfls, words, sweep, sweep_
     settings = "[{name: split, set: {identification.training_share: 0.7}}, {name: whole}]"
     options = ("--set", f"sweep.settings={settings}", "--set", "sweep.seeds=1", "--validate", other)
     assert cpfls(*words, "-o", output, *options).exit_code == 0
-    artifact = read_artifact(output)
-    assert artifact.texts("part") == ["training", "held-out rest", "other.h5"]
-    known = np.isfinite(artifact.array("run/mse"))
-    assert known.tolist() == [[True, True, True], [True, False, True]]
+    sweep = sweep_in(output)
+    assert sweep.parts == ("training", "held-out rest", "other.h5")
+    known = [np.isfinite(own.replicates[0].mse).tolist() for own in sweep.settings]
+    assert known == [[True, True, True], [True, False, True]]
 
 
 def test_workers_find_the_same(cpfls, words, tmp_path):
@@ -134,7 +124,7 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
     assert first["runs"] == 2
     assert first["mse"]["mean"] == first["mse"]["smallest"]
     assert first["mse"]["variance"] is None
-    assert check_artifact(read_artifact(tmp_path / "sweep.h5")) == []
+    assert sweep_in(tmp_path / "sweep.h5").without_model == 1
 
 
 def test_dry_run_writes_nothing(cpfls, words, tmp_path):

@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 
 from benchmarks.shared.playback_scores import free_runs, rate_stays, score
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from tests.builders.command_line import run
 from tests.builders.playback_flights import ROTORPY_HIDDEN, rotorpy_flight, rotorpy_truth
 from tests.builders.recorded_flights import path_of_log
-from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 CONFIG = Path(__file__).parents[3] / "configs" / "gap" / "rotorpy.yaml"
 
@@ -48,7 +47,7 @@ def test_torque_and_force_of_the_model_that_flew_are_what_the_motion_takes(name,
     told, gaps = {}, {}
     for model in ("none", name):
         vehicle = replace(rotorpy_truth(model), vehicle=study.vehicle)
-        write_record(tmp_path / "vehicle.h5", record_of(vehicle, config=resolved_yaml(study)))
+        write_vehicle(tmp_path / "vehicle.h5", vehicle_of(vehicle), resolved_yaml(study))
         told[model] = answered("predict", CONFIG, tmp_path / "vehicle.h5", flight, "-o", tmp_path / "p.h5")
         words = ("compare", CONFIG, flight, "--model", tmp_path / "vehicle.h5", "-o", tmp_path / "gap.h5")
         gaps[model] = answered(*words)["gap"]

@@ -180,7 +180,7 @@ def test_a_vehicle_holds_the_gusts_of_its_flights(flights, runs, told_by):
     known = flown if runs == "repeats" else [flown[0], flown[RUNS]]
     found = find_vehicle(vehicle, known, settings, np.random.default_rng(1), lambda *_: None)
     assert found.loop.shows_loop
-    assert found.constants.told_by == told_by
+    assert found.instruments.kind == told_by
     assert np.diag(found.model.body.inertia)[:2] == pytest.approx(LARGE.inertia[:2], rel=0.15)
-    assert found.gusts.told_by == told_by
+    assert found.disturbance.told_by == told_by
     assert found.model.gusts.size[:2] / LARGE.inertia[:2] == pytest.approx(GUSTS[:2], rel=0.25)

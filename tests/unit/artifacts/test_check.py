@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.spec import Format, Header, Record, dataset, group, record
 from cpfls_cli.artifacts.store import Artifact
 
@@ -75,34 +74,6 @@ def test_not_finite_counts_samples_and_names_the_first():
 
 def test_gaps_are_allowed_where_the_format_says_so():
     assert findings(**datasets(rotor_speed=np.full((4, 6), np.nan))) == []
-
-
-def test_lengths_in_digits_are_fixed():
-    assert findings(IdentifiedRecord.spec(), vehicle__inertia_functions__rigid_body=np.zeros(5)) == [
-        "vehicle/inertia_functions/rigid_body: 5 along '6', but 6 by the format"
-    ]
-
-
-@pytest.mark.parametrize("chosen", [3, -1, 10**6])
-def test_an_index_has_to_lead_somewhere(chosen):
-    given = {"front__objectives": np.ones((3, 3)), "front__chosen": np.array(chosen)}
-    expected = f"front/chosen: {chosen} is not an index into the 3 of 'member'"
-    assert findings(IdentifiedRecord.spec(), **given) == [expected]
-    assert findings(IdentifiedRecord.spec(), **(given | {"front__chosen": np.array(2)})) == []
-
-
-def test_a_condition_number_is_one_at_least():
-    assert findings(IdentifiedRecord.spec(), solve__condition_number=np.array(0.0)) == [
-        "solve/condition_number: 0.0 is below 1"
-    ]
-
-
-@pytest.mark.parametrize("kind", ["U8", "S8"])
-def test_scores_hold_those_of_training(kind):
-    parts = {"judged__samples": np.ones(2), "judged__parts": np.array(["training", "held-out"], dtype=kind)}
-    assert findings(IdentifiedRecord.spec(), **parts) == []
-    parts["judged__parts"] = np.array(["x", "held-out"], dtype=kind)
-    assert findings(IdentifiedRecord.spec(), **parts) == ["judged/parts: lacks training"]
 
 
 def test_empty_datasets_are_not_an_error_of_the_rules_but_time_has_two_samples():

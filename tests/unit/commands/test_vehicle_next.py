@@ -8,10 +8,10 @@ import pytest
 
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.commands.numbers import to_fly
-from cpfls_cli.commands.vehicle import next_commands
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC
 from cpfls_cli.report.outcome import command_line
+from cpfls_cli.stages.vehicle import next_commands
 from cpfls_cli.validation.trust import Trust
 from tests.builders.vehicle_search import CONFIG
 
@@ -20,7 +20,7 @@ from tests.builders.vehicle_search import CONFIG
 def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust):
     study = validate(parse_config(CONFIG, "config"), "config")
     job = Job(study, Path("own/found.h5"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
-    record = SimpleNamespace(complete=True, trust=trust, rotors_told=None)
+    record = SimpleNamespace(complete=True, trust=trust, logged_slowly=False)
     page, (_, command, *words) = next_commands(job, record, [Path("f.h5")], ())
     assert page[:2] == ("cpfls", "report")
     poor = trust in (Trust.LACKING, Trust.NOT_DETERMINED, Trust.LOOP, Trust.DO_NOT_USE)
@@ -31,7 +31,7 @@ def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust
     _, (*mission, _) = next_commands(coarse, record, [Path("f.h5")], ())
     assert "trajectory.sample_time_s=0.02" in mission
     # No flight tells more before its log is faster.
-    slow = SimpleNamespace(complete=True, trust=trust, rotors_told=10.0, logged_by=("ArduPilot",))
+    slow = SimpleNamespace(complete=True, trust=trust, logged_slowly=True)
     assert next_commands(job, slow, [Path("f.h5")], ()) == (page,)
 
 

@@ -127,18 +127,17 @@ def test_numbers_come_back_bit_by_bit():
 
 
 def test_what_is_not_finite_is_null_and_what_is_not_known_is_too():
-    document = document_of(model_of(CASES["paper"]), verdict=None, stop_reason="", config={"a": float("inf")})
+    document = document_of(model_of(CASES["paper"]), verdict=None, config={"a": float("inf")})
     scores = document["judged"]["models"]["model"]["training"]
-    known = {name: [1.0, 2.0, 3.0] for name in ("mse", "max_error", "r2_body")}
+    known = {name: [1.0, 2.0, 3.0] for name in ("mse", "max_error", "vaf", "r2_body")}
     assert scores == {**known, "relative_error": [0.1, None, 0.2], "r2": [0.9, None, 0.5]}
     assert document["verdict"] is None
-    assert document["stop_reason"] is None
     assert document["provenance"]["config"] == {"a": None}
 
 
 def test_the_verdict_and_its_reasons_are_there():
     verdict = verdict_of("do-not-use", "nowhere", ("D is not positive definite", -1), ("few samples", 0))
-    document = document_of(model_of(CASES["paper"]), verdict=verdict, complete=False)
+    document = document_of(model_of(CASES["paper"]), verdict=verdict, stop_reason="interrupted")
     assert document["complete"] is False
     assert document["verdict"]["label"] == "do-not-use"
     assert document["verdict"]["reasons"][0] == {"reason": "D is not positive definite", "speaks": -1.0}

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.rebuilt import estimates, vehicle_model
 from cpfls_cli.export.registry import exported
 from cpfls_cli.export.source import jax_parameters, python_source
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.spread import drawn
+from cpfls_cli.playback.spread import Estimates, drawn
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.flown_exports import executed
 from tests.builders.playback_flights import flown, truth
@@ -21,9 +20,7 @@ DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), t
 
 def vehicles(model, count):
     record = found_record(model)
-    return vehicle_model(record.vehicle), drawn(
-        vehicle_model(record.vehicle), estimates(record), count, np.random.default_rng(1)
-    )
+    return record.model, drawn(record.model, Estimates.of(record), count, np.random.default_rng(1))
 
 
 def test_the_parameters_of_each_vehicle_are_those_of_its_own_export():

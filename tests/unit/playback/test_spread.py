@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.rebuilt import estimates, vehicle_model
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
-from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
+from cpfls_cli.playback.spread import POSITIVE, Estimates, drawn, model_at
 from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass
@@ -27,7 +26,7 @@ def flat(model):
 
 
 def spread_of(record, count=COUNT, seed=1):
-    return drawn(vehicle_model(record.vehicle), estimates(record), count, np.random.default_rng(seed))
+    return drawn(record.model, Estimates.of(record), count, np.random.default_rng(seed))
 
 
 def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together():
@@ -35,7 +34,7 @@ def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together(
     assert not spread.rejected
     assert spread.tried == 2000
     values = dict(zip(spread.names, spread.values.T, strict=True))
-    known = {number.name: number for number in estimates(found_record(flat(truth()))).numbers}
+    known = {number.name: number for number in Estimates.of(found_record(flat(truth()))).numbers}
     for name, own in values.items():
         inside = np.mean((known[name].low <= own) & (own <= known[name].high))
         assert 0.93 < inside < 0.97
@@ -132,9 +131,10 @@ def test_a_number_that_no_vehicle_has_is_named():
 def test_what_the_loop_leaves_open_is_between_its_bounds():
     bounds = np.array([[0.9, 1.0, 0.8], [1.0, 1.25, 1.0]])
     record = found_record(flat(truth()), loop=bounds, relative=0.4)
-    narrow = replace(record, found=replace(record.found, low=record.found.value * 0.8, high=record.found.value * 1.25))
+    numbers = (each._replace(low=each.value * 0.8, high=each.value * 1.25) for each in record.numbers)
+    narrow = replace(record, numbers=tuple(numbers))
     spread = spread_of(narrow)
-    begun = {number.name: number.value for number in estimates(narrow).numbers}
+    begun = {number.name: number.value for number in Estimates.of(narrow).numbers}
     shares = {name: own / begun[name] for name, own in zip(spread.names, spread.values.T, strict=True)}
     # Yaw torque and inertia are known by their ratio: what the loop did is in the moment of inertia alone.
     assert np.median(shares["drag_factor"]) == pytest.approx(1.0, abs=0.02)
@@ -146,7 +146,7 @@ def test_what_the_loop_leaves_open_is_between_its_bounds():
 def test_gusts_are_drawn_as_accelerations():
     record = found_record(flat(truth()))
     spread = spread_of(record)
-    nominal = vehicle_model(record.vehicle)
+    nominal = record.model
     bodies = np.array([inertia_and_mass(own.vehicle) for own in spread.models])
     shares = np.array([own.gusts.size for own in spread.models]) / nominal.gusts.size
     accelerations = shares * inertia_and_mass(nominal.vehicle) / bodies
@@ -163,7 +163,7 @@ def test_what_the_model_lacks_goes_with_the_vehicles_and_the_white_part_with_the
     assert spread.lack.share[:3].tolist() == [[0.3, 0.2]] * 3
     assert np.isnan(spread.lack.rest[3:]).all()
     first = spread.models[0]
-    bodies = inertia_and_mass(first.vehicle) / inertia_and_mass(vehicle_model(record.vehicle).vehicle)
+    bodies = inertia_and_mass(first.vehicle) / inertia_and_mass(record.model.vehicle)
     assert first.gusts.white == pytest.approx(record.disturbance.white * bodies)
     assert spread_of(found_record(), 3).lack is None
 
@@ -173,11 +173,6 @@ def test_a_part_that_is_not_in_the_model_stays_out_of_it():
     spread = spread_of(found_record(model), 3)
     assert "linear_damping.d_y" not in spread.names
     assert all(own.effects[0].coefficients[1] == 0.0 for own in spread.models)
-
-
-def test_an_artifact_of_before_says_how_to_get_one_that_knows():
-    with pytest.raises(InputError, match="run `cpfls vehicle` again"):
-        estimates(found_record(correlation=None))
 
 
 def test_draws_are_the_same_with_the_same_seed():

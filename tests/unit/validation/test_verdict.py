@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.grounds import MODEL, Grounds
-from cpfls_cli.validation.reasons import _band
+from cpfls_cli.validation.reasons import Reason, _band
 from cpfls_cli.validation.replay import NOTHING_MOVES
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.verdict import Verdict, beside_loop, confirmed_axes, region_in_words
@@ -61,21 +61,21 @@ def test_without_windows_torque_decides():
 @pytest.mark.parametrize("by_past", [False, True])
 @pytest.mark.parametrize("label", [Trust.CONTROL, Trust.INSIDE, Trust.RIGID_BODY])
 def test_no_model_of_flights_that_show_the_loop_is_good(label, by_past):
-    found = beside_loop(Verdict(label, "", ("better",), (1,)), LOOP, by_past=by_past)
+    found = beside_loop(Verdict(label, "", (Reason("better", 1),)), LOOP, by_past=by_past)
     assert found.label == Trust.LOOP
-    assert "50 % of roll, 80 % of pitch" in found.reason[0]
-    assert ("What was before tells roll and pitch" in found.reason[0]) is by_past
-    assert found.speaks == (-1, 1)
+    assert "50 % of roll, 80 % of pitch" in found.reasons[0].text
+    assert ("What was before tells roll and pitch" in found.reasons[0].text) is by_past
+    assert [each.speaks for each in found.reasons] == [-1, 1]
 
 
 def test_a_loop_does_not_save_what_is_not_to_be_used():
-    found = beside_loop(Verdict(Trust.DO_NOT_USE, "", ("no body",), (-1,)), LOOP)
-    assert (found.label, found.reason[0], len(found.reason)) == (Trust.DO_NOT_USE, "no body", 2)
+    found = beside_loop(Verdict(Trust.DO_NOT_USE, "", (Reason("no body", -1),)), LOOP)
+    assert (found.label, found.reasons[0].text, len(found.reasons)) == (Trust.DO_NOT_USE, "no body", 2)
 
 
 @pytest.mark.parametrize("loop", [None, LOOP._replace(explained=np.array([0.95, 0.95, 0.1]))])
 def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
-    found = Verdict(Trust.INSIDE, "", ("better",), (1,))
+    found = Verdict(Trust.INSIDE, "", (Reason("better", 1),))
     assert beside_loop(found, loop) is found
 
 

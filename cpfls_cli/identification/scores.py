@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import BODY, EULER, dataset, record
-
-if TYPE_CHECKING:
-    from cpfls_cli.identification.identify import Identification
+from cpfls_cli.identification.identify import TRAINING as TRAINING
+from cpfls_cli.identification.identify import Identification
+from cpfls_cli.result import about, result
 
 AXES = ("roll", "pitch", "yaw")
 """Euler axes, in the order in which scores have them."""
-
-TRAINING = "training"
-"""Name of the part that models learn from."""
 
 MODEL, RIGID_BODY, ZERO = "model", "rigid-body", "torque-zero"
 """Names of the model and of two of its baselines among the judged models."""
@@ -26,47 +22,68 @@ Winner = Literal["model", "rigid-body", "tie"]
 # A mean squared error that is smaller by less than a hundredth, or beside that of no torque at all, decides nothing.
 _TIE, _ROUNDING = 0.01, 1e-12
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
-_JUDGED = ("judged_model", "part", "axis")
+_EULER = "Euler angles (intrinsic ZYX)"
 
 
-@record
-class JudgedGroup:
-    """Scores of the model and its baselines, by part of the data and axis."""
+@result
+class Judged:
+    """Scores of the model and its baselines, by model, part of the data and axis."""
 
-    models: tuple[str, ...] = dataset("the model and its baselines", "judged_model")
-    parts: tuple[str, ...] = dataset("training, held-out rest, other flights", "part", holds=TRAINING)
-    samples: IntArray = dataset("samples judged", "part")
-    outside: IntArray = dataset("of them outside the attitudes that training visited", "part")
-    mse: Array = dataset("mean squared torque error", *_JUDGED, units="(N m)^2", frame=EULER)
-    max_error: Array = dataset("largest torque error", *_JUDGED, units="N m", frame=EULER)
-    relative_error: Array = dataset("largest error over largest torque", *_JUDGED, frame=EULER, gaps=True)
-    r2: Array = dataset("share of the torque's variance explained", *_JUDGED, frame=EULER, gaps=True)
-    vaf: Array | None = dataset(
-        "the same without the mean of the error: variance accounted for", *_JUDGED, frame=EULER, gaps=True, default=None
+    models: tuple[str, ...] = about("the model and its baselines", "judged_model")
+    parts: tuple[str, ...] = about("training, held-out rest, other flights", "part")
+    samples: IntArray = about("samples judged", "part")
+    outside: IntArray = about("of them outside the attitudes that training visited", "part")
+    mse: Array = about(
+        "mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", frame=_EULER, brief=False
     )
-    r2_body: Array = dataset("the same for body torque, not near a pitch of +-90 deg", *_JUDGED, frame=BODY, gaps=True)
+    max_error: Array = about(
+        "largest torque error", "judged_model", "part", "axis", unit="N m", frame=_EULER, brief=False
+    )
+    relative_error: Array = about(
+        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+    )
+    r2: Array = about(
+        "share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+    )
+    vaf: Array = about(
+        "the same without the mean of the error: variance accounted for",
+        "judged_model",
+        "part",
+        "axis",
+        gaps=True,
+        frame=_EULER,
+        brief=False,
+    )
+    r2_body: Array = about(
+        "the same for body torque, not near a pitch of +-90 deg",
+        "judged_model",
+        "part",
+        "axis",
+        gaps=True,
+        frame="body (FLU)",
+        brief=False,
+    )
 
     @classmethod
-    def of(cls, result: Identification) -> Self:
+    def of(cls, found: Identification) -> Self:
         """Arrange the scores of an identification."""
-        parts, models = list(result.scores), list(result.scores[TRAINING])
+        parts, models = list(found.scores), list(found.scores[TRAINING])
 
         def table(measure: str) -> Array:
-            return np.array([[getattr(result.scores[part][model], measure) for part in parts] for model in models])
+            return np.array([[getattr(found.scores[part][model], measure) for part in parts] for model in models])
 
         return cls(
             models=tuple(models),
             parts=tuple(parts),
-            samples=np.array([result.samples[part] for part in parts]),
-            outside=np.array([result.outside[part] for part in parts]),
+            samples=np.array([found.samples[part] for part in parts]),
+            outside=np.array([found.outside[part] for part in parts]),
             **{measure: table(measure) for measure in _MEASURES},
         )
 
     @property
     def measures(self) -> dict[str, Array]:
-        """All scores by name, each of shape (models, parts, 3); without those that an older version left out."""
-        tables = {measure: getattr(self, measure) for measure in _MEASURES}
-        return {measure: table for measure, table in tables.items() if table is not None}
+        """All scores by name, each of shape (models, parts, 3)."""
+        return {measure: getattr(self, measure) for measure in _MEASURES}
 
     @property
     def held_out(self) -> tuple[str, ...]:
@@ -83,11 +100,10 @@ class JudgedGroup:
         return int(self.samples[self.parts.index(part)])
 
     def of_axes(self, measure: str, model: str, part: str) -> Array:
-        """Get a measure by axis, shape (3,); NaN where this model or part was not judged, or not by this measure."""
-        table = getattr(self, measure)
-        if table is None or model not in self.models or part not in self.parts:
+        """Get a measure by axis, shape (3,); NaN where this model or part was not judged."""
+        if model not in self.models or part not in self.parts:
             return np.full(3, np.nan)
-        return np.asarray(table[self.models.index(model), self.parts.index(part)])
+        return np.asarray(getattr(self, measure)[self.models.index(model), self.parts.index(part)])
 
     def nrmse(self, model: str, part: str) -> Array:
         """Get the root mean square error by axis over the standard deviation of the torque, shape (3,)."""

@@ -1,4 +1,4 @@
-"""Command `identify`: find a model in flights and judge it."""
+"""Identify a model from one or more flights and judge it beside its baselines."""
 
 from __future__ import annotations
 
@@ -8,12 +8,23 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from signal import SIGINT
+from typing import Annotated
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.job import Job, finish
-from cpfls_cli.artifacts.learned import LearnedGroup
+import typer
+
+from cpfls_cli.arguments import (
+    ChooseOnOption,
+    ResumeOption,
+    SchedulerOption,
+    TimeLimitOption,
+    TrainingArgument,
+    ValidateOption,
+    WorkersOption,
+)
+from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.store import read_header
-from cpfls_cli.commands.stopped import stopped, without_model
+from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
@@ -24,72 +35,83 @@ from cpfls_cli.flights.training import TrainingData, flight_roles, read_training
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.excitation import swings
 from cpfls_cli.identification.findings import short_flight
-from cpfls_cli.identification.identify import Identification, identify
+from cpfls_cli.identification.identify import Identification
+from cpfls_cli.identification.identify import identify as identified
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.sensors import tell_before_search
-from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Command, Outcome, nothing_written
+from cpfls_cli.report.outcome import Command
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
+from cpfls_cli.stage import Run, stage
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
 from cpfls_cli.validation.verdict import contradicted
 from cpfls_cli.workers.workforce import WorkerError
 
+SelectionOption = Annotated[
+    Path | None,
+    typer.Option("--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."),
+]
 
-def run(
-    job: Job,
-    flights: Sequence[Path],
-    selection: Path | None,
-    validate: Sequence[Path],
-    options: SearchOptions,
-    choose_on: Sequence[Path] = (),
-) -> Outcome:
-    """Identify a model and write it."""
-    inputs, search = begin_search(job, input_roles(flights, selection, validate, choose_on), options)
-    data = read_training(flights, selection, job.study, inputs)
-    kept = choosing_source(choose_on, inputs)
-    with settings_of("identification", job.study):
-        require_flights(job.study.identification.choice, given=kept is not None)
-    held_out = held_out_parts(job.study, data.rests, inputs, validate)
-    wrong = _contradictions([*flights, *choose_on, *validate], job.study)
-    others = other_vehicles([*flights, *choose_on, *validate], job.study)
+
+@stage(IdentifiedModel, title="Identification", words=WORDS, study=True, resumes=True)
+def identify(
+    run: Run,
+    flights: TrainingArgument,
+    selection: SelectionOption = None,
+    validate: ValidateOption = None,
+    choose_on: ChooseOnOption = None,
+    resume: ResumeOption = False,
+    time_limit: TimeLimitOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+) -> IdentifiedModel | None:
+    """Identify a model, and gather the evidence on it."""
+    options, others, choosing = SearchOptions(resume, time_limit, workers, scheduler), validate or [], choose_on or []
+    inputs, search = begin_search(run, input_roles(flights, selection, others, choosing), options)
+    run.files.update(inputs)
+    data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
+    with settings_of("identification", run.study):
+        require_flights(run.study.identification.choice, given=kept is not None)
+    held_out = held_out_parts(run.study, data.rests, inputs, others)
+    wrong = _contradictions([*flights, *choosing, *others], run.study)
+    for sentence in other_vehicles([*flights, *choosing, *others], run.study):
+        run.note(sentence)
     tell_before_search(wrong)
-    if job.dry_run:
-        return nothing_written(job)
-    clock = time.perf_counter()
-    watch = Watch(job, options.time_limit_s)
-    with search.kept():
-        result = _identify(job, flights, data, held_out, kept, search.run(options, watch, _shown(job)))
-    if isinstance(result, NothingFoundError):
-        search.end(result.stop_reason)
-        raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
-    result = _with_length(result, flights, data)
-    with search.kept():
-        evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
-        base, vehicle = job.study.identification.base, VehicleModel(vehicle=job.study.vehicle, fuzzy=result.model)
-        parts = LearnedGroup.parts(flight_roles(flights), data.parts)
-        record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle, parts), inputs)
-    unjudged = signal is not None and evidence is None and job.study.identification.validation.enabled
+    if run.dry_run:
+        return None
+    clock, watch = time.perf_counter(), Watch(run, time_limit)
+    run.until_written.enter_context(search.kept())
+    found = _identified(run, flights, data, held_out, kept, search.run(options, watch, _shown(run)))
+    if isinstance(found, NothingFoundError):
+        search.end(found.stop_reason)
+        raise without_model(found.stop_reason, watch.signal) or _of(flights, found)
+    found = _with_length(found, flights, data)
+    evidence, signal = _evidence(run, found, data, held_out, wrong, watch.signal)
+    model = VehicleModel(vehicle=run.study.vehicle, fuzzy=found.model)
+    parts = zip(flight_roles(flights), data.parts, strict=True)
+    learned = tuple(LearnedFlight.in_file(inputs[role], *samples) for role, samples in parts)
+    hashes = tuple(file.sha256 for role, file in inputs.items() if role.startswith("choose-on"))
+    made = identified_model(found, run.study.identification.base, data.indices, evidence, model, learned, hashes)
+    unjudged = signal is not None and evidence is None and run.study.identification.validation.enabled
     if not unjudged:
-        search.end(result.stop_reason)
-    seconds = round(time.perf_counter() - clock, 3)
-    summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
-    warnings = [Text(sentence, "warning") for sentence in others]
-    outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))), next=(_next(job, record, flights),))
-    remedy = "--resume" if search.checkpoint.path.exists() else "--force"
-    return stopped(outcome, result.stop_reason, signal, job.output, unjudged=remedy if unjudged else None)
+        run.afterwards.append(lambda: search.end(found.stop_reason))
+    run.also = {**made.errors, "seconds": round(time.perf_counter() - clock, 3)}
+    run.next.append(_next(run, made, flights))
+    remedy = None if not unjudged else "--resume" if search.checkpoint.path.exists() else "--force"
+    note, run.exit_code = stop_note(found.stop_reason, signal, run.output, unjudged=remedy)
+    run.said += [note] if note else []
+    return made
 
 
-def _next(job: Job, record: IdentifiedRecord, flights: Sequence[Path]) -> Command:
+def _next(run: Run, made: IdentifiedModel, flights: Sequence[Path]) -> Command:
     """Give the command that hands a good model over, or else shows why it is none."""
-    if record.trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE):
-        return "cpfls", "export", job.output, "-o", job.output.with_suffix(".c")
-    return "cpfls", "report", job.config, *flights, job.output, "-o", job.beside("report.html")
+    if made.trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE):
+        return "cpfls", "export", run.output, "-o", run.output.with_suffix(".c")
+    return "cpfls", "report", run.config, *flights, run.output, "-o", run.beside("report.html")
 
 
 def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
@@ -98,23 +120,23 @@ def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
     return contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, study))
 
 
-def _identify(
-    job: Job,
+def _identified(
+    job: Run,
     flights: Sequence[Path],
     data: TrainingData,
     held_out: dict[str, TorqueSource],
     kept: TorqueSource | None,
-    run: SearchRun,
+    search: SearchRun,
 ) -> Identification | NothingFoundError:
     try:
         with settings_of("identification", job.study):
-            return identify(
+            return identified(
                 data.training,
                 data.learned,
                 held_out,
                 job.study.identification,
                 generator(job.study, "identify"),
-                run,
+                search,
                 six_parameters(job.study.vehicle.inertia_kg_m2),
                 kept,
             )
@@ -140,7 +162,7 @@ def _of(flights: Sequence[Path], error: ComputationError | ConfigError) -> Compu
     return kind(f"{' '.join(str(path) for path in flights)}: {error}")
 
 
-def _shown(job: Job) -> Callable[[SearchStep], None]:
+def _shown(job: Run) -> Callable[[SearchStep], None]:
     """Show the progress of a search on that of its job; a new machine compiles before the first step."""
     job.progress(0.0, 1, "loads compiled loops")
     return lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
@@ -154,7 +176,7 @@ def _note(step: SearchStep) -> str:
 
 
 def _evidence(
-    job: Job,
+    job: Run,
     result: Identification,
     data: TrainingData,
     held_out: Mapping[str, TorqueSource],

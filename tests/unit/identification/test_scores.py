@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.scores import JudgedGroup
+from cpfls_cli.identification.scores import Judged
 
 
 def scores(model, rigid, zero=(1.0, 1.0, 1.0)):
     mse = np.array([[model], [rigid], [zero]])
     names, parts, samples = ("model", "rigid-body", "torque-zero"), ("training",), np.array([10])
-    measures = dict.fromkeys(("mse", "max_error", "relative_error", "r2", "r2_body"), mse)
-    return JudgedGroup(models=names, parts=parts, samples=samples, outside=0 * samples, **measures)
+    measures = dict.fromkeys(("mse", "max_error", "relative_error", "r2", "vaf", "r2_body"), mse)
+    return Judged(models=names, parts=parts, samples=samples, outside=0 * samples, **measures)
 
 
 def test_the_smaller_mean_squared_error_wins_axis_by_axis():
