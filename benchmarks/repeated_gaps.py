@@ -24,7 +24,7 @@ import numpy as np
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -71,7 +71,7 @@ def main(draws: int) -> None:
     print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
 
 
-def split(flown: Sequence[PlaybackFlight]) -> ComesAgain:
+def split(flown: Sequence[PlaybackFlight]) -> Repeatability:
     """Split what a model without drag and damping leaves of flights."""
     recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)

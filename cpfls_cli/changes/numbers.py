@@ -308,7 +308,7 @@ def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_
             names = [f"vibration {sensor} {axis}" for axis in _AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
     if signals.specific_force is not None:
-        yield _averaged([f"felt {axis}" for axis in _AXES], _beside_gravity(signals), flies, lambda means: means)
+        yield _averaged([f"felt {axis}" for axis in _AXES], _less_gravity(signals), flies, lambda means: means)
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
@@ -381,7 +381,7 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
 
 
-def _beside_gravity(signals: Signals) -> Array:
+def _less_gravity(signals: Signals) -> Array:
     """Take gravity from what the accelerometer feels: on average a flight that ends where it began feels nothing else.
 
     With an attitude along axes that are level and turn with the heading, where no wind shows: it leans against it.

@@ -58,7 +58,7 @@ def trend(
     JASA 107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
     Processing 167.
     """
-    names, kept = most_told(flights)
+    names, kept = most_complete(flights)
     without = [flight for flight in flights if not any(flight is each for each in kept)]
     turned = [(flight.name, [name for name in flight.reversed if name in names]) for flight in without]
     if len(kept) < (reference or FEWEST) + 1:
@@ -107,7 +107,7 @@ def trend(
     )
 
 
-def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
+def most_complete(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
     """Choose the numbers and the flights that tell all of them such that they are the most together."""
     told = list(dict.fromkeys(name for flight in flights for name in flight.values))
     if {flight.commanded for flight in flights} == {True, False}:

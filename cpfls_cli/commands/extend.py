@@ -22,7 +22,7 @@ from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
-from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import with_known_wrench, has_effects, on_top_of, require_body, whole_vehicle
 from cpfls_cli.pages.extended import warnings
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
@@ -45,7 +45,7 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
         return nothing_written(job)
     flights = (in_roles(diagnosed.recorded, role) for role in (TRAINING, HELD_OUT))
     training, held = (
-        beside_rotors([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
+        with_known_wrench([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
         for own in flights
     )
     known = learned_in(origin.inputs, diagnosed.learned, MODEL_FLIGHT) if model is None else learned_by(model)

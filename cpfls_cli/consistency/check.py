@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.consistency.motion import beside_lean
+from cpfls_cli.consistency.motion import against_lean
 from cpfls_cli.consistency.rotors import (
     IDLE,
     beyond_propellers,
     lift,
     misplaced,
-    tells_thrust,
-    thrust_beside_weight,
+    thrust_is_known,
+    thrust_against_weight,
     too_fast,
 )
 from cpfls_cli.consistency.sensors import Sensors, sensors_of
@@ -85,21 +85,21 @@ def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Find
 
 def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Finding | None]:
     yield too_fast(parts)
-    weighs = thrust_beside_weight(parts)
+    weighs = thrust_against_weight(parts)
     yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
     if parts[0].attitude is None:
         yield _unlike_gravity(max(_middle(parts), key=len))
     if hangs is None:
-        yield from beside_lean(max(_middle(parts), key=len))
+        yield from against_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
         return
     if not sensors.gyroscope.apart:
         # A gyroscope that the attitude contradicts tells of no rotor.
         yield misplaced(_middle(parts))
     yield from sensors.findings
-    if tells_thrust(parts) and sensors.motion.against_thrust is None:
+    if thrust_is_known(parts) and sensors.motion.against_thrust is None:
         yield lift(sensors.motion.checks, parts[0].vehicle)
 
 

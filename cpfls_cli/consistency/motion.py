@@ -189,7 +189,7 @@ def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = 
     return tuple(check for pair in pairs if (check := _checked(pair, flights, windows)) is not None)
 
 
-def beside_lean(part: Signals) -> Iterator[Finding]:
+def against_lean(part: Signals) -> Iterator[Finding]:
     """Say which of position and velocity no lean makes of gravity in their unit, where the lean explains them."""
     from scipy.spatial.transform import Rotation
 

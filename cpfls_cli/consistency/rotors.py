@@ -143,7 +143,7 @@ def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, d
     return None if unit is None else MeantUnit(unit, read[unit], lifts)
 
 
-def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
+def thrust_against_weight(parts: Sequence[Signals]) -> Finding | None:
     """Say how the thrust lies to the weight where no flight has it so; nothing where a guess states it."""
     vehicle = parts[0].vehicle
     if "thrust_factor" in vehicle.unknown:
@@ -161,9 +161,9 @@ def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
     return Finding(f"the thrust of the rotors is {size:.3g} {words}", _REMEDY, ("rotors", "vehicle"), size)
 
 
-def tells_thrust(parts: Sequence[Signals]) -> bool:
+def thrust_is_known(parts: Sequence[Signals]) -> bool:
     """Tell whether the size of the thrust says anything."""
-    return "thrust_factor" not in parts[0].vehicle.unknown and thrust_beside_weight(parts) is None
+    return "thrust_factor" not in parts[0].vehicle.unknown and thrust_against_weight(parts) is None
 
 
 def weighed(part: Signals) -> Signals:

@@ -16,7 +16,7 @@ from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
 from cpfls_cli.consistency.repairs import ChannelRepair
-from cpfls_cli.consistency.rotors import tells_thrust, weighed
+from cpfls_cli.consistency.rotors import thrust_is_known, weighed
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
@@ -183,7 +183,7 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     if rotors is not None:
         own, flights, doubted = _uncontradicted((rotors,), flights, windows)
         clocks, dropped = (*clocks, *own), (*dropped, *doubted)
-    told = tells_thrust(flights)
+    told = thrust_is_known(flights)
     motion = settled(flights if told else [weighed(signals) for signals in flights], windows)
     mended = [repair.finding for repair in clocks if repair.finding is not None]
     wrong = (*gyroscope.findings(windows), *mended, *dropped, *motion.findings)

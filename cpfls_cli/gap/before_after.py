@@ -14,7 +14,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.results import BODY
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
@@ -253,7 +253,7 @@ class BeforeAfter:
     """Errors of the model as given and of the model with effects on held-out flights.
 
     `stretches`: of the model as given, largest gap first.
-    `again_before`, `again_after`: what of the gap comes again, of training flights too; None where no flight repeats
+    `repeatability_before`, `repeatability_after`: what of the gap comes again, of training flights too; None where no flight repeats
     another.
     """
 
@@ -263,8 +263,8 @@ class BeforeAfter:
     whiteness: WhitenessChange
     picture: WorstWindows
     run: FreeRuns
-    again_before: ComesAgain | None
-    again_after: ComesAgain | None
+    repeatability_before: Repeatability | None
+    repeatability_after: Repeatability | None
 
 
 def before_after(
@@ -309,7 +309,7 @@ def before_after(
 
 def _again(
     training: Sequence[Recording], held: Sequence[Recording], model: ExtendedModel, settings: GapSettings
-) -> tuple[ComesAgain | None, ComesAgain | None]:
+) -> tuple[Repeatability | None, Repeatability | None]:
     """Split the gap of the model as given, of signals as logged, and of the model with effects where paths repeat."""
     recordings = [*training, *held]
     repeated = RepeatedRuns.of(recordings, len(held))

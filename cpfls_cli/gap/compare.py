@@ -14,11 +14,11 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
-from cpfls_cli.gap.naming.leftover import not_excited
+from cpfls_cli.gap.naming.open_questions import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
@@ -75,7 +75,7 @@ class Comparison:
     """The gap between a model and flights."""
 
     sizes: ChannelGaps = part(brief=False)
-    comes_again: ComesAgain | None = part(None)
+    repeatability: Repeatability | None = part(None)
     worst: tuple[GapStretch, ...] = part(brief=False)
     dependence: tuple[Dependence, ...] = part()
     heat_map: HeatMap | None = part(None)
@@ -158,7 +158,7 @@ def compare(
             floors=np.where(known.any(axis=0), rms / floor, np.nan),
             share=rms / _activity(hypothesis, known),
         ),
-        comes_again=None if repeated is None else repeated.split(hypothesis, extended.linear),
+        repeatability=None if repeated is None else repeated.split(hypothesis, extended.linear),
         worst=stretches(residual / floor, centres, index),
         dependence=dependence,
         heat_map=_worst(residual, rms / floor, dependence, states),

@@ -22,7 +22,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, that_stand, untold, untold_axes
+from cpfls_cli.gap.naming.by_instruments import by_instruments, significant_effects, untold, unidentified_axes
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
@@ -34,8 +34,8 @@ from cpfls_cli.gap.naming.causes import (
 )
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
-from cpfls_cli.gap.naming.lateness import told_apart
-from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
+from cpfls_cli.gap.naming.actuation import decided_by_instruments
+from cpfls_cli.gap.naming.open_questions import with_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
     Alternative,
@@ -113,7 +113,7 @@ def diagnose(
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            axes = untold_axes(named.judgement.found, given)
+            axes = unidentified_axes(named.judgement.found, given)
             flights = flights.in_air(gusts, axes)
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
@@ -122,7 +122,7 @@ def diagnose(
     progress(0.75, "rivals")
     # What makes rotors late in gusts instruments have decided.
     tried = [each for each in named.effects if gusts is None or not each.late]
-    wider, unnamed = beside_the_unnamed(found, named.steps[-1], tried, rng)
+    wider, unnamed = with_unnamed(found, named.steps[-1], tried, rng)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
     held_by = tuple(own if each.effect.late and named.sure else with_it for each, own, with_it in pairs)
     estimates = replace(wider, effects=held_by)
@@ -228,7 +228,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given)
-        stand = that_stand(found, given)
+        stand = significant_effects(found, given)
         names = {each.effect.name for each, _ in stand}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
@@ -242,7 +242,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
             refusals.append(Refusal(effect.name, f"judged by what instruments tell, {what} may be 0"))
         fit = fewer
     loose = tuple(effect.name for effect in untold(fit, found))
-    late = told_apart(found, named.effects, given)
+    late = decided_by_instruments(found, named.effects, given)
     judgement, without = judge.judge(late.found), judge.judge(late.without)
     left, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
     if not late.chances or np.nanmax(more**2 - left**2) < VISIBLE**2:

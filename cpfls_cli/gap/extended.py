@@ -23,7 +23,7 @@ from cpfls_cli.gap.balance.weak_flight import (
     WeakFlight,
     nuisance,
 )
-from cpfls_cli.gap.naming.by_instruments import by_instruments, untold_axes
+from cpfls_cli.gap.naming.by_instruments import by_instruments, unidentified_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor
@@ -143,7 +143,7 @@ def extend(
     found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
         given = known_motion(training)
-        untold = untold_axes(found, given)
+        untold = unidentified_axes(found, given)
         flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
     hypothesis, estimates, *_ = found

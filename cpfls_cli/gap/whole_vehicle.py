@@ -137,7 +137,7 @@ def has_effects(model: VehicleModel) -> bool:
     return not model.is_rigid_body and model.fuzzy is None
 
 
-def beside_rotors(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
 
     Raises InputError if a flight lacks a signal that the model needs.

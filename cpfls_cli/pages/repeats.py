@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.residual.repeated import ComesAgain
+from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.pages.gap import channel_words
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over
 from cpfls_cli.report.numbers import plain
@@ -39,10 +39,10 @@ _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
-def again_drawn(groups: Callable[[Any], tuple[ComesAgain | None, ComesAgain | None]]) -> Drawn:
+def again_drawn(groups: Callable[[Any], tuple[Repeatability | None, Repeatability | None]]) -> Drawn:
     """Make the figure of what comes again of a result: of the model as given, and with effects or None."""
 
-    def held(r: Any) -> list[ComesAgain]:
+    def held(r: Any) -> list[Repeatability]:
         return [each for each in groups(r) if each is not None]
 
     def height(r: Any) -> float:
@@ -54,7 +54,7 @@ def again_drawn(groups: Callable[[Any], tuple[ComesAgain | None, ComesAgain | No
     return Drawn("What comes again of torque and force, by channel and band", height, draw, held)
 
 
-def _draw(groups: Sequence[ComesAgain], figure: Figure) -> None:
+def _draw(groups: Sequence[Repeatability], figure: Figure) -> None:
     """Draw by channel and band what comes again, explained and not, and what does not."""
     before = groups[0]
     channels, bands = before.known, np.arange(1, len(before.low))[::-1]
@@ -71,7 +71,7 @@ def _draw(groups: Sequence[ComesAgain], figure: Figure) -> None:
     legend_over(figure, panels.flat[0])
 
 
-def _draw_channel(axes: Axes, groups: Sequence[ComesAgain], channel: int, bands: Any) -> None:
+def _draw_channel(axes: Axes, groups: Sequence[Repeatability], channel: int, bands: Any) -> None:
     width = 0.8 / len(groups)
     for place, again in enumerate(groups):
         x = np.arange(len(bands)) - 0.4 + width * (place + 0.5)
@@ -85,7 +85,7 @@ def _draw_channel(axes: Axes, groups: Sequence[ComesAgain], channel: int, bands:
     axes.set_axisbelow(True)
 
 
-def _heights(again: ComesAgain, channel: int) -> Any:
+def _heights(again: Repeatability, channel: int) -> Any:
     """Give the parts of a bar in per cent, shape (part, band)."""
     left = np.clip(again.again[channel], 0.0, again.total[channel])
     noise = np.clip(np.nan_to_num(again.noise[channel]), 0.0, again.total[channel] - left)

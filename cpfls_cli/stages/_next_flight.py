@@ -29,7 +29,7 @@ from cpfls_cli.gap.next_flight.logged import (
     needed_signals,
     planned_signals,
 )
-from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, questions_left, require_tellable
+from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, open_questions, require_visible
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
@@ -105,7 +105,7 @@ def _effects(study: Study) -> list[Effect]:
     key = "trajectory.next_flight.to_tell"
     with about(key, InputError):
         effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.to_tell)]
-    require_tellable(effects, key, study.vehicle)
+    require_visible(effects, key, study.vehicle)
     return effects
 
 
@@ -151,7 +151,7 @@ def _left_open(study: Study, path: Path) -> Case:
     floor = best_floor(explained)
     rivals, unseen = _open_effects(study, found, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
-    weighed = questions_left(named, rivals, unseen, flights, floor, study.gap)
+    weighed = open_questions(named, rivals, unseen, flights, floor, study.gap)
     questions = weighed or _between(study)
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
@@ -175,7 +175,7 @@ def _open_effects(
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
-        require_tellable([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
+        require_visible([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
     hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in told]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]

@@ -169,7 +169,7 @@ def _signal_words(signal: str) -> str:
 
 
 FIGURES = {
-    "comes-again": again_drawn(lambda r: (r.comes_again, None)),
+    "comes-again": again_drawn(lambda r: (r.repeatability, None)),
     "gap-over-time": Drawn(
         "Gap of each channel over time in noise floors",
         lambda r: 0.7 + 1.1 * len(r.sizes.known),

@@ -181,7 +181,7 @@ def _finite(value: Any) -> bool:
 
 
 FIGURES = {
-    "comes-again": again_drawn(lambda r: (r.again_before, r.again_after)),
+    "comes-again": again_drawn(lambda r: (r.repeatability_before, r.repeatability_after)),
     "free-runs": Drawn(
         "Body rates about three axes, measured and simulated before and after, over time",
         6.4,

@@ -18,7 +18,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
+from cpfls_cli.gap.whole_vehicle import with_known_wrench, has_effects, of_vehicle
 from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
@@ -123,7 +123,7 @@ def _flights(
     """Read all flights together, so that one battery is full in all of them, and split them."""
     read = read_flights([*flights, *held_out], run.study)
     flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
-    balanced = beside_rotors(read.recordings, base)
+    balanced = with_known_wrench(read.recordings, base)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
     refuse_seen(files[: len(split.training)], files[len(split.training) :])

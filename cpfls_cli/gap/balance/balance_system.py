@@ -193,7 +193,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     """
     square, count = np.zeros(6), np.zeros(6)
     for number, flight in enumerate(hypothesis.flights):
-        floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows, flight.cut_off)
+        floor = noise_floor(residual_along(hypothesis, number, coefficients), flight.windows, flight.cut_off)
         floor = np.maximum(floor, flight.air)
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
@@ -204,7 +204,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * moves), 1.0)
 
 
-def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
+def residual_along(hypothesis: System, number: int, coefficients: Array) -> Columns:
     """Compute the residual of a fitted hypothesis along one flight, sample by sample.
 
     `number`: of the flight; `coefficients`: shape (column,); Result: shape (time, 6).

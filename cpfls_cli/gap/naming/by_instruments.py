@@ -20,13 +20,13 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.residual.air import foretold_rows
+from cpfls_cli.gap.residual.air import predicted_rows
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.newness import PER_WINDOW, news
 
 
-class _Told(NamedTuple):
+class _Source(NamedTuple):
     """What a source of knowledge tells of numbers.
 
     `products`, shape (block, number + 1, number + 1): of what is known of each number, and of what is left, with what
@@ -63,10 +63,10 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
-    return at._replace(estimates=_with_untold(found, at.estimates, moved))
+    return at._replace(estimates=_with_unidentified(found, at.estimates, moved))
 
 
-def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
+def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
     values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
@@ -92,7 +92,7 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
-def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
+def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), of whose inertia instruments tell nothing: a fit shows that of the loop."""
     told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
     for _, numbers in _sources(found, given):
@@ -100,7 +100,7 @@ def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
     return ~told
 
 
-def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
+def significant_effects(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
     """Keep the effects that are not 0 by what instruments tell, and what an effect holds where all else of it may be 0.
 
     Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
@@ -126,7 +126,7 @@ def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, flo
     return stand
 
 
-def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values: Array) -> float:
+def _chance_of(sources: Sequence[_Source], own: IntArray, shapes: IntArray, values: Array) -> float:
     """Compute the probability of what all sources show of numbers that they know if these are 0, shapes as they are.
 
     A source is asked of a number that another one tells as well. NaN where none knows any of them.
@@ -164,7 +164,7 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
+def predictable_residual(found: NamedFit, given: Instruments) -> Array:
     """Multiply what is left with what was known of it before, by block: 0 but for chance where nothing is missing."""
     _, runs = _known_windows(found, given)
     products = np.concatenate([rows[..., -1] * known[..., -1] for rows, known, _ in runs])
@@ -172,13 +172,13 @@ def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
     return np.array([products[block == number].sum() for number in np.unique(block)])
 
 
-def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
+def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
     """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
 
     Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
     turn at once, which instruments hardly tell. A linear answer to setpoints tells lateness by far worse.
     """
-    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Told]()
+    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Source]()
     weight = np.tile(found.floor, (len(hypothesis.residual), 1))
     free = ~fit_within_bounds(hypothesis, weight, of_vehicle=True)[1] & hypothesis.base.any(axis=(0, 1))
     vehicle, of_vehicle = hypothesis.places[0]
@@ -198,7 +198,7 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
             # What a bound tells better than these flights is not told by them.
             numbers = left & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
             numbers = _strong(flown, numbers)
-            sources.append(_Told(products, numbers))
+            sources.append(_Source(products, numbers))
             left = left & ~numbers
     return sources
 
@@ -235,20 +235,20 @@ def _strength(products: Array) -> Array:
     return np.asarray(np.square(np.maximum(products.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
 
 
-def _with_untold(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
+def _with_unidentified(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
     """Keep the intervals of effects and numbers of the vehicle that instruments do not tell."""
     (vehicle, of_vehicle), *_ = before.hypothesis.places
-    parameters = _told_numbers(vehicle.effect, moved[of_vehicle], before.estimates.parameters, after.parameters)
+    parameters = _identified_numbers(vehicle.effect, moved[of_vehicle], before.estimates.parameters, after.parameters)
     effects, places = [], places_of(before.hypothesis)
     pairs = zip(before.hypothesis.chosen, places, before.estimates.effects, after.effects, strict=True)
     for (effect, _), (linear, shapes), was, now in pairs:
         own = np.concatenate([moved[linear], moved[shapes]])
-        of_columns = now if effect.physical else _told_numbers(effect, own, was, now)
+        of_columns = now if effect.physical else _identified_numbers(effect, own, was, now)
         effects.append(of_columns if own.any() else was)
     return replace(after, effects=tuple(effects), parameters=parameters)
 
 
-def _told_numbers(
+def _identified_numbers(
     effect: Effect, told: BoolArray, was: Sequence[Estimate], now: Sequence[Estimate]
 ) -> tuple[Estimate, ...]:
     """Take the numbers of an effect that are told, and leave the others as they were."""
@@ -286,12 +286,12 @@ def _known_windows(found: NamedFit, given: Instruments) -> tuple[list[_Windows],
         # Runs of one path know of each other, but not of what was before.
         of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
-    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
+    known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
     new, foretold, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
-    return _told_of(own, known, of_path), _told_of(new, foretold, of_run)
+    return _known_windows_of(own, known, of_path), _known_windows_of(new, foretold, of_run)
 
 
-def _told_of(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
+def _known_windows_of(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
     """Take windows of which something is known, and their blocks; of a shorter list of windows these are the last."""
     windows = []
     for mine, theirs, block in zip(rows, known, blocks, strict=True):

@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.odds import likely, odds
 from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
@@ -49,7 +49,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
     for index, share in enumerate(shares(found).tolist()):
         candidate, numbers = chosen[index], estimates.effects[index]
         others = [*chosen[:index], *chosen[index + 1 :]]
-        chance = chance_beside_its_like(hypothesis, index, effects, settings)
+        chance = chance_given_actuation(hypothesis, index, effects, settings)
         step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
         own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(

@@ -24,7 +24,7 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
-from cpfls_cli.gap.naming.leftover import leftover
+from cpfls_cli.gap.naming.open_questions import leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
 from cpfls_cli.gap.naming.results import GapSize, Unexplained
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE

@@ -24,7 +24,7 @@ def free_numbers(chosen: Sequence[Candidate]) -> int:
     return sum(len(each.effect.shapes) + len(each.effect.coefficients) for each in chosen)
 
 
-def more_left(one: Array, other: Array) -> Array:
+def more_residual(one: Array, other: Array) -> Array:
     """Compute by how much more one explanation leaves of each block than another; 0 where that is rounding."""
     return np.where(tied(one, other), 0.0, one - other)
 
@@ -74,7 +74,7 @@ def log_odds(more: Array, off: float) -> Array:
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     """Compute the `log_odds` of another set, shape (block,), where no set at all leaves `above_floor`."""
     off = off_by(above_floor, 0.0, above_floor - own.gain)
-    return log_odds(more_left(other.block_error, own.block_error), off)
+    return log_odds(more_residual(other.block_error, own.block_error), off)
 
 
 @cache

@@ -62,7 +62,7 @@ class RankedStep:
     above_floor: float
     block: IntArray
 
-    def worth_a_name(self, explained: float = 0.0) -> float:
+    def least_gain(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
         gap = max(self.above_floor - explained, 0.0)
         return max(COUNTS * gap, VISIBLE**2 * len(self.hypothesis.residual))

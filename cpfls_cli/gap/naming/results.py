@@ -307,7 +307,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
     large = (after > ERRORS * CLEAR) & (after > OFF * before)
-    return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
+    return filled or bool((clear & (_is_unexplained(after, before, named_share) | large)).any())
 
 
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
@@ -320,9 +320,9 @@ def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     largest = float(np.nanmax(before[kind], initial=1.0))
     second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest**2
-    return second or bool(_is_left(np.array(unexplained.floors), np.array(largest), named_share))
+    return second or bool(_is_unexplained(np.array(unexplained.floors), np.array(largest), named_share))
 
 
-def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
+def _is_unexplained(after: Array, before: Array, named_share: float) -> BoolArray:
     """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
     return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))

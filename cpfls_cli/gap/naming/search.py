@@ -12,7 +12,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_left, names_of, simplest, unbeaten
+from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_residual, names_of, simplest, unbeaten
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, best_floor, block_index, rank_effects, scoring_matrix
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.settings import GapSettings
@@ -53,7 +53,7 @@ def forward_selection(
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
         # A set that was there before would come round again for ever.
-        if of_motion(best.gain, step, refitted) < step.worth_a_name() or names_of(refitted.chosen) in tried:
+        if of_motion(best.gain, step, refitted) < step.least_gain() or names_of(refitted.chosen) in tried:
             return chosen, steps
         tried.add(names_of(refitted.chosen))
         step.hypothesis.cache.clear()
@@ -63,7 +63,7 @@ def forward_selection(
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:
     """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
     best = max((scored.gain for scored in step.ranking), default=-np.inf)
-    return best >= step.worth_a_name() and step.p_value(best) <= settings.significance
+    return best >= step.least_gain() and step.p_value(best) <= settings.significance
 
 
 def _grown(step: RankedStep) -> list[Scored]:
@@ -91,7 +91,7 @@ def grown_elsewhere(
         return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
     two = _late(chosen[-1:]) and not _late(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
-    if not (two or step.above_floor > step.worth_a_name()):
+    if not (two or step.above_floor > step.least_gain()):
         return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
@@ -140,7 +140,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
     if len(candidate.effect.shapes) > 1 and not _late(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
-    numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.worth_a_name(own.gain)
+    numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
     moved = [_moved(each, step) for each in tried if worth or free_numbers(each) <= numbers]
     fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _late([scored.candidate]))]
@@ -151,7 +151,7 @@ def _late(chosen: Sequence[Candidate]) -> bool:
     return any(each.effect.actuation is not None for each in chosen)
 
 
-def chance_beside_its_like(
+def chance_given_actuation(
     together: System, index: int, effects: Sequence[Effect], settings: GapSettings
 ) -> float | None:
     """Compute how likely it is that an effect between command and rotors adds nothing to its like; None without any.
@@ -165,7 +165,7 @@ def chance_beside_its_like(
         return None
     floor, block = best_floor(together), block_index(together, settings)
     without = refined(together.flights, others, floor)
-    margin = more_left(_unseen(without, floor, block), _unseen(together, floor, block))
+    margin = more_residual(_unseen(without, floor, block), _unseen(together, floor, block))
     tried = sum(effect.actuation is not None for effect in effects)
     return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
 

@@ -14,7 +14,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit, least_squares, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.leftover import usual_size
+from cpfls_cli.gap.naming.open_questions import usual_size
 from cpfls_cli.gap.naming.ranking import candidates_of, known_before
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
@@ -23,7 +23,7 @@ from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
-def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
+def require_visible(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
     """Refuse effects that no torque and no force shows.
 
     `source`: file or key that named them, for the message. Raises InputError: it names the effect and what shows it.
@@ -73,7 +73,7 @@ def usual(effect: Effect, vehicle: VehicleSettings) -> SizedEffect:
     return SizedEffect(candidate, usual_size(effect, vehicle, width))
 
 
-def questions_left(
+def open_questions(
     named: Sequence[NamedEffect],
     rivals: Sequence[Alternative],
     unseen: Sequence[Effect],
@@ -98,7 +98,7 @@ def questions_left(
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
         beside += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
-    questions += [each for each in beside if not _is_told(each, flights, floor, settings)]
+    questions += [each for each in beside if not _is_answered(each, flights, floor, settings)]
     once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
     asked = tuple(question for question in once.values() if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
@@ -111,7 +111,7 @@ def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> 
     return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
 
 
-def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
+def _is_answered(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
     """Tell whether the flights that are there answer a question."""
     if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
         return False

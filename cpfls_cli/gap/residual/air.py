@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.balance.balance_system import System, floors, left_over, system
+from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
@@ -175,7 +175,7 @@ class _Left:
     @cached_property
     def sides(self) -> list[Array]:
         """What both sides of the balance differ by, of each run, shape (time, 2, 6)."""
-        left = [left_over(self.hypothesis, number, self.linear) for number in range(len(self.hypothesis.flights))]
+        left = [residual_along(self.hypothesis, number, self.linear) for number in range(len(self.hypothesis.flights))]
         sides = []
         for run in self.given.runs:
             momentum, direct = left[run.flight].momentum, left[run.flight].direct
@@ -226,7 +226,7 @@ class _Left:
         states = [without_actuation(state_signals(*pair)) for pair in signals]
         names = [name for name in states[0] if all(name in state for state in states)]
         flown = [np.stack([state[name] for name in names], axis=1) for state in states]
-        asked = np.concatenate(foretold_rows(given, flights[0].windows, flown))
+        asked = np.concatenate(predicted_rows(given, flights[0].windows, flown))
         time = np.concatenate([each["time"] for each in states])
         state = dict(zip(names, asked.T, strict=True)) | {"time": time}
         index = self.hypothesis.flight_index
@@ -265,7 +265,7 @@ def in_air(flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:
     return [replace(flight, air=floor * flight.known) for flight in flights]
 
 
-def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
+def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
     """Predict rows of windows over runs, shape (window, ...), from what was asked for; NaN for runs without setpoints.
 
     `rows`, each shape (window, ...): of each run.

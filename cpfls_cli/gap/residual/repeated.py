@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.balance.balance_system import System, left_over
+from cpfls_cli.gap.balance.balance_system import System, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
@@ -53,7 +53,7 @@ class Part(NamedTuple):
 
 
 @result
-class ComesAgain:
+class Repeatability:
     """What of a gap comes again in other runs of the same path, by channel and band, and what does not.
 
     With the gap r of a run and r' of another at the same place of the path, mean squares are over windows and pairs;
@@ -180,12 +180,12 @@ class ComesAgain:
         explained = self.explained[channel, part.bands]
         return (float(explained.min()), float(explained.max())) if (explained > COUNTS).all() else None
 
-    def kept_of(self, before: ComesAgain, channel: int, part: Part) -> float:
+    def kept_of(self, before: Repeatability, channel: int, part: Part) -> float:
         """Compute the share that is left of what came again in a part before effects."""
         left, came = (np.nansum(each.again[channel, part.bands]) for each in (self, before))
         return float(np.clip(left / came, 0.0, 1.0))
 
-    def left_of(self, before: ComesAgain) -> dict[int, float]:
+    def left_of(self, before: Repeatability) -> dict[int, float]:
         """Give by channel the largest share that is left of what came again before; infinite where none came."""
         shares = {}
         for channel in self.repeating:
@@ -233,7 +233,7 @@ class ComesAgain:
             "gap": np.sqrt(self.total),
             "share": self.share,
             "share_half_width": self.share_half,
-            "comes_again": self.sure,
+            "repeatability": self.sure,
             "noise": np.sqrt(self.noise),
             "explained": self.explained,
         }
@@ -281,7 +281,7 @@ class RepeatedRuns:
             return None
         return cls(tuple(each.name for each in recordings), given, tuple(judged or pairs), bands)
 
-    def split(self, hypothesis: System, linear: Array) -> ComesAgain | None:
+    def split(self, hypothesis: System, linear: Array) -> Repeatability | None:
         """Split what a model leaves of the balance into what comes again and what does not.
 
         `hypothesis`: of the flights that the runs are of.
@@ -290,7 +290,7 @@ class RepeatedRuns:
         Reference: Pintelon and Schoukens 2012 (repeated excitation); Efron and Tibshirani 1993, chapter 11 (jackknife).
         """
         flights = hypothesis.flights
-        sides = [_sides(left_over(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
+        sides = [_sides(residual_along(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
         found = [self._of_band(band.windows, sides) for band in self.bands]
         blocks = np.array([len(of_band) for of_band in found])
         if blocks[0] < FEWEST_BLOCKS:
@@ -299,7 +299,7 @@ class RepeatedRuns:
         values, errors = np.where(known, np.stack([_with_errors(of_band) for of_band in found], axis=-1), np.nan)
         total, again, taken, *_ = values
         body = flights[0].signals.vehicle
-        return ComesAgain(
+        return Repeatability(
             low=np.array([band.low for band in self.bands]),
             high=np.array([band.high for band in self.bands]),
             noise=np.where(known, self._noise(flights, sides), np.nan),
@@ -359,7 +359,7 @@ def _with_errors(sums: Array) -> Array:
 
 
 def _shares(sums: Array) -> Array:
-    """Compute the means of `ComesAgain` and the shares that follow from sums, shapes (..., 4, 6) to (..., 5, 6)."""
+    """Compute the means of `Repeatability` and the shares that follow from sums, shapes (..., 4, 6) to (..., 5, 6)."""
     own, crossed, taken, count = np.moveaxis(sums, -2, 0)
     total, again, moved = (_ratio(each, count) for each in (own, crossed, taken))
     return np.stack([total, again, moved, _ratio(crossed, own), 1 - _ratio(crossed, taken)], axis=-2)

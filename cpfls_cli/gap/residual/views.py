@@ -18,7 +18,7 @@ from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
-_OUTSTANDING_SHARE = 0.1
+_WORST_SHARE = 0.1
 """Of the time is called worst."""
 
 _LONGEST_PAUSE_S = 1.0
@@ -68,7 +68,7 @@ def _of_channel(
         np.sqrt(np.maximum(uniform_filter1d(residual[rows] ** 2, max(1, pause), mode="nearest"), 0.0))
         for rows, pause in zip(flights, pauses, strict=True)
     ]
-    least = max(level, float(np.quantile(np.concatenate(size), 1 - _OUTSTANDING_SHARE)))
+    least = max(level, float(np.quantile(np.concatenate(size), 1 - _WORST_SHARE)))
     for rows, local, hop, pause in zip(flights, size, hops, pauses, strict=True):
         for run in _runs(local >= least, pause):
             inside = rows[run]

@@ -72,14 +72,14 @@ def test_what_comes_again_stands_behind_the_verdict(found):
 
 
 def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_one(found):
-    compared, before = found.summary["disagreement"]["comes_again"], found.summary["comes_again"]["before"]
+    compared, before = found.summary["disagreement"]["repeatability"], found.summary["repeatability"]["before"]
     assert (compared["runs"], compared["paths"], before["runs"]) == (3, 1, 3)
     for told in (compared, before):
         assert told["channels"]["force x"]["share"][0] > 0.7
-        assert all(told["channels"]["force x"]["comes_again"][:5])
-        assert not any(told["channels"]["torque x"]["comes_again"])
+        assert all(told["channels"]["force x"]["repeatability"][:5])
+        assert not any(told["channels"]["torque x"]["repeatability"])
     diagnosed, _ = read(found.folder / "diagnosis.h5", Diagnosis)
-    assert diagnosed.again_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
+    assert diagnosed.repeatability_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
 
 
 def test_the_report_shows_it_in_a_picture(found):

@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, forward_selection, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, forward_selection, in_place_of
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
@@ -204,7 +204,7 @@ def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
 
 def chances(flights, chosen):
     effects, together = [CATALOGUE[each] for each in STILL], system(flights, chosen)
-    return [chance_beside_its_like(together, index, effects, SETTINGS) for index in range(len(chosen))]
+    return [chance_given_actuation(together, index, effects, SETTINGS) for index in range(len(chosen))]
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ def test_what_stands_above_the_gusts_is_none_of_them(flown, monkeypatch, offset_
     moved = tuple(replace(each, position_m=(each.position_m[0] + offset_m, *each.position_m[1:])) for each in rotors)
     recordings = recorded(flown["asked"], replace(TRUE.vehicle, rotors=moved), setpoints=True)
     # As if instruments told nothing.
-    monkeypatch.setattr("cpfls_cli.gap.diagnose.that_stand", lambda *_: [])
+    monkeypatch.setattr("cpfls_cli.gap.diagnose.significant_effects", lambda *_: [])
     names = [effect.name for effect in diagnosed(recordings).diagnosis.effects]
     assert names == (["com_offset"] if stands else [])
 

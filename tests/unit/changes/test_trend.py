@@ -9,7 +9,7 @@ from scipy.special import stdtrit
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
 from cpfls_cli.changes.reference import EACH_TEST, Reference, furthest, number_limits
-from cpfls_cli.changes.trend import most_told, trend
+from cpfls_cli.changes.trend import most_complete, trend
 from cpfls_cli.errors import InputError
 from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights, having
 
@@ -103,12 +103,12 @@ def test_a_battery_that_is_used_up_is_no_change():
 def test_numbers_and_flights_that_are_the_most_together():
     given = flights(6, np.random.default_rng(7))
     few = {name: value for name, value in given[0].values.items() if name.startswith("load")}
-    names, kept = most_told([having(given[0], few), *given[1:]])
+    names, kept = most_complete([having(given[0], few), *given[1:]])
     assert (names, len(kept)) == (NAMES, 5)
     speeds = [replace(flight, commanded=False) for flight in given[:2]]
-    assert not [name for name in most_told([*speeds, *given[2:]])[0] if name.startswith("load")]
+    assert not [name for name in most_complete([*speeds, *given[2:]])[0] if name.startswith("load")]
     with pytest.raises(InputError, match="no number in common"):
-        most_told([having(given[0], {})])
+        most_complete([having(given[0], {})])
 
 
 def test_too_few_flights_are_refused():

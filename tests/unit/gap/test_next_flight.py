@@ -14,8 +14,8 @@ from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_sign
 from cpfls_cli.gap.next_flight.rivals import (
     physical_values,
     questions_between,
-    questions_left,
-    require_tellable,
+    open_questions,
+    require_visible,
     usual,
 )
 from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
@@ -287,14 +287,14 @@ def test_a_special_case_is_not_told_from_what_holds_it():
 @pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
 def test_what_no_flight_tells_is_refused(names):
     with pytest.raises(InputError, match=names[0]):
-        require_tellable([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
+        require_visible([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
 
 
 def test_an_effect_of_the_propellers_asks_for_their_size():
     bare = replace(VEHICLE, rotors=tuple(replace(rotor, radius_m=None) for rotor in VEHICLE.rotors))
-    require_tellable([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
+    require_visible([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
     with pytest.raises(InputError, match=r"ground_effect needs vehicle\.rotors\.radius_m"):
-        require_tellable([CATALOGUE["ground_effect"]], "--to-tell", bare)
+        require_visible([CATALOGUE["ground_effect"]], "--to-tell", bare)
 
 
 def test_the_plan_counts_on_nothing_that_is_not_logged():
@@ -311,7 +311,7 @@ def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
     effect = named_effect("linear_damping", linear=size)
     rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
-    first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR, GapSettings())
+    first, second, *_ = open_questions([effect], rivals, [], [silent], FLOOR, GapSettings())
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
     known = goal([first, second], [silent], room(), LOGGING)
     assert min(answer.evidence.left.sum() for answer in known.answers(along(path_of(0, 1.0, 3)))) > 0
@@ -323,7 +323,7 @@ def test_a_rival_takes_the_size_that_imitates_the_named_effect():
     flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
     effect = named_effect("com_offset", linear=size)
     rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
-    first, second, *others = questions_left([effect], rivals, [], flights, FLOOR, GapSettings())
+    first, second, *others = open_questions([effect], rivals, [], flights, FLOOR, GapSettings())
     # What else looks like either by the catalogue must not take the place of the rival.
     asked = [(each.true.candidate.effect.name, each.rival.name) for each in others]
     assert ("com_offset", "rotor_mismatch") in asked

@@ -13,9 +13,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
+from cpfls_cli.gap.naming.by_instruments import by_instruments, predictable_residual, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
-from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
+from cpfls_cli.gap.naming.odds import chance_of_ranks, more_residual
 from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.naming.search import alternative
@@ -25,7 +25,7 @@ from cpfls_cli.playback.instruments import Instruments
 _Names = tuple[str, ...]
 
 
-class Lateness(NamedTuple):
+class ActuationFit(NamedTuple):
     """What lies between command and rotors: fits with the set that leaves least, and with none.
 
     `chances`: how likely chance makes each effect of the set; `alike`: sets that leave as little.
@@ -37,7 +37,7 @@ class Lateness(NamedTuple):
     alike: tuple[Alternative, ...]
 
 
-def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -> Lateness:
+def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: Instruments) -> ActuationFit:
     """Decide by instruments what lies between command and rotors.
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
@@ -51,7 +51,7 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
     shifted = {each.effect.name for each in found.hypothesis.chosen}
     tried = {each.name: each for each in late if each.actuation or each.name in shifted}
     if not tried:
-        return Lateness(found, found, {}, ())
+        return ActuationFit(found, found, {}, ())
     sets = _Sets(found, tried, given)
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.late)
@@ -68,9 +68,9 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
             *beside, last = new if gone else names
             alike.append(alternative(tried[(gone or best)[0]], tried[last], 1.0, *beside))
     # Of one number its own size tells, of several that so much less is left.
-    less = chance_of_ranks(more_left(sets.left[()], sets.left[best]))
+    less = chance_of_ranks(more_residual(sets.left[()], sets.left[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
-    return Lateness(sets.fits[best], sets.fits[()], chances, tuple(alike))
+    return ActuationFit(sets.fits[best], sets.fits[()], chances, tuple(alike))
 
 
 @dataclass
@@ -116,7 +116,7 @@ class _Sets:
         """Fit sets; of those whose numbers instruments tell the names come back."""
         for names in tried:
             if (fit := self._fit(names)) is not None:
-                self.fits[names], self.left[names] = fit, foretold_of_left(fit, self.given)
+                self.fits[names], self.left[names] = fit, predictable_residual(fit, self.given)
         return [names for names in tried if names in self.fits]
 
     def _fit(self, names: _Names) -> NamedFit | None:
@@ -147,7 +147,7 @@ class _Sets:
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Tell whether one leaves surely more than another; the right one leaves nothing, and less than that chance."""
         left = (self.left[names] * (self.left[names].sum() > 0) for names in (one, other))
-        return self._more(more_left(*left), self.found.settings.significance)
+        return self._more(more_residual(*left), self.found.settings.significance)
 
     def _more(self, left: Array, rate: float) -> bool:
         """Tell whether what is left is more than nothing, and more than formulas are off by."""

@@ -12,7 +12,7 @@ from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, mean_error
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
+from cpfls_cli.gap.balance.balance_system import System, residual_along, system, window_noise
 from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
@@ -62,7 +62,7 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     hypothesis, settings = found.hypothesis, found.settings
     windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, found.estimates.linear)))
+        rows.append(replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear)))
         rates.append(windows.average(flight.signals.body_rate))
     band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
     return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
@@ -84,7 +84,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
-def beside_the_unnamed(
+def with_unnamed(
     found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.

@@ -12,7 +12,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.diagnose import _Named
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
+from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Source, significant_effects
 from cpfls_cli.gap.naming.causes import JudgedEffect
 from cpfls_cli.gap.naming.estimate import NamedFit
 from cpfls_cli.gap.residual.air import _growing, _gusty
@@ -73,7 +73,7 @@ def told(true, found, reach, rng):
     left = gust[..., 0] + moved @ (np.array(true) - found)
     rows = np.concatenate([moved, left[..., None]], axis=2)
     known = np.concatenate([known, np.zeros_like(gust)], axis=2)
-    return _Told(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
+    return _Source(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
         rng = np.random.default_rng(seed)
         sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
-        stand.append([each.effect.name for each, _ in that_stand(fit, None)])
+        stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
     assert stand.count(names) >= 17
 
 
