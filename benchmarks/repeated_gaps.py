@@ -51,7 +51,7 @@ def main(draws: int) -> None:
     gusty, calm, alone = ([one[name] for one in found] for name in SETS)
     shares, inside, passed = [], [], []
     for there, truth in zip(gusty, calm, strict=True):
-        expected = truth.again / (truth.again + there.total - there.again)
+        expected = truth.repeatable / (truth.repeatable + there.total - there.repeatable)
         inside.append(np.abs(there.share - expected) < there.share_half)
         off = np.abs(there.explained - truth.explained) < half_width(there.explained_error, there.blocks)
         passed.append(off[MODELLED])
@@ -68,7 +68,9 @@ def main(draws: int) -> None:
     print(f"\nshares within their intervals: {np.mean(inside):.3f} of {np.size(inside)}")
     print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
     print(f"gusts alone: {sum(one.sure.sum() for one in alone)} of {sum(one.sure.size for one in alone)} come again")
-    print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
+    print(
+        "the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.non_repeatable[c] for one in alone])) for c in range(6))
+    )
 
 
 def split(flown: Sequence[PlaybackFlight]) -> Repeatability:

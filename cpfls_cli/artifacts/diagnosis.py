@@ -88,7 +88,7 @@ class Diagnosis(Conclusion):
             **vars(diagnosed.diagnosis),
             repeatability_before=change.repeatability_before,
             repeatability_after=change.repeatability_after,
-            air=None if air is None else DisturbanceGroup.of(air.found, air.told),
+            air=None if air is None else DisturbanceGroup.of(air.found, air.gusts_only),
             playback=change.playback,
             worst=change.stretches,
             residual=change.residual,
@@ -149,7 +149,7 @@ class Diagnosis(Conclusion):
 
     @property
     def repeatability(self) -> dict[str, Repeatability] | None:
-        """What of the gap comes again, before and after; None where no flight repeats another."""
+        """The repeatable part of the gap, before and after; None where no flight repeats another."""
         if self.repeatability_before is None or self.repeatability_after is None:
             return None
         return {"before": self.repeatability_before, "after": self.repeatability_after}
@@ -173,12 +173,12 @@ class Diagnosis(Conclusion):
 
     @property
     def gusts(self) -> tuple[GustAxis, ...]:
-        """Gusts that are all that is left of the flights, by axis; none where nothing tells."""
+        """Gusts that are all of the residual, by axis; none where they are not identified."""
         return self._gusts(alone=True)
 
     @property
-    def gusts_beside(self) -> tuple[GustAxis, ...]:
-        """Gusts beside which something else is left, by axis; none where nothing tells."""
+    def partial_gusts(self) -> tuple[GustAxis, ...]:
+        """Gusts that are a part of the residual, by axis; none where they are not identified."""
         return self._gusts(alone=False)
 
     def _gusts(self, *, alone: bool) -> tuple[GustAxis, ...]:
@@ -189,7 +189,7 @@ class Diagnosis(Conclusion):
 
     @property
     def only_gusts(self) -> bool:
-        """Whether a gap is left of which it is known that it does not come again."""
+        """Whether a gap remains that is known not to be repeatable."""
         left = (self.gap.after_floors > CLEAR).any() and not self.contradictions
         return bool(left) and self.repeatability_after is not None and self.repeatability_after.nothing
 

@@ -22,7 +22,7 @@ from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
-from cpfls_cli.gap.whole_vehicle import with_known_wrench, has_effects, on_top_of, require_body, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import has_effects, on_top_of, require_body, whole_vehicle, with_known_wrench
 from cpfls_cli.pages.extended import warnings
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of

@@ -11,8 +11,8 @@ from cpfls_cli.consistency.rotors import (
     beyond_propellers,
     lift,
     misplaced,
-    thrust_is_known,
     thrust_against_weight,
+    thrust_is_known,
     too_fast,
 )
 from cpfls_cli.consistency.sensors import Sensors, sensors_of

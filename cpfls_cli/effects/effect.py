@@ -197,7 +197,7 @@ class Effect:
         return not self.coefficients
 
     @property
-    def late(self) -> bool:
+    def is_lag(self) -> bool:
         """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
         if self.actuation is None:
             return self.kind == "actuator" and self.log is not None

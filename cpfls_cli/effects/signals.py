@@ -44,14 +44,14 @@ class Signals:
     the acceleration too.
     `rotor_speed`, shape (time, rotor), rad/s: measured, or commanded where `commanded`.
     `commanded`: whether actuation is what was asked for, not what was measured.
-    `rotor_command`, shape (time, rotor), rad/s: what was asked for beside speeds that were measured.
+    `rotor_command`, shape (time, rotor), rad/s: what was asked for, where speeds were measured too.
     `stated_torque`, shape (time, 3), N m, body frame: torque of a log that has no rotor speeds.
     `stated_thrust`, shape (time,), N: thrust of such a log.
     `voltage`, shape (time,): as a fraction of the full battery.
     `ground_height_m`: height of the ground in the world frame.
     `wind`, shape (3,), m/s, world frame: None for still air.
-    `beside`, shape (time, 6), N m and N, body frame: torque and force of a known model beyond the squares of its rotor
-    speeds.
+    `known_wrench`, shape (time, 6), N m and N, body frame: torque and force of a known model beyond
+    the squares of its rotor speeds.
     `setpoints`, each shape (time, column): what was asked of the autopilot and of its loops, where it is known at all
     samples: ``position`` and ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad;
     ``body_rate``, rad/s, body frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks``
@@ -74,7 +74,7 @@ class Signals:
     voltage: Array | None = None
     ground_height_m: float = 0.0
     wind: Array | None = None
-    beside: Array | None = None
+    known_wrench: Array | None = None
     setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -145,8 +145,8 @@ class Signals:
 
     @cached_property
     def wrench(self) -> Array:
-        """Torque and force of the rotors, and of what is known beside them, shape (time, 6); unknown parts are 0."""
-        wrench = np.zeros((len(self), 6)) if self.beside is None else self.beside.copy()
+        """Torque and force of the rotors, and of a known model, shape (time, 6); unknown parts are 0."""
+        wrench = np.zeros((len(self), 6)) if self.known_wrench is None else self.known_wrench.copy()
         if self.torque is not None:
             wrench[:, :3] += self.torque
         if self.thrust is not None:
@@ -237,7 +237,7 @@ class Signals:
     def once(self, key: Hashable, make: Callable[[], _T]) -> _T:
         """Make what follows from the flight, or give what was made before: no stage of a workflow makes it again.
 
-        `key`: who makes it, and all that it depends on beside the flight.
+        `key`: who makes it, and all that it depends on other than the flight.
         """
         made = self.__dict__.setdefault("made", {})
         if key not in made:

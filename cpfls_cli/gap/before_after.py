@@ -253,8 +253,7 @@ class BeforeAfter:
     """Errors of the model as given and of the model with effects on held-out flights.
 
     `stretches`: of the model as given, largest gap first.
-    `repeatability_before`, `repeatability_after`: what of the gap comes again, of training flights too; None where no flight repeats
-    another.
+    `repeatability_before`, `repeatability_after`: of training flights too; None where no flight repeats another.
     """
 
     playback: PlaybackChange

@@ -137,7 +137,7 @@ def compare(
     progress(0.3, "noise floor")
     hypothesis = extended.system(flights)
     floor = best_floor(hypothesis)
-    residual = hypothesis.left(extended.linear)
+    residual = hypothesis.residual_at(extended.linear)
     progress(0.5, "what the gap depends on")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)

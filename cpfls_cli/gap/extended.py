@@ -94,7 +94,7 @@ class ExtendedModel:
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
         """Compute the gap that the model leaves, shape (window, 6), N m and N."""
         hypothesis = self.system(flights)
-        return hypothesis.left(self.linear)
+        return hypothesis.residual_at(self.linear)
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
@@ -143,8 +143,8 @@ def extend(
     found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
         given = known_motion(training)
-        untold = unidentified_axes(found, given)
-        flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
+        unidentified = unidentified_axes(found, given)
+        flights, logged, repaired = ([f.as_stated(unidentified) for f in each] for each in (flights, logged, repaired))
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
     hypothesis, estimates, *_ = found
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)

@@ -147,13 +147,13 @@ def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> l
     given = []
     for recording in of_vehicle(recordings, model):
         signals = recording.signals
-        beside = model.wrench_along(model.acting(signals)) - signals.wrench
-        given.append(replace(recording, signals=replace(signals, beside=beside)))
+        known = model.wrench_along(model.acting(signals)) - signals.wrench
+        given.append(replace(recording, signals=replace(signals, known_wrench=known)))
     return given
 
 
 def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
-    """Add what a balance has found beside a model to it."""
+    """Add to a model what a balance has found above it."""
     if not has_effects(base):
         return found
     known = {effect.name: effect for effect in base.effects}
@@ -169,7 +169,7 @@ def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
 
 
 def known_already(model: VehicleModel) -> tuple[str, ...]:
-    """Name the effects that a model has: a search beside it does not look for them again."""
+    """Name the effects that a model has: a search above it does not look for them again."""
     late = [known.name for known, _ in late_effects(model.response)]
     return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
 

@@ -29,7 +29,7 @@ from cpfls_cli.gap.next_flight.logged import (
     needed_signals,
     planned_signals,
 )
-from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, open_questions, require_visible
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
@@ -168,7 +168,7 @@ def _open_effects(
     """List the rivals that a diagnosis leaves, or what its flights could not show; nothing for effects not weighed."""
     asked = _effects(study)
     # Between an effect and two that together do the same no path decides: the log has to.
-    rivals = [each for each in found.alternatives if not each.beside]
+    rivals = [each for each in found.alternatives if not each.jointly_with]
     told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
     rivals = [each for each in rivals if each.name in told and each.instead_of in found.effects_of_motion]
     if asked:

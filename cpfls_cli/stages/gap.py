@@ -18,7 +18,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.gap.whole_vehicle import with_known_wrench, has_effects, of_vehicle
+from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel

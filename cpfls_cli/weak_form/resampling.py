@@ -106,7 +106,7 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def beside(self, base: IntArray) -> "Beside":
+    def conditional_on(self, base: IntArray) -> "ConditionalNormalEquations":
         """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
 
         `base`: not in question: a block that alone shows one of these stays in the fit.
@@ -122,7 +122,7 @@ class Folds:
         shadow, fitted = solved[..., : seen.shape[2]], solved[..., seen.shape[2] :]
         turned, rest = shadow.swapaxes(1, 2), inner - inner[:, :, base] @ shadow
         missed = inner_right - inner[:, :, base] @ fitted
-        return Beside(
+        return ConditionalNormalEquations(
             normal=self,
             base=base,
             gram=seen - across.swapaxes(1, 2) @ shadow,
@@ -135,7 +135,7 @@ class Folds:
 
 
 @dataclass(frozen=True)
-class Beside:
+class ConditionalNormalEquations:
     """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all.
 
     `gram`, shape (block + 1, column, column): of columns without what the base explains of them, over the blocks that a

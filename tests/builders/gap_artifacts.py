@@ -442,7 +442,7 @@ def extended(diagnosis_sha256="", **changed):
     return Artifact(ExtendedRecord.spec(), Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
 
 
-def repeatability(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):
+def repeatability(share, *, error=0.02, gap=4.0, noise=0.1, motion=8.0):
     """What of gaps comes again, shares by channel and band, of rad/s^2 and m/s^2 about a body of 1 kg m^2 and 1 kg."""
     share = np.array(share, dtype=float)
     total = np.full(share.shape, gap**2)
@@ -451,9 +451,9 @@ def repeatability(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):
         low=np.array(low),
         high=np.array(high),
         total=total,
-        again=share * total,
+        repeatable=share * total,
         noise=np.full(share.shape, noise**2),
-        taken=np.full(share.shape, taken**2),
+        motion=np.full(share.shape, motion**2),
         share_error=np.full(share.shape, error),
         explained_error=np.full(share.shape, 0.05),
         resists=np.ones(6),

@@ -61,7 +61,7 @@ class System:
             residual = residual - self.columns(candidate)[..., 0]
         return residual
 
-    def left(self, linear: Array) -> Array:
+    def residual_at(self, linear: Array) -> Array:
         """Compute what coefficients of `base` leave of the residual, shape (window, 6), N m and N."""
         return np.asarray(self.residual - self.base @ linear)
 

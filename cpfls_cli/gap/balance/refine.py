@@ -233,7 +233,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
     """Move the shapes of all effects, together with all coefficients, to their least squares by Gauss-Newton steps.
 
     The last fit of a hypothesis that is believed: it stands where the same linear system that gives the intervals asks
-    for no further step. As in the search, less torque with less inertia explains nothing (`compensation`).
+    for no further step. As in the search, less torque with less inertia explains nothing (`torque_loss_ratio`).
 
     `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
     """
@@ -245,9 +245,9 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
     def fitted(there: System) -> tuple[float, tuple[Array, Array, BoolArray]]:
         """Compute the squares that are left, and weights, coefficients and those on bounds."""
-        own = weight / compensation(rotor_wrench, there.rotor_wrench)
+        own = weight / torque_loss_ratio(rotor_wrench, there.rotor_wrench)
         linear, held = fit_within_bounds(there, own)
-        return float(((there.left(linear) / own) ** 2).sum()), (own, linear, held)
+        return float(((there.residual_at(linear) / own) ** 2).sum()), (own, linear, held)
 
     error, (own, linear, held) = fitted(hypothesis)
     while True:
@@ -298,8 +298,8 @@ def _improved(
 
     def error(value: float) -> float:
         hypothesis = system(flights, [*chosen[:index], candidate.at({shape.name: float(value)}), *chosen[index + 1 :]])
-        weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
-        return float(((hypothesis.left(fit(hypothesis, floor)) * weight) ** 2).sum())
+        weight = torque_loss_ratio(rotor_wrench, hypothesis.rotor_wrench) / floor
+        return float(((hypothesis.residual_at(fit(hypothesis, floor)) * weight) ** 2).sum())
 
     value = candidate.shape[shape.name]
     bracket = _bracket(_steps(shape, value), value)
@@ -322,7 +322,7 @@ def _in_deepest_valley(
 
     def error(tried: Candidate) -> float:
         hypothesis = system(flights, [*chosen[:-1], tried])
-        return float(((hypothesis.left(fit(hypothesis, floor)) / floor) ** 2).sum())
+        return float(((hypothesis.residual_at(fit(hypothesis, floor)) / floor) ** 2).sum())
 
     tried = (Candidate(newest.effect, dict(zip(names, values, strict=True))) for values in product(*grids))
     return smallest(tried, error)
@@ -355,10 +355,10 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
 
     def residual_at(shapes: Array) -> Array:
         there = hypothesis.with_shapes(shapes)
-        left = there.left(linear)
+        left = there.residual_at(linear)
         if rotor_wrench is None:
             return left
-        before, after = (compensation(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
+        before, after = (torque_loss_ratio(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
         return left * after / before
 
     for number, unit in enumerate(np.eye(len(values))):
@@ -369,7 +369,7 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
     return columns
 
 
-def compensation(before: Array, after: Array) -> Array:
+def torque_loss_ratio(before: Array, after: Array) -> Array:
     """Weigh the channels by how much an actuator effect reduces their rotor torque.
 
     Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the

@@ -106,7 +106,7 @@ def shares(found: NamedFit) -> Array:
         """Compute the residual with some of the effects only, at the coefficients of all of them."""
         linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
         hypothesis = system(found.hypothesis.flights, [chosen[index] for index in kept])
-        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
+        return hypothesis.residual_at(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
 
     indices = range(len(chosen))
     everything = remaining(indices)
@@ -166,7 +166,7 @@ def sensor_fault(
     """Name a fault of the sensors with the share of the gap that its repair removes from the training flights."""
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = (((each.left(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
+    before, after = (((each.residual_at(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
     share = float(np.clip(1 - after / max(before, 1e-12), 0, 1))
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"

@@ -70,9 +70,9 @@ class NamedFit(NamedTuple):
         return block_index(self.hypothesis, self.settings)
 
     @property
-    def left(self) -> Array:
-        """Root mean square that is left of each channel, shape (6,), floors."""
-        return size_in_floors(self.hypothesis.left(self.estimates.linear), self.floor)
+    def rms_floors(self) -> Array:
+        """Root mean square of the residual of each channel, shape (6,), floors."""
+        return size_in_floors(self.hypothesis.residual_at(self.estimates.linear), self.floor)
 
     def without(self, names: Collection[str]) -> NamedFit:
         """Leave effects out and refit the others."""
@@ -105,10 +105,10 @@ def channel_weight(hypothesis: System, floor: Array) -> Array:
 
 def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
     """Estimate the noise of each window, shape (window, 6), and the root mean square that a fit leaves in it, (6,)."""
-    residual = hypothesis.left(fit(hypothesis, floor))
+    residual = hypothesis.residual_at(fit(hypothesis, floor))
     noise = window_noise(hypothesis, residual, floor)
     if (noise > floor).any():
-        residual = hypothesis.left(fit(hypothesis, noise))
+        residual = hypothesis.residual_at(fit(hypothesis, noise))
     return noise, size_in_floors(residual, noise)
 
 

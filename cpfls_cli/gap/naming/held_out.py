@@ -24,9 +24,9 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
-from cpfls_cli.gap.naming.open_questions import leftover
+from cpfls_cli.gap.naming.open_questions import unexplained_channels
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
-from cpfls_cli.gap.naming.results import GapSize, Unexplained
+from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
@@ -132,11 +132,11 @@ def held_out(
     }
     known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
-    scatter = scatter_size(scatter_variance(fitted), fitted.left(linear), floor)
+    scatter = scatter_size(scatter_variance(fitted), fitted.residual_at(linear), floor)
     return HeldOut(
         raw.residual,
-        plain.left(fit(own, channel_size(own.residual))),
-        full.left(linear),
+        plain.residual_at(fit(own, channel_size(own.residual))),
+        full.residual_at(linear),
         here,
         known,
         np.sqrt(here**2 + scatter * scatter_variance(full)),
@@ -168,10 +168,6 @@ class Judge:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
         linear = found.estimates.linear
         return Judgement(found, held_out(self.logged, self.repaired, found.hypothesis, linear, found.floor))
-
-    def remainder(self, found: NamedFit) -> tuple[Unexplained, ...]:
-        """Analyse what effects leave of the flights that they were found in."""
-        return leftover(found, self.rng)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
@@ -210,7 +206,7 @@ class Judge:
         """Leave an effect out and refit the others."""
         without = judgement.found.without([name])
         there = system(self.repaired, without.hypothesis.chosen)
-        residual, unseen = there.left(without.estimates.linear), judgement.held_out
+        residual, unseen = there.residual_at(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, without.settings)
@@ -285,7 +281,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)
-    seen = size_in_floors(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
+    seen = size_in_floors(start.hypothesis.residual_at(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     unseen = smallest(
@@ -300,7 +296,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
             f" held-out flights have none ({unseen[here]:.2g} floors at most): something changed between them, or the"
             " held-out flights do not move in a way that shows it",
         )
-    if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found):
+    if unseen[here] > CLEAR and not seen[there] > CLEAR and not unexplained_channels(last.found, judge.rng):
         return (
             f"the held-out flights have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and the training"
             f" flights have none ({seen[there]:.2g} floors at most): something changed between them, or only the"
@@ -319,7 +315,7 @@ def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
     # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
-    after = refit.left(own.linear)
+    after = refit.residual_at(own.linear)
     share = unseen.share_removed(unseen.parameters / unseen.noise, after / unseen.noise)
     if share < settings.named_share or size_in_floors(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()

@@ -29,10 +29,10 @@ _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
 
 
-def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
+def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
     """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
     hypothesis, settings, block = found.hypothesis, found.settings, found.block
-    residual = hypothesis.left(found.estimates.linear)
+    residual = hypothesis.residual_at(found.estimates.linear)
     noise = window_noise(hypothesis, residual, found.floor)
     sizes = size_in_floors(residual, noise)
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
@@ -62,7 +62,9 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     hypothesis, settings = found.hypothesis, found.settings
     windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        rows.append(replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear)))
+        rows.append(
+            replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear))
+        )
         rates.append(windows.average(flight.signals.body_rate))
     band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
     return band if band and band.p_value <= settings.significance and band.share > COUNTS else None

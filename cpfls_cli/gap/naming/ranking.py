@@ -15,19 +15,19 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
-from cpfls_cli.gap.balance.refine import compensation, fit, shape_columns
+from cpfls_cli.gap.balance.refine import torque_loss_ratio, fit, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.resampling import Beside, blocks_of, folds, mirror_shifted
+from cpfls_cli.weak_form.resampling import ConditionalNormalEquations, blocks_of, folds, mirror_shifted
 
 
 @dataclass(frozen=True)
 class Scored:
     """A candidate, the last of its set, with its cross-validated gain.
 
-    `chosen`: what it stands beside, and itself.
+    `chosen`: what it stands conditional, and itself.
     `gain`: sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where
     refused.
     `block_error`, shape (block,): what is left on each block.
@@ -105,13 +105,13 @@ def rank_effects(
     arranged = scoring_matrix(hypothesis, [each for each in listed if hypothesis.can(each)], floor)
     right = hypothesis.residual[..., None]
     if rng is not None:
-        unexplained = hypothesis.left(fit(hypothesis, floor))
+        unexplained = hypothesis.residual_at(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
     block = block_index(hypothesis, settings)
-    beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
-    scored, chance = score(arranged, beside, hypothesis)
-    above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
+    conditional = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).conditional_on(arranged.base)
+    scored, chance = score(arranged, conditional, hypothesis)
+    above_floor = float(max(conditional.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, each)
@@ -177,45 +177,52 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     for candidate in candidates:
         columns = hypothesis.columns(candidate)
         actuator = candidate.effect.kind == "actuator"
-        weight = compensation(own_wrench, own_wrench + columns[..., 0]) if actuator else np.ones(6)
+        weight = torque_loss_ratio(own_wrench, own_wrench + columns[..., 0]) if actuator else np.ones(6)
         placed.append((candidate, np.arange(first, first := first + columns.shape[2]), weight))
         parts.append(columns)
         priors.append(_information(candidate.effect, columns.shape[2], hypothesis.vehicle))
     return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, placed, np.concatenate(priors))
 
 
-def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+def score(
+    arranged: ScoringMatrix, conditional: ConditionalNormalEquations, hypothesis: System
+) -> tuple[list[Scored], Array]:
     """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
 
     Chance is what stands behind the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
     given more than its due.
     """
     scored = []
-    chance = np.full(beside.before.shape[1] - 1, -np.inf)
+    chance = np.full(conditional.before.shape[1] - 1, -np.inf)
     for candidate, columns, weight in arranged.candidates:
-        error = _error(candidate, columns, weight, beside)
-        chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], beside))
+        error = _error(candidate, columns, weight, conditional)
+        chance = np.maximum(chance, (conditional.before - error)[:, 1:].sum(axis=0))
+        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], conditional))
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
-def _error(candidate: Candidate, columns: IntArray, weight: Array, beside: Beside) -> Array:
+def _error(candidate: Candidate, columns: IntArray, weight: Array, conditional: ConditionalNormalEquations) -> Array:
     """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
     if candidate.effect.unit_coefficient:
-        return beside.subtracted(int(columns[0]), weight)
-    error = beside.unseen(columns)
-    return np.where(beside.normal.alone(columns)[:, None], np.minimum(beside.before, error), error)
+        return conditional.subtracted(int(columns[0]), weight)
+    error = conditional.unseen(columns)
+    return np.where(conditional.normal.alone(columns)[:, None], np.minimum(conditional.before, error), error)
 
 
 def _scored(
-    hypothesis: System, candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside
+    hypothesis: System,
+    candidate: Candidate,
+    columns: IntArray,
+    weight: Array,
+    error: Array,
+    conditional: ConditionalNormalEquations,
 ) -> Scored:
     """Score a candidate that leaves `error` of the blocks with all its columns."""
-    chosen, before = (*hypothesis.chosen, candidate), beside.before[:, 0]
+    chosen, before = (*hypothesis.chosen, candidate), conditional.before[:, 0]
     fitted, kept = np.ones(len(columns)), np.ones(len(columns), dtype=bool)
     while not candidate.effect.unit_coefficient:
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
-        fitted[kept], unsure[kept] = beside.fit(columns[kept])
+        fitted[kept], unsure[kept] = conditional.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, hypothesis.vehicle)
         if not admissible or not (kept & keep).any():
             return Scored(chosen, -np.inf, before, fitted)
@@ -223,7 +230,7 @@ def _scored(
             break
         kept &= keep
     if not kept.all():
-        error = _error(candidate, columns[kept], weight, beside)[:, 0]
+        error = _error(candidate, columns[kept], weight, conditional)[:, 0]
     return Scored(chosen, float((before - error).sum()), error, fitted)
 
 

@@ -106,9 +106,7 @@ class Alternative:
         "what it explains over what the named one explains; NaN where it could not be tried", gaps=True
     )
     separated_by: str = about("the flight, or the signal, that separates them")
-    beside: str = about(
-        "another effect that is not named and without which it would not do; empty for none", default=""
-    )
+    jointly_with: str = about("another effect that is not named and that it needs; empty for none", default="")
 
 
 @dataclass(frozen=True)

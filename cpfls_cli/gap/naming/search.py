@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import compensation, fit, refined
+from cpfls_cli.gap.balance.refine import torque_loss_ratio, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_residual, names_of, simplest, unbeaten
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, best_floor, block_index, rank_effects, scoring_matrix
@@ -178,7 +178,7 @@ def _moved(chosen: Sequence[Candidate], step: RankedStep) -> Scored:
 def _rescored(hypothesis: System, step: RankedStep) -> Scored:
     """Score a set, with its shapes where they are, by what it leaves of each block that no fit saw."""
     # Beside the best set, whose rotor torque is what it is in the look.
-    floor = step.floor * compensation(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
+    floor = step.floor * torque_loss_ratio(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
     # Shapes that are refined stay.
     error = _unseen(hypothesis, floor, step.block, moving=not _late(hypothesis.chosen))
     gain = step.above_floor + hypothesis.known.sum() - error.sum()
@@ -187,7 +187,7 @@ def _rescored(hypothesis: System, step: RankedStep) -> Scored:
 
 def _unseen(hypothesis: System, floor: Array, block: IntArray, *, moving: bool = True) -> Array:
     """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
-    weight = floor / compensation(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
+    weight = floor / torque_loss_ratio(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
     arranged = scoring_matrix(hypothesis, (), weight)
     normal = folds(arranged.matrix, hypothesis.residual / weight, block, arranged.prior)
     columns = arranged.base if moving else arranged.base[: hypothesis.base.shape[2]]
@@ -204,13 +204,13 @@ def alternatives(
     effect, known = chosen.candidate.effect, names_of(chosen.chosen)
     found = []
     for scored in unbeaten(chosen, ranking, above_floor):
-        *beside, other = (each.effect for each in scored.chosen if each.effect.name not in known)
+        *jointly, other = (each.effect for each in scored.chosen if each.effect.name not in known)
         if effect.name not in other.holds and scored.gain > settings.partial_share * chosen.gain:
-            found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in beside)))
+            found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in jointly)))
     return found
 
 
-def alternative(effect: Effect, other: Effect, relative_gain: float, beside: str = "") -> Alternative:
-    """Say what tells an effect from another one."""
-    told = effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation
-    return Alternative(other.name, effect.name, relative_gain, told, beside)
+def alternative(effect: Effect, other: Effect, relative_gain: float, jointly_with: str = "") -> Alternative:
+    """Say what separates an effect from another one."""
+    separated_by = effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation
+    return Alternative(other.name, effect.name, relative_gain, separated_by, jointly_with)

@@ -146,7 +146,7 @@ def fitted_rival(
 
     def error(candidate: Candidate) -> float:
         balance = system(flights, [*besides, candidate])
-        return float(((balance.left(fit(balance, floor)) / floor) ** 2).sum())
+        return float(((balance.residual_at(fit(balance, floor)) / floor) ** 2).sum())
 
     best = smallest(candidates_of([rival]), error)
     return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]

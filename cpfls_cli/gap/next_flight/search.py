@@ -36,11 +36,11 @@ class Goal:
     def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
         """Judge what the known flights say together with one along given signals; None: with themselves once more."""
         if signals is None:
-            evidence = [known.beside(known) for known in self.known]
+            evidence = [known.after(known) for known in self.known]
         else:
             there = [self.logging.weak(signals)]
             fresh = [self.logging.gathered(each, there) for each in self.questions]
-            evidence = [one.beside(known) for one, known in zip(fresh, self.known, strict=True)]
+            evidence = [one.after(known) for one, known in zip(fresh, self.known, strict=True)]
         of_effect: dict[str, list[int]] = {}
         for index, question in enumerate(self.questions):
             of_effect.setdefault(question.true.candidate.effect.name, []).append(index)

@@ -74,7 +74,7 @@ class Evidence:
         nowhere = np.zeros(0, dtype=int)
         return cls(np.zeros((blocks, 1, 1)), nowhere, (nowhere,), unit=False, off=0.0)
 
-    def beside(self, known: Evidence) -> Evidence:
+    def after(self, known: Evidence) -> Evidence:
         """Put blocks of other flights before these."""
         shape = (len(known.gram), *self.gram.shape[1:])
         gram = np.concatenate([np.broadcast_to(known.gram, shape), self.gram])
@@ -124,7 +124,7 @@ def formulas_off(hypothesis: System, floor: Array) -> float:
     `floor`: shape (6,), N m and N; Result: mean square, as a share of that of what the effects explain.
     """
     plain = system(hypothesis.flights)
-    before, left = (float(((each.left(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
+    before, left = (float(((each.residual_at(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
     return float(np.clip((left - hypothesis.known.sum()) / max(before - left, ROUNDING), 0.0, OFF**2))
 
 

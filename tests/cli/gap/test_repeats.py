@@ -1,4 +1,4 @@
-"""`cpfls gap` on flights that repeat a path in gusts: what comes again leads page, terminal and JSON."""
+"""`cpfls gap` on flights that repeat a path in gusts: the repeatable part leads page, terminal and JSON."""
 
 import json
 from types import SimpleNamespace
@@ -66,8 +66,8 @@ def found(cpfls, tmp_path_factory):
 def test_what_comes_again_stands_behind_the_verdict(found):
     (said,) = (line for line in found.stdout.splitlines() if line.startswith("REPEATS: "))
     assert said.startswith("REPEATS: Of the gap in the force along")
-    assert "comes again: the model as given lacks an effect there." in said
-    assert "Torque about x (roll): nothing comes again" in found.stdout
+    assert "is repeatable: the model as given lacks an effect there." in said
+    assert "Torque about x (roll): nothing is repeatable" in found.stdout
     assert "--repeat" not in found.stdout
 
 
@@ -84,6 +84,6 @@ def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_on
 
 def test_the_report_shows_it_in_a_picture(found):
     page = (found.folder / "report.html").read_text()
-    assert "diagnose-1-comes-again" in page
-    assert "compare-1-comes-again" in page
+    assert "diagnose-1-repeatable" in page
+    assert "compare-1-repeatable" in page
     assert page.index("REPEATS") < page.index("band by band")

@@ -181,7 +181,9 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
     (moved,) = refined(flights, [low], step.floor).chosen
     own, *ranking = in_place_of(moved, step)
-    pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
+    pairs = {
+        frozenset((rival.name, rival.jointly_with)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)
+    }
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 

@@ -12,7 +12,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.diagnose import _Named
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Source, significant_effects
+from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects
 from cpfls_cli.gap.naming.causes import JudgedEffect
 from cpfls_cli.gap.naming.estimate import NamedFit
 from cpfls_cli.gap.residual.air import _growing, _gusty

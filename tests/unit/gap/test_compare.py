@@ -198,8 +198,8 @@ def test_what_comes_again_is_gone_with_the_effect():
     found = extend(training, held, [named("linear_damping")], compared_runs.audit, SETTINGS, None)
     shown = before_after(training, held, found.unseen, found.model, SETTINGS)
     before, after = shown.repeatability_before, shown.repeatability_after
-    assert before.again[:3, 0] == pytest.approx(compared_runs.repeatability.again[:3, 0], rel=0.05)
-    assert (np.abs(after.again[:3, 0]) < 0.02 * before.again[:3, 0]).all()
+    assert before.repeatable[:3, 0] == pytest.approx(compared_runs.repeatability.repeatable[:3, 0], rel=0.05)
+    assert (np.abs(after.repeatable[:3, 0]) < 0.02 * before.repeatable[:3, 0]).all()
     assert (after.explained[:3, 2] > 0.99).all()
 
 

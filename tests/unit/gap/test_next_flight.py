@@ -12,9 +12,9 @@ from cpfls_cli.gap.naming.odds import likely
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import (
+    open_questions,
     physical_values,
     questions_between,
-    open_questions,
     require_visible,
     usual,
 )
@@ -106,7 +106,7 @@ def test_evidence_of_flights_adds_up_to_that_of_all():
     paths = path_of(2, 0.15), path_of(0, 1.0, 3)
     offset = question("com_offset", [LEVER, LEVER], "rotor_mismatch")
     one, two = (LOGGING.gathered(offset, [LOGGING.weak(along(path))]) for path in paths)
-    assert two.beside(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
+    assert two.after(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
 
 
 def test_effects_that_are_there_besides_are_free_too():
