@@ -15,7 +15,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
-from cpfls_cli.gap.balance.refine import torque_loss_ratio, fit, shape_columns
+from cpfls_cli.gap.balance.refine import fit, shape_columns, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import torque_loss_ratio, fit, refined
+from cpfls_cli.gap.balance.refine import fit, refined, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_residual, names_of, simplest, unbeaten
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, best_floor, block_index, rank_effects, scoring_matrix
