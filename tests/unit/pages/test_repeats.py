@@ -118,7 +118,7 @@ def test_the_split_stands_behind_a_verdict_and_before_a_gap():
     groups = {"repeatability_before": made.repeatability(PITCH), "repeatability_after": made.repeatability(NOTHING)}
     found = replace(made.diagnosis(), **groups)
     assert [each.label for each in made.blocks_of(found, "diagnose") if isinstance(each, Box)] == ["NAMED", "REPEATS"]
-    assert plain(found)["repeatability"]["before"]["channels"]["torque y"]["repeatability"][3:5] == [True, True]
+    assert plain(found)["repeatability"]["before"]["channels"]["torque y"]["repeatable"][3:5] == [True, True]
     compared = made.blocks_of(replace(made.disagreement(), repeatability=groups["repeatability_before"]), "compare")
     assert [each.label for each in compared if isinstance(each, Box)] == ["REPEATS", "GAP"]
 
@@ -130,7 +130,7 @@ def test_a_gap_that_does_not_come_again_is_said_beside_the_verdict(floors):
     groups = {"repeatability_before": made.repeatability(NOTHING), "repeatability_after": made.repeatability(NOTHING)}
     box, facts, *_ = made.blocks_of(replace(given, **groups), "diagnose")
     assert (NO_EFFECT in box.sentences) == (floors > 1.5)
-    assert dict(facts.rows)["Next"].startswith("Nothing on the model" if floors > 1.5 else "Look at what is left")
+    assert dict(facts.rows)["Next"].startswith("Nothing on the model" if floors > 1.5 else "Look at the residual")
 
 
 def test_without_repeats_one_line_says_what_to_fly():
