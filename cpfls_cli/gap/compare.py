@@ -34,7 +34,9 @@ class ResidualWindows:
 
     time: Array = about("middle of each window, on the clock of its flight", "window", unit="s")
     flight: IntArray = about("index of its flight", "window")
-    value: Array = about("what inertia and rotors leave, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True)
+    value: Array = about(
+        "residual of inertial and rotor wrench, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True
+    )
 
 
 @result

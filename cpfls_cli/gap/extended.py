@@ -129,7 +129,7 @@ def extend(
     `effects`: to become part of the model; shapes start from theirs.
     `audit`: faults of the sensors that are repaired.
     `base`: None for the rigid body of the vehicle.
-    `gusty_floor`, shape (6,), N m and N: noise floor with the gusts of the flights, beside which the numbers come by
+    `gusty_floor`, shape (6,), N m and N: noise floor with the gusts of the flights, above which the numbers come by
     instruments; None for no gusts.
     Raises ComputationError if the gap on the held-out flights does not shrink in the channels that change.
     """

@@ -26,7 +26,7 @@ OFF = 0.1
 VISIBLE = 0.3
 """Root mean square in floors of one channel from which on an effect shows.
 
-Beside noise it makes the channel 4 % larger; less than that floors are off by.
+With noise it makes the channel 4 % larger; less than that floors are off by.
 """
 
 ERRORS = 2.0
@@ -37,11 +37,11 @@ COUNTS = 0.05
 
 CHANCE = 0.05
 """Probability of chance from which on something makes an answer more careful: an unnamed effect, a form of
-what is late."""
+lag."""
 
 RARE = 0.01
-"""The rate of errors that names are given at, gusts among them: of chance, of an effect that is 0 by what instruments
-tell, and of a rival beside the chosen set."""
+"""The rate of errors that names are given at, gusts among them: of chance, of an effect that is 0 by
+instruments, and of a rival against the chosen set."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,7 +49,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleM
 
 
 def _parts(extended: ExtendedModel, vehicle: VehicleSettings) -> tuple[VehicleParts, dict[str, float]]:
-    """Put each effect where the model of a whole vehicle has it, and tell how late the rotors are, s."""
+    """Put each effect where the model of a whole vehicle has it, and give lag and delay of the rotors, s."""
     parts = VehicleParts(vehicle, inertia_correction(extended.parameters, vehicle))
     times = {"delay_s": 0.0, "lag_s": 0.0}
     for (known, shape), linear in extended.effects:
@@ -170,8 +170,8 @@ def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
 
 def known_already(model: VehicleModel) -> tuple[str, ...]:
     """Name the effects that a model has: a search above it does not look for them again."""
-    late = [known.name for known, _ in late_effects(model.response)]
-    return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
+    lags = [known.name for known, _ in late_effects(model.response)]
+    return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *lags)
 
 
 def _beyond_rigid_body(model: VehicleModel) -> Effect:

@@ -55,14 +55,14 @@ class System:
 
     @cached_property
     def residual(self) -> Array:
-        """What inertia and rotors leave, without the effects of unit coefficient; shape (window, 6)."""
+        """Residual of inertial and rotor wrench, and of effects of unit coefficient; shape (window, 6)."""
         residual = self.by_flight(lambda flight, signals: flight.averaged(flight.residual(signals)))
         for candidate in self.fixed:
             residual = residual - self.columns(candidate)[..., 0]
         return residual
 
     def residual_at(self, linear: Array) -> Array:
-        """Compute what coefficients of `base` leave of the residual, shape (window, 6), N m and N."""
+        """Compute the residual with coefficients of `base`, shape (window, 6), N m and N."""
         return np.asarray(self.residual - self.base @ linear)
 
     @cached_property
@@ -146,7 +146,7 @@ class System:
 
     @property
     def most_noise(self) -> Array:
-        """Mean square in squared floors up to which what is left of each channel is noise, shape (6,).
+        """Mean square in squared floors up to which the residual of each channel is noise, shape (6,).
 
         In gusts it is as much as a gap begins at: they are drawn anew in each flight, and known to a third.
         """
@@ -239,12 +239,13 @@ def scatter_variance(hypothesis: System) -> Array:
 
 
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
-    """Estimate the relative scatter of effects, one number for all channels, by its likelihood in what a fit leaves.
+    """Estimate the relative scatter of effects, one number for all channels, by its likelihood in a residual.
 
     `variance`, shape (window, 6): for a unit of scatter.
     `residual`: shape (window, 6).
     `floor`: shape (6,).
-    Result: mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
+    Result: mean square of the relative scatter over a window; 0 where stretches that should scatter are not
+    significant.
     """
     expected = variance / floor**2
     scatters = expected.any(axis=0)
@@ -252,19 +253,19 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
         return 0.0
     expected, square = expected[:, scatters], (residual / floor)[:, scatters] ** 2
 
-    def beside(size: float) -> tuple[Array, float]:
-        """Give the shape of the variance, and its scale: what is left everywhere is no scatter."""
+    def scaled(size: float) -> tuple[Array, float]:
+        """Give the shape of the variance, and its scale: a residual that is everywhere is no scatter."""
         shape = 1 + size * expected
         return shape, max(1.0, float(np.mean(square / shape)))
 
     def unlikely(size: float) -> float:
-        shape, scale = beside(size)
+        shape, scale = scaled(size)
         return float(np.sum(np.log(shape * scale) + square / (shape * scale)))
 
     most = float(np.max(square[expected > 0] / expected[expected > 0]))
     size = float(minimize_scalar(unlikely, bounds=(0.0, most), method="bounded").x) if most > 0 else 0.0
-    # One number more has to be worth its while (Schwarz 1978).
-    return size * beside(size)[1] if unlikely(0.0) - unlikely(size) > np.log(square.size) else 0.0
+    # One parameter more has to lower the information criterion (Schwarz 1978).
+    return size * scaled(size)[1] if unlikely(0.0) - unlikely(size) > np.log(square.size) else 0.0
 
 
 def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:

@@ -36,11 +36,11 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
     of noise that is correlated from sample to sample. The fit is read off at the frequencies that the windows average
-    over. Longer windows tell frequencies apart better, so that the fit can start lower; the median over the windows
+    over. Longer windows resolve frequencies better, so that the fit can start lower; the median over the windows
     keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: above
     it the filter has removed the noise as well.
 
-    `residual`: what the model leaves, shape (time, 6).
+    `residual`: of the model, shape (time, 6).
     `cut_off`, shape (6,), Hz: of the filter that each channel went through before it was logged, infinite for none.
     """
     limit = np.full(6, np.inf) if cut_off is None else np.asarray(cut_off)
@@ -120,8 +120,8 @@ def _terms(weights: bytes, period: float, centre: float) -> Array:
 
 
 def _best_pair(relative: Array) -> int:
-    """Choose a flat and a rising spectrum, neither negative, that leave least of one, of all pairs by formula."""
-    # What is left does not depend on the unit, and fourth powers stay within range.
+    """Choose a flat and a rising spectrum, neither negative, with the least residual, of all pairs by formula."""
+    # The residual does not depend on the unit, and fourth powers stay within range.
     scaled = relative / relative.max()
     flat, rising = scaled[:, ::2, None], scaled[:, None, 1::2]
     flat_squared, rising_squared, both = (each.sum(axis=0) for each in (flat**2, rising**2, flat * rising))

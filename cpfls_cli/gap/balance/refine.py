@@ -19,11 +19,11 @@ from cpfls_cli.gap.settings import VISIBLE
 from cpfls_cli.rounding import ROUNDING, at_most, levelled, smallest
 
 _MOST_NOISE = 0.5
-"""Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of
-it is uncertain."""
+"""Share of the squares of any combination of columns that is believed to be noise at most: beyond it, the rest is
+uncertain."""
 _SETTLED = 1e-2
-"""Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error; and share of
-a step, or of what it takes off, below which it is none."""
+"""Change of the sum of squares, in variances, below which a fit has converged: a tenth of a standard error; and share
+of a step, or of what it takes off, below which it is none."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -40,7 +40,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     for shape in best[-1].effect.shapes if best else ():
         if shape.valley is not None:
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
-    # What took the place of a linear effect stands between no points of a grid.
+    # What took the place of a linear effect has no place on a grid.
     indices = [index for index, candidate in enumerate(best) if candidate.effect is chosen[-1].effect]
     newest = [(index, shape) for index in indices for shape in best[index].effect.shapes]
     # A second round where there are several: the best length of a cable depends on its damping.
@@ -127,7 +127,7 @@ def equations(hypothesis: System, weight: Array) -> Equations:
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns by weighted least squares, which leave the least but shrink numbers whose columns are noisy.
+    """Fit all free columns by weighted least squares, which shrink numbers whose columns are noisy.
 
     `floor`: shape (6,) or (window, 6); Result: shape (column,).
     """
@@ -219,7 +219,7 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
 
 
 def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArray:
-    """Mark torques that are surely impossible beside the force of their effect."""
+    """Mark torques that are surely impossible with the force of their effect."""
     out = np.zeros(len(linear), dtype=bool)
     for candidate, place in hypothesis.places if has_force(hypothesis.flights) else ():
         if candidate.effect.lever is not None:
@@ -232,7 +232,7 @@ def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArra
 def refitted(hypothesis: System, weight: Array) -> System:
     """Move the shapes of all effects, together with all coefficients, to their least squares by Gauss-Newton steps.
 
-    The last fit of a hypothesis that is believed: it stands where the same linear system that gives the intervals asks
+    The last fit of a hypothesis that is believed: it ends where the same linear system that gives the intervals asks
     for no further step. As in the search, less torque with less inertia explains nothing (`torque_loss_ratio`).
 
     `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
@@ -251,14 +251,14 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
     error, (own, linear, held) = fitted(hypothesis)
     while True:
-        # The change of the shapes beside the coefficients that no bound holds, and what it takes off the squares where
-        # the residual is linear in them.
+        # The change of the shapes jointly with the coefficients that no bound holds, and what it takes off the squares
+        # where the residual is linear in them.
         moving = shape_columns(hypothesis, linear, rotor_wrench)
         rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
         step, (columns, right) = rows.solve(), rows.root
         step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
         # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it
-        # holds for no step: a filter and a lag that nothing tells apart would creep along with no end in sight.
+        # holds for no step: a filter and a lag that nothing separates would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
@@ -313,7 +313,7 @@ def _in_deepest_valley(
 ) -> Candidate:
     """Try one shape of the newest effect in steps of its valleys, with all that the grids of its others hold."""
     newest = chosen[-1]
-    # Where valleys are narrower than the steps of the grid, the best point of that lies beside its deepest one.
+    # Where valleys are narrower than the steps of the grid, the best point of that lies next to its deepest one.
     low, high = _bracket(shape.grid, newest.shape[shape.name])
     low, high = _bracket(shape.grid, low)[0], _bracket(shape.grid, high)[1]
     values = [value for value in _steps(shape, newest.shape[shape.name]) if low <= value <= high]

@@ -1,4 +1,4 @@
-"""Causes of a gap: each chosen effect judged beside the others, faults of the sensors, wrong numbers of the vehicle."""
+"""Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02
-"""Relative error of a moment of inertia or of the thrust from which on it is told."""
+"""Relative error of a moment of inertia or of the thrust from which on it is named."""
 
 
 @dataclass(frozen=True)
 class JudgedEffect:
     """A chosen effect and its rivals.
 
-    `odds`: of each set with others in its place, beside the chosen one: logarithm of the predictive density of each
+    `odds`: of each set with others in its place, against the chosen one: logarithm of the predictive density of each
     block.
     """
 

@@ -1,4 +1,4 @@
-"""The gap on held-out flights, of the model as given and with effects; which names stand there; and if both agree."""
+"""The gap on held-out flights, of the model as given and with effects; which names it confirms; and if both agree."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ class HeldOut:
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.
 
-        `as_given`: of the gap of the model as given, on signals as logged; else of what its own numbers leave.
+        `as_given`: of the gap of the model as given, on signals as logged; else of that with its own parameters
+        refitted.
         Result: of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where
         neither does.
         """
@@ -114,7 +115,7 @@ def held_out(
     linear: Array,
     floor: Array,
 ) -> HeldOut:
-    """Apply a fitted hypothesis to held-out flights, and the model with its own numbers refitted beside it.
+    """Apply a fitted hypothesis to held-out flights, and the model with its own parameters refitted.
 
     `logged`, `repaired`: the flights as logged, and after repair of the sensors.
     `fitted`: of the training flights.
@@ -146,7 +147,7 @@ def held_out(
 
 
 class Judgement(NamedTuple):
-    """Effects with what they leave of the flights held out."""
+    """Effects with their residual on held-out flights."""
 
     found: NamedFit
     held_out: HeldOut
@@ -165,7 +166,7 @@ class Judge:
     rng: np.random.Generator
 
     def judge(self, found: NamedFit) -> Judgement:
-        """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
+        """Evaluate effects on the held-out flights, and the model with its own parameters refitted."""
         linear = found.estimates.linear
         return Judgement(found, held_out(self.logged, self.repaired, found.hypothesis, linear, found.floor))
 
@@ -245,7 +246,7 @@ class Without(NamedTuple):
         return float(self.seen.max())
 
     def worsened(self, after: Array) -> Array:
-        """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
+        """Compute how much worse the effect makes channels with `after` floors, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
         worse = (after > CLEAR) & (after > (1 + OFF) * self.left) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
@@ -262,12 +263,12 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])
-        beside = max(beyond, *(one.seen[channel] for one in compared.values()))
-        if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):
-            told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
+        most = max(beyond, *(one.seen[channel] for one in compared.values()))
+        if off < OFF**2 * most and (left > CLEAR or off < ERRORS * (NOISE - 1)):
+            size = f"{left:.2g} floors remain with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
             return Refusal(
                 name,
-                f"in the {CHANNELS[channel]} {told}, and it removes less than a hundredth of what the largest effect"
+                f"in the {CHANNELS[channel]} {size}, and it removes less than a hundredth of what the largest effect"
                 " does: the error of that one's formula looks the same",
             )
     return None

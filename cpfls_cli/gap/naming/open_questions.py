@@ -30,7 +30,7 @@ _USUAL_OF_BOUND = 0.2
 
 
 def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
-    """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
+    """List the channels with an unexplained residual: size, dependence on signals, narrow band, energy."""
     hypothesis, settings, block = found.hypothesis, found.settings, found.block
     residual = hypothesis.residual_at(found.estimates.linear)
     noise = window_noise(hypothesis, residual, found.floor)
@@ -40,14 +40,14 @@ def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Une
         residual / noise, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     # The largest of each channel.
-    told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
+    dependent = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
     band = _band(found, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = []
     for place, (channel, size, energy) in enumerate(zip(CHANNELS, sizes.tolist(), directions, strict=True)):
-        follows, rings = told.get(channel), band if band and band.channel == channel else None
+        follows, rings = dependent.get(channel), band if band and band.channel == channel else None
         if size > CLEAR or (size**2 > hypothesis.most_noise[place] and (follows or rings)):
             signal, share = (follows.signal, follows.r2) if follows else (None, 0.0)
             frequency = None
@@ -71,7 +71,7 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
-    """Tell of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
+    """Say of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
 
     By the sign of the mean power ``M omega`` against its scatter over blocks of windows.
     """
@@ -92,7 +92,7 @@ def with_unnamed(
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
-    formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
+    formula that is right in slow flight bends in fast flight: where a bend shows, its number changes with it.
 
     `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
     are with the unnamed effects, whose names come too, and without them.
@@ -181,8 +181,8 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
                 logged = [name for name in to_log if name != _RADIUS]
                 asked = [f"log {' and '.join(logged)}"] if logged else []
                 asked += ["state rotors.radius_m in the config"] if _RADIUS in to_log else []
-                told = f"{' and '.join(asked)}, without which it was not tried"
-                rivals.append(Alternative(name, effect.name, np.nan, told))
+                separated_by = f"{' and '.join(asked)}, without which it was not tried"
+                rivals.append(Alternative(name, effect.name, np.nan, separated_by))
     return tuple(rivals)
 
 

@@ -1,4 +1,4 @@
-"""Effects ranked beside a hypothesis, by what they take off blocks that no fit saw, within physical bounds.
+"""Effects ranked given a hypothesis, by what they take off blocks that no fit saw, within physical bounds.
 
 Floors are of shape (6,), N m and N, by channel.
 """
@@ -27,10 +27,10 @@ from cpfls_cli.weak_form.resampling import ConditionalNormalEquations, blocks_of
 class Scored:
     """A candidate, the last of its set, with its cross-validated gain.
 
-    `chosen`: what it stands conditional, and itself.
+    `chosen`: the hypothesis, and itself.
     `gain`: sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where
     refused.
-    `block_error`, shape (block,): what is left on each block.
+    `block_error`, shape (block,): sum of squares of the residual.
     `coefficients`, shape (coefficient,): linear, of a fit on all blocks; 0 where a bound took one out.
     """
 
@@ -47,11 +47,11 @@ class Scored:
 
 @dataclass(frozen=True)
 class RankedStep:
-    """All candidates ranked beside a hypothesis.
+    """All candidates ranked given a hypothesis.
 
     `ranking`: best first, each effect once, at its best shape.
     `chance`, shape (shift,): what the best candidate explains of shifted residuals.
-    `above_floor`: sum of squares that the hypothesis leaves above the floor, in squared floors.
+    `above_floor`: residual sum of squares above the floor, in squared floors.
     `block`, shape (window,): of the cross-validation.
     """
 
@@ -63,7 +63,7 @@ class RankedStep:
     block: IntArray
 
     def least_gain(self, explained: float = 0.0) -> float:
-        """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
+        """Compute what an effect has to explain of a gap, of which a part is explained, in squared floors."""
         gap = max(self.above_floor - explained, 0.0)
         return max(COUNTS * gap, VISIBLE**2 * len(self.hypothesis.residual))
 
@@ -92,10 +92,10 @@ def rank_effects(
     also: Sequence[Candidate] = (),
     floor: Array | None = None,
 ) -> RankedStep:
-    """Score all effects beside those chosen.
+    """Score all effects given those chosen.
 
     `rng`: of the shifts; None for none.
-    `also`: tried beside the grids, with shapes of their own.
+    `also`: tried with the grids, with shapes of their own.
     `floor`, shape (6,): None: as the residual of the hypothesis shows it.
     """
     hypothesis = system(flights, chosen)
@@ -167,7 +167,7 @@ class ScoringMatrix(NamedTuple):
 def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:
     """Arrange base and candidates, in floors.
 
-    The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
+    The shapes of the chosen effects are in the base by their derivatives, so that a candidate is judged by what it
     adds after they have moved.
     """
     parts = [hypothesis.base, shape_columns(hypothesis, fit(hypothesis, floor))]
@@ -189,7 +189,7 @@ def score(
 ) -> tuple[list[Scored], Array]:
     """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
 
-    Chance is what stands behind the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
+    Chance is what follows the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
     given more than its due.
     """
     scored = []
@@ -202,7 +202,7 @@ def score(
 
 
 def _error(candidate: Candidate, columns: IntArray, weight: Array, conditional: ConditionalNormalEquations) -> Array:
-    """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
+    """Compute the residual of each block with a candidate; a block that alone shows it does not count against it."""
     if candidate.effect.unit_coefficient:
         return conditional.subtracted(int(columns[0]), weight)
     error = conditional.unseen(columns)
@@ -217,7 +217,7 @@ def _scored(
     error: Array,
     conditional: ConditionalNormalEquations,
 ) -> Scored:
-    """Score a candidate that leaves `error` of the blocks with all its columns."""
+    """Score a candidate whose residual of the blocks is `error` with all its columns."""
     chosen, before = (*hypothesis.chosen, candidate), conditional.before[:, 0]
     fitted, kept = np.ones(len(columns)), np.ones(len(columns), dtype=bool)
     while not candidate.effect.unit_coefficient:

@@ -98,7 +98,7 @@ class TorqueAlone:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that the flights cannot tell from a named one."""
+    """An effect that the flights cannot separate from a named one."""
 
     name: str = about("identifier of the effect")
     instead_of: str = about("the named one")
@@ -125,7 +125,7 @@ class Unexplained:
     floors: float = about("root mean square of its residual, in floors")
     signal: str | None = about("signal that it depends on most")
     share: float = about("share of the residual that signal or narrow band explains")
-    frequency_hz: float | None = about("of a narrow band that stands out", unit="Hz")
+    frequency_hz: float | None = about("of a significant narrow band", unit="Hz")
     energy: str = about("feeds, drains or neither")
 
 
@@ -271,7 +271,7 @@ def verdict_of(
     """Derive the verdict from named effects, rivals and unexplained residuals.
 
     What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round; so
-    has an effect without which chance explains as much beside the others.
+    has an effect that is not significant jointly with the others.
 
     `unexplained`: where effects were found: of those, the ones that matter.
     `shares`: of the gap of torque or force above the floor that the effects take off flights not seen, where there is
@@ -309,7 +309,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
 
 
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
-    """Tell whether an unexplained residual is a second cause, by what it follows, or more than a name may leave.
+    """Tell whether an unexplained residual is a second cause, by its dependence, or more than a name may leave.
 
     `before`, shape (6,), floors: the gap of each channel without effects.
     `named_share`: of the gap above the floor that has to go.

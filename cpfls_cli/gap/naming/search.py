@@ -1,4 +1,4 @@
-"""A search over sets of effects: a beam, its sets compared by what they leave of blocks that no fit saw."""
+"""A search over sets of effects: a beam, its sets compared by their residual in blocks that no fit saw."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def forward_selection(
         number = float(np.log(step.hypothesis.known.sum()))
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
-        # A set that was there before would come round again for ever.
+        # A set that was there before would recur for ever.
         if of_motion(best.gain, step, refitted) < step.least_gain() or names_of(refitted.chosen) in tried:
             return chosen, steps
         tried.add(names_of(refitted.chosen))
@@ -73,8 +73,8 @@ def _grown(step: RankedStep) -> list[Scored]:
     """
     best = step.ranking[0]
     near = [scored for scored in step.ranking if scored.gain > 0]
-    alike = [scored for scored in near if _late([scored.candidate])]
-    if best not in alike or not (_late(best.chosen[:-1]) or len(alike) > 1):
+    alike = [scored for scored in near if _lags([scored.candidate])]
+    if best not in alike or not (_lags(best.chosen[:-1]) or len(alike) > 1):
         return near
     moved = [_moved(scored.chosen, step) for scored in alike]
     return ascending(moved, lambda scored: -scored.gain)
@@ -83,25 +83,25 @@ def _grown(step: RankedStep) -> list[Scored]:
 def grown_elsewhere(
     sets: Sequence[Sequence[Candidate]], step: RankedStep, effects: Sequence[Effect], settings: GapSettings
 ) -> list[Scored]:
-    """List sets that grew from others than the best one and leave less than that with no more numbers.
+    """List sets that grew from others than the best one and leave less residual with no more numbers.
 
     Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
     """
     if not sets:
         return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
-    two = _late(chosen[-1:]) and not _late(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
+    two = _lags(chosen[-1:]) and not _lags(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
     if not (two or step.above_floor > step.least_gain()):
         return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
-        late = _late(other)
-        like = [each for each in effects if each.actuation is not None] if late else effects
+        lags = _lags(other)
+        like = [each for each in effects if each.actuation is not None] if lags else effects
         there = rank_effects(flights, other, like, settings, None, floor=step.floor)
-        for scored in there.ranking[: _BEAM if late else 1]:
+        for scored in there.ranking[: _BEAM if lags else 1]:
             grown = scored.chosen
             if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen) + two:
-                found.append(_moved(grown, step) if late else _rescored(system(flights, grown), step))
+                found.append(_moved(grown, step) if lags else _rescored(system(flights, grown), step))
     return [scored for scored in found if _is_better(scored, own, step)]
 
 
@@ -126,27 +126,27 @@ def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
 
 
 def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
-    """Score an effect, and behind it all that could stand in its place, beside the look at the others and it.
+    """Score an effect, and behind it all that could take its place, given the look at the others and it.
 
-    What lies between command and rotors is scored with shapes moved, and two of these can stand for one with two
-    shapes; more numbers than it has have to be worth it.
+    What lies between command and rotors is scored with shapes moved, and two of these can replace one with two
+    shapes; more numbers than it has need a gain.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != candidate.effect.name)
-    if not _late([candidate]):
+    if not _lags([candidate]):
         return ranked
     others = step.hypothesis.chosen
     own = _rescored(system(step.hypothesis.flights, [*others, candidate]), step)
-    alike = [each.candidate for each in ranked[1:] if _late([each.candidate]) and np.isfinite(each.gain)]
+    alike = [each.candidate for each in ranked[1:] if _lags([each.candidate]) and np.isfinite(each.gain)]
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
-    if len(candidate.effect.shapes) > 1 and not _late(others):
+    if len(candidate.effect.shapes) > 1 and not _lags(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
-    numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
-    moved = [_moved(each, step) for each in tried if worth or free_numbers(each) <= numbers]
+    numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
+    moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
     fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
-    return [own, *fair, *(scored for scored in ranked[1:] if not _late([scored.candidate]))]
+    return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
 
-def _late(chosen: Sequence[Candidate]) -> bool:
+def _lags(chosen: Sequence[Candidate]) -> bool:
     """Tell whether any effect lies between command and rotors."""
     return any(each.effect.actuation is not None for each in chosen)
 
@@ -156,12 +156,13 @@ def chance_given_actuation(
 ) -> float | None:
     """Compute how likely it is that an effect between command and rotors adds nothing to its like; None without any.
 
-    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
-    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
-    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
+    Shifted residuals cannot show it: each of these effects moves with the command, and so does the residual of the
+    others. Compared are therefore the residuals of all effects, and of the others without it, in blocks that their fits
+    did not see, both with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could
+    have been there.
     """
     others = [*together.chosen[:index], *together.chosen[index + 1 :]]
-    if not (_late([together.chosen[index]]) and _late(others)):
+    if not (_lags([together.chosen[index]]) and _lags(others)):
         return None
     floor, block = best_floor(together), block_index(together, settings)
     without = refined(together.flights, others, floor)
@@ -176,17 +177,17 @@ def _moved(chosen: Sequence[Candidate], step: RankedStep) -> Scored:
 
 
 def _rescored(hypothesis: System, step: RankedStep) -> Scored:
-    """Score a set, with its shapes where they are, by what it leaves of each block that no fit saw."""
+    """Score a set, with its shapes where they are, by its residual in each block that no fit saw."""
     # Beside the best set, whose rotor torque is what it is in the look.
     floor = step.floor * torque_loss_ratio(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
     # Shapes that are refined stay.
-    error = _unseen(hypothesis, floor, step.block, moving=not _late(hypothesis.chosen))
+    error = _unseen(hypothesis, floor, step.block, moving=not _lags(hypothesis.chosen))
     gain = step.above_floor + hypothesis.known.sum() - error.sum()
     return Scored(hypothesis.chosen, float(gain), error, np.zeros(0))
 
 
 def _unseen(hypothesis: System, floor: Array, block: IntArray, *, moving: bool = True) -> Array:
-    """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
+    """Compute the residual of each block that a fit of coefficients, and of moving shapes, did not see."""
     weight = floor / torque_loss_ratio(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
     arranged = scoring_matrix(hypothesis, (), weight)
     normal = folds(arranged.matrix, hypothesis.residual / weight, block, arranged.prior)

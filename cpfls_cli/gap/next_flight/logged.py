@@ -56,7 +56,7 @@ class Logging:
 
     `signals`: of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
     `commanded`: whether commands are logged in place of rotor speeds.
-    `floor`, shape (6,), N m and N: what noise leaves of a window.
+    `floor`, shape (6,), N m and N: standard deviation of window averages by noise.
     `off`: what formulas are off by, see `formulas_off`.
     `base`: of the model that misses something; None for the rigid body of the vehicle.
     """

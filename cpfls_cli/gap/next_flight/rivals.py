@@ -43,13 +43,13 @@ def require_visible(effects: Sequence[Effect], source: str, vehicle: VehicleSett
     if actuators and measured:
         raise InputError(
             f"{source}: {actuators[0]} shows if commands are logged instead of rotor speeds, {measured[0]} if "
-            "rotor speeds are measured; no single flight tells them apart. Log measured rotor speeds: they rule out "
+            "rotor speeds are measured; no single flight separates them. Log measured rotor speeds: they rule out "
             f"{actuators[0]}"
         )
 
 
 def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tuple[Question, ...]:
-    """Ask for every two effects, either way, whether they would be told apart at a usual size.
+    """Ask for every two effects, either way, whether they would be separated at a usual size.
 
     One effect alone asks whether it shows at all.
     """
@@ -60,7 +60,7 @@ def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tu
 
 
 def _is_open(question: Question) -> bool:
-    """Tell whether there is anything to tell: an effect is also what holds it as a special case."""
+    """Tell whether there is a question: an effect is also what holds it as a special case."""
     effect, rival = question.true.candidate.effect, question.rival
     return effect.kind != "parameter" and (rival is None or effect.name not in rival.holds)
 
@@ -90,21 +90,21 @@ def open_questions(
         for each in named
         if each.candidate is not None
     }
-    questions, beside = [], []
+    questions, others = [], []
     for rival in rivals:
         one = sized[rival.instead_of]
         besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
         other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
-        beside += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
-    questions += [each for each in beside if not _is_answered(each, flights, floor, settings)]
+        others += [Question(true, each, besides) for true, known in pair for each in _alike(true, known, flights)]
+    questions += [each for each in others if not _is_answered(each, flights, floor, settings)]
     once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
     asked = tuple(question for question in once.values() if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
 
 
-def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
+def _alike(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
     """List what else looks like an effect by the catalogue, and must not take the place of the rival."""
     others = (CATALOGUE[name] for name in true.candidate.effect.rivals if name != rival.name)
     known = (each for each in others if each.columns is not None and each.kind == true.candidate.effect.kind)
@@ -120,14 +120,14 @@ def _is_answered(question: Question, flights: Sequence[WeakFlight], floor: Array
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
-    """Fit effects together on flights; what the flights leave open stays small beside its bounds.
+    """Fit effects together on flights; what the flights leave open stays small against its bounds.
 
     `chosen`: their shapes are kept; `floor`: shape (6,), N m and N.
     """
     balance = system(flights, chosen)
     matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
     prior = known_before(balance)[: balance.base.shape[2]]
-    # Rows of the prior beside those of the flights.
+    # Rows of the prior below those of the flights.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
     linear = least_squares(matrix, np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))]))
     by_name = {each.effect.name: linear[place] for each, place in balance.places}

@@ -21,7 +21,7 @@ from cpfls_cli.weak_form.windows import windows
 
 @dataclass(frozen=True)
 class Goal:
-    """What the next flight has to tell, beside what is known from others.
+    """What the next flight has to show, given what is known from others.
 
     `known`: what the flights already flown say on each question; no blocks without such flights.
     `noise`: see `shared_noise`.
@@ -61,7 +61,7 @@ class Goal:
 
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
-    """Set up what the next flight has to tell.
+    """Set up what the next flight has to show.
 
     `flights`: that are there already.
     """
@@ -96,7 +96,7 @@ def next_flight(
     rng: np.random.Generator,
     progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None,
 ) -> NextFlight:
-    """Search for the path that tells most.
+    """Search for the most informative path.
 
     The best of some random paths is changed at random as long as that helps, by steps that shrink to nothing.
 

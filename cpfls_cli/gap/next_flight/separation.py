@@ -1,4 +1,4 @@
-"""How well flights tell rivals apart: how likely each is after them, by what it leaves of the one that is true."""
+"""How well flights separate rivals: how likely each is after them, by the residual that it leaves of the true one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SizedEffect:
 
 @dataclass(frozen=True)
 class Question:
-    """Whether an effect would be told from a rival, if it is the true one.
+    """Whether an effect would be separated from a rival, if it is the true one.
 
     `rival`: None: whether the effect shows at all, beyond the vehicle's own numbers.
     `besides`: effects that are there whichever is true; their coefficients are free.
@@ -82,7 +82,7 @@ class Evidence:
 
     @cached_property
     def left(self) -> Array:
-        """What the rival leaves of the true effect at its best, shape (block,), squared floors."""
+        """Least residual of the true effect under the rival, shape (block,), squared floors."""
         return min((self._left(rival) for rival in self.rivals), key=lambda left: float(left.sum()))
 
     @cached_property
@@ -119,7 +119,7 @@ class Evidence:
 
 
 def formulas_off(hypothesis: System, floor: Array) -> float:
-    """Estimate what formulas are off by, by what effects leave above the floor of the flights that they were named in.
+    """Estimate what formulas are off by, from the residual above the floor of the flights that effects were named in.
 
     `floor`: shape (6,), N m and N; Result: mean square, as a share of that of what the effects explain.
     """
@@ -160,7 +160,7 @@ class Answer:
 
     `own`, `likely`: how likely the true effect and the rival are expected to be after them, among all rivals of the
     true one.
-    `sure`: probability that the rival is then so rare beside the true effect that it is no rival.
+    `sure`: probability that the rival is then so unlikely against the true effect that it is no rival.
     """
 
     evidence: Evidence
@@ -187,7 +187,7 @@ class Answer:
 
 
 def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
-    """Foretell the table of how likely each set of effects is where one effect is true, over draws of the noise.
+    """Predict the table of how likely each set of effects is where one effect is true, over draws of the noise.
 
     `evidence`: on each of its rivals, of the same flights; `noise`: see `shared_noise`.
     """

@@ -97,12 +97,12 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
         given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
     different = set(without_copies(recordings))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
-    beside = tuple(
+    known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}
         for number, each in enumerate(given.repeats.beside)
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
-    return replace(given, repeats=Repeats(beside, likeness))
+    return replace(given, repeats=Repeats(known, likeness))
 
 
 def air(

@@ -1,4 +1,4 @@
-"""A narrow band that stands out of the smooth spectrum of a residual, and whether it feeds the motion."""
+"""A narrow band above the smooth spectrum of a residual, and whether it feeds the motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MEDIAN_CYCLES = 24
 
 @dataclass(frozen=True)
 class NarrowBand:
-    """The narrow band that stands out most.
+    """The most significant narrow band.
 
     `channel`: one of `CHANNELS`.
     `share`: of the variance of the channel, above the background.
@@ -61,7 +61,7 @@ def narrow_band(
     rng: np.random.Generator,
     significance: float = 1.0,
 ) -> NarrowBand | None:
-    """Search for one narrow band that stands out of the smooth spectrum of the residual.
+    """Search for one narrow band above the smooth spectrum of the residual.
 
     The periodogram over all flights is divided by its background; the largest ratio of all frequencies and channels is
     compared with that of noise drawn from the background. Rows from windows of 0.4 s at a hop of 0.2 s show lines up

@@ -22,7 +22,7 @@ _WORST_SHARE = 0.1
 """Of the time is called worst."""
 
 _LONGEST_PAUSE_S = 1.0
-"""With pauses up to this long in it, over which what is left is averaged: a zero crossing makes no gap small."""
+"""With pauses up to this long in it, over which the residual is averaged: a zero crossing makes no gap small."""
 
 
 class GapStretch(NamedTuple):
