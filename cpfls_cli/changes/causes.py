@@ -19,15 +19,15 @@ class Cause:
     """A change and its directions in the numbers of a flight.
 
     `name`: what changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
-    `directions`, shape (number, size): of each size of it, the first of which is told, for as much as is usual where it
-    happens.
+    `directions`, shape (number, size): of each size of it, the first of which is reported, for as much as is usual
+    where it happens.
     `usual`: the first size, in its unit, where it happens: standard deviation of a normal prior.
-    `prior`: beside the others, of the belief in it.
-    `searched`: the same where it is searched for; 0 where another way in which it shows stands for it.
+    `prior`: of the belief in it, relative to the others.
+    `searched`: the same where it is searched for; 0 where another way in which it shows replaces it.
     `losses`: of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than
     none.
-    `told`: of the first so many sizes: they have the unit of the cause.
-    `ratio`: 1 where what is told shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
+    `reported`: how many of the first sizes have the unit of the cause.
+    `ratio`: 1 where the size shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Cause:
     prior: float = 1.0
     searched: float = 1.0
     losses: int = 0
-    told: int = 1
+    reported: int = 1
     ratio: int = 0
 
     def size(self, shown: float) -> float:
@@ -69,10 +69,10 @@ _OF_YAW = 0.2
 """By how much its drag changes by another share than its thrust, of that share."""
 
 _RARER = 0.5
-"""Prior of two rotors beside that of one."""
+"""Prior of two rotors relative to that of one."""
 
 _SHAKES = 1.0
-"""Logarithm of vibration beside the reference, of something that came loose or out of balance."""
+"""Logarithm of vibration relative to the reference, of something that came loose or out of balance."""
 
 _OF_AXIS = 0.5
 """Of that, by how much each axis differs from the others."""
@@ -85,7 +85,7 @@ _IN_WASH = 0.5
 """Probability that what hangs near a rotor takes of its thrust."""
 
 _ON_ARMS = (1 / 3, 2 / 3)
-"""Of the way from the middle to a rotor: places of a mass, beside those half way between two rotors."""
+"""Of the way from the middle to a rotor: places of a mass, and half way between two rotors."""
 
 _OFF_CENTRE = 0.1
 """Of the arm: by how much a centre of mass moves."""
@@ -103,13 +103,13 @@ _ALONE = {
     "scale": (0.1, "1"),
     "battery": (0.05, "1"),
 }
-"""Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
+"""Of kinds of which each number is a cause: how much it changes where it does, and its unit."""
 
 _ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
 _ONE_TOO = ("unbalance",)
-"""Of these the kinds of which one number can change as well: rotors that turn alike are hardly told apart."""
+"""Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
 
 _AT_ONCE = ("lean", "drift")
 """Kinds of which all numbers change at once, each by itself."""
@@ -144,7 +144,7 @@ class _Numbers:
         return [name for name in self.names if name.split()[0] == kind]
 
     def direction(self, changes: Mapping[str, float]) -> Array:
-        """Give what changes, shape (number,); what is not told is left out."""
+        """Give what changes, shape (number,); what is not known is left out."""
         return np.array([changes.get(name, 0.0) for name in self.names])
 
     def loads(self, of: Array) -> Array:
@@ -158,17 +158,17 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
     arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     arm = float(np.linalg.norm(arms, axis=1).mean())
     lever = arms[:, ::-1] ** 2 / np.maximum((arms**2).sum(axis=0)[::-1], 1e-12)
-    beside = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw)]
+    yaw = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw)]
     single = []
     for index, (roll, pitch) in enumerate(lever):
         # It turns the body less too, as far as it drives roll and pitch.
         weaker = numbers.direction({"follow roll": -roll, "follow pitch": -pitch})
         single.append(_LOSS * (loads(own.rotor[index]) + weaker))
-        yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *beside], axis=1), _LOSS, "1", losses=1, ratio=-1)
+        yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *yaw], axis=1), _LOSS, "1", losses=1, ratio=-1)
     for one, other in combinations(range(len(single)), 2):
-        columns = np.stack([single[one], single[other], *beside], axis=1)
+        columns = np.stack([single[one], single[other], *yaw], axis=1)
         yield Cause(
-            f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, _RARER, losses=2, told=2, ratio=-1
+            f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, _RARER, losses=2, reported=2, ratio=-1
         )
     moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
     yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", 0.5, ratio=1)
@@ -182,11 +182,11 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         for besides in ([], moved):
             swung = np.stack([hangs, *besides], axis=1)
             yield Cause("load on a cable", swung, _HEAVIER, "1", 0.5, 0.5, losses=1)
-    yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
+    yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", reported=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     share = 1 / len(arms)
     for index, place in enumerate(arms):
-        # In hover hardly another thing than a rotor that pulls less, and what stands in its wash makes it do so.
+        # In hover hardly another thing than a rotor that pulls less, and what hangs in its wash makes it do so.
         hung, prior = _HEAVIER * _hung(numbers, vehicle, place), (1 - _IN_WASH) * share
         weight = Cause(f"weight near M{index + 1}", hung[:, None], _HEAVIER, "1", prior, share, losses=1)
         yield weight
@@ -222,7 +222,7 @@ def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
 
 
 def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
-    """List what numbers of a kind tell by themselves."""
+    """List the causes of single numbers of a kind."""
     usual, unit = _ALONE[kind]
     each = [usual * numbers.direction({name: 1.0}) for name in numbers.of_kind(kind)]
     if not each:
@@ -232,7 +232,7 @@ def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
         columns = [together, *(_ALIKE[kind] * column for column in each)]
         yield Cause(kind, np.stack(columns, axis=1), usual, unit)
     elif kind in _AT_ONCE:
-        yield Cause(kind, np.stack(each, axis=1), usual, unit, told=len(each))
+        yield Cause(kind, np.stack(each, axis=1), usual, unit, reported=len(each))
     if kind in _ONE_TOO or kind not in (*_ALIKE, *_AT_ONCE):
         for name, column in zip(numbers.of_kind(kind), each, strict=True):
             yield Cause(name, column[:, None], usual, unit)

@@ -1,4 +1,4 @@
-"""Whether flights of today are those of an unchanged vehicle, and which change they tell of."""
+"""Whether flights of today are those of an unchanged vehicle, and which change they show."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ NAMED = 0.95
 """Share of the belief from which on a change is named; below, it is one of several that look alike."""
 
 LISTED = 0.03
-"""Share of the belief from which on a change is told to look alike."""
+"""Share of the belief from which on a change is said to look alike."""
 
 _MOST = 3
 """Changes at once."""
@@ -53,8 +53,8 @@ less the larger it is, for large numbers of an unchanged vehicle, a t, are rare 
 
 _DRAWS, _POWER = 2000, 0.9
 _SHOWN, _SIZES = 100, np.geomspace(0.05, 3.0, 28)
-"""Draws and sizes, in what is usual of a change, that tell which one shows: neighbours differ by a sixth. One of which
-three times what is usual does not show cannot be told."""
+"""Draws and sizes, in what is usual of a change, for the smallest that shows: neighbours differ by a sixth. One of
+which three times what is usual does not show is not found."""
 
 _IN_COMMON = 0.8
 """Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
@@ -64,7 +64,7 @@ _NODES, _MOST_NODES = 8, 256
 """Of the scatter of one kind, and at most so many of kinds that go together: densities within 3 %."""
 
 _FARTHEST = 20.0
-"""Deviations up to which they tell how improbable numbers are."""
+"""Deviations up to which densities are right."""
 
 _NONE = np.arange(0)
 _HALF_WIDTH = 1.96
@@ -97,16 +97,16 @@ def changed(
 ) -> Changed:
     """Hold flights of today against reference flights.
 
-    Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
+    Each change that is possible is a normal distribution of its sizes against that of unchanged flights, a multivariate
     t; its evidence is the ratio of both densities. It may be there from any flight of today on. The largest evidence
-    counts, against the largest that unchanged flights have, searched alike. Beside that each number is held against its
+    counts, against the largest that unchanged flights have, searched alike. Besides, each number is held against its
     own limit, whatever is known to change it. The only threshold is the rate of false alarms, half of it for each test.
 
     `today`, `before`: at least one each; today's of one day. Raises InputError if the flights have no number in common.
     """
     names = common_numbers([*before, *today])
     if not names:
-        raise InputError("flights of today and of the reference tell no number in common; import the same signals")
+        raise InputError("flights of today and of the reference have no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
         names = tuple(name for name in names if not name.startswith("load "))
     reference = Reference.of(before, names, vehicle)
@@ -155,7 +155,7 @@ def _in_common(reference: Reference, today: Sequence[FlightNumbers]) -> tuple[fl
 def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightNumbers]) -> bool:
     """Tell whether a ratio that may be zero is nearer to that than to what it is in the reference.
 
-    One that is only told badly, as in a quiet hover, agrees with the reference as well as with zero.
+    One that is badly identified, as in a quiet hover, agrees with the reference as well as with zero.
     """
     usual = float(np.mean([own.values[name] for own in before]))
     # The scale of a gyroscope is the inverse of the ratio that is fitted.
@@ -172,7 +172,7 @@ def judged(
 ) -> Judged:
     """Hold flights of today against a reference, as `changed`.
 
-    `starts`: flights from which on it may be changed, up to the last: the most telling one counts, as it does in
+    `starts`: flights from which on it may be changed, up to the last: the clearest one counts, as it does in
     chance.
     """
     names = reference.names
@@ -182,9 +182,9 @@ def judged(
 
     def held(flights: Sequence[FlightNumbers], asked: int) -> _Held:
         """Hold flights against what they, and no others of today, can be off by."""
-        beside, own = reference.apart(flights)
+        rows, own = reference.apart(flights)
         space = _Space(own, reference.freedom, listed, kinds)
-        mean = space.whitened(beside.mean(axis=0))
+        mean = space.whitened(rows.mean(axis=0))
         return _Held(
             space,
             mean,
@@ -241,7 +241,7 @@ def drawn_by_chance(
 
 
 def beyond_chance(chance: Array, value: float) -> float:
-    """Tell how probable a value of at least this size is, held against draws of chance."""
+    """Compute how probable a value of at least this size is, held against draws of chance."""
     return float((1 + (chance >= value).sum()) / (1 + len(chance)))
 
 
@@ -275,38 +275,40 @@ class _Space:
         """Compute the logarithm of the largest evidence of a change, shape (row,)."""
         return np.asarray((self.evidence(rows, self.searched) + self.searched_prior[:, None]).max(axis=0))
 
-    def evidence(self, rows: Array, of: Sequence[int], beside: Array | None = None) -> Array:
+    def evidence(self, rows: Array, of: Sequence[int], given: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of changes, without what was believed before, shape (cause, row).
 
         `rows`, shape (number, row): whitened.
-        `beside`, shape (number, size): whitened directions of changes that are there anyway.
+        `given`, shape (number, size): whitened directions of changes that are there anyway.
         """
-        base = rows[:, :0] if beside is None else beside
-        told: dict[tuple[bytes, ...], Array] = {}
+        base = rows[:, :0] if given is None else given
+        known: dict[tuple[bytes, ...], Array] = {}
 
         def density(own: Array, losses: int) -> Array:
-            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), told)
+            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), known)
 
         widths = np.log([[share] for _, share in _WIDTHS])
         each = [
             _total(widths + [density(width * self.white[index], self.listed[index].losses) for width, _ in _WIDTHS])
             for index in of
         ]
-        return np.array(each) - self._density(rows, base, _NONE, told)
+        return np.array(each) - self._density(rows, base, _NONE, known)
 
-    def _density(self, rows: Array, directions: Array, losses: IntArray, told: dict[tuple[bytes, ...], Array]) -> Array:
+    def _density(
+        self, rows: Array, directions: Array, losses: IntArray, known: dict[tuple[bytes, ...], Array]
+    ) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
         `losses`, shape (loss,): directions whose sizes are nearly always above 0.
-        `told`: densities of parts, which changes have in common; what is not there is added.
+        `known`: densities of parts, which changes have in common; what is not there is added.
         """
         total = np.zeros(rows.shape[1])
         for kinds, columns in self._parts(directions):
             own, lost = directions[:, columns], np.flatnonzero(np.isin(columns, losses, assume_unique=True))
             key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
-            if key not in told:
-                told[key] = _total(self._posterior(rows, own, kinds, lost)[0])
-            total += told[key]
+            if key not in known:
+                known[key] = _total(self._posterior(rows, own, kinds, lost)[0])
+            total += known[key]
         return total
 
     def _parts(self, directions: Array) -> list[tuple[list[IntArray], IntArray]]:
@@ -328,9 +330,9 @@ class _Space:
     def _posterior(
         self, rows: Array, directions: Array, kinds: Sequence[IntArray], losses: IntArray
     ) -> tuple[Array, Array, Array]:
-        """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
+        """Integrate over sizes, at nodes of how far each kind scatters relative to what was learned.
 
-        Each kind is a multivariate t of its own: that the others scatter little tells nothing of it.
+        Each kind is a multivariate t of its own: it is independent of how the others scatter.
 
         `rows`, shape (number, row): whitened.
         `losses`, shape (loss,): directions whose sizes are nearly always above 0.
@@ -356,17 +358,17 @@ class _Space:
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Estimate, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
 
-        What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
+        Any reported size counts as as likely; a prior of what is usual would draw large ones in.
         """
         first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
-        told = np.arange(first, first + self.listed[of].told)
+        own = np.arange(first, first + self.listed[of].reported)
         directions = np.hstack([self.white[index] for index in chosen])
-        directions[:, told] *= _ANY
-        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(told, columns).any()]
+        directions[:, own] *= _ANY
+        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(own, columns).any()]
         logarithm, means, covariance = self._posterior(row[:, None], directions, list(chain(*moved)), _NONE)
         share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
-        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
+        means, variances = means[:, own, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, own]
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
@@ -383,9 +385,9 @@ class _Space:
 
         def is_enough(size: float) -> bool:
             rows = drawn + size * self.white[index][:, :1]
-            told = self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold
+            clear = self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold
             beyond = (np.abs(self.deviations(rows)) > limit[:, None]).any(axis=0)
-            return bool(np.mean(told | beyond) >= _POWER)
+            return bool(np.mean(clear | beyond) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
@@ -436,7 +438,7 @@ def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
 def _losing(mean: Array, variance: Array) -> Array:
     """Compute the logarithm of what the sign of losses adds to a density, shape (scale, row).
 
-    Of two losses as if neither told of the other.
+    Of two losses as if they were independent.
 
     `mean`: shape (scale, loss, row); `variance`, shape (scale, loss): of the size of each.
     """
@@ -447,7 +449,7 @@ def _losing(mean: Array, variance: Array) -> Array:
 
 
 def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]]:
-    """Name one change after another while each explains more than chance beside the others.
+    """Name one change after another while each is significant conditional on the others.
 
     Where something is off and no change by itself explains it, the first counts on credit: two at once hide each
     other.
@@ -455,7 +457,7 @@ def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]
     space, row, _, _ = held
     chosen: list[int] = []
     while len(chosen) < _MOST:
-        evidence = _beside(space, row, space.searched, chosen) + space.searched_prior
+        evidence = _evidence_given(space, row, space.searched, chosen) + space.searched_prior
         best = int(np.argmax(evidence))
         if chosen and beyond_chance(chance, float(evidence[best])) > EACH_TEST:
             break
@@ -501,8 +503,8 @@ def _by_name(space: _Space, beliefs: Array) -> dict[str, float]:
 
 
 def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
-    """Compute the belief in each change beside those that are there, shape (cause,)."""
-    evidence = _beside(space, row, range(len(space.listed)), there) + space.prior
+    """Compute the belief in each change given those that are there, shape (cause,)."""
+    evidence = _evidence_given(space, row, range(len(space.listed)), there) + space.prior
     share = np.exp(evidence - evidence.max())
     return np.asarray(share / share.sum())
 
@@ -510,9 +512,9 @@ def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
 def _since(space: _Space, apart: Array, found: Sequence[Cause], starts: Sequence[int]) -> int:
     """Find the flight before which flights are nearest to the reference, and from which on to each other.
 
-    Along what was found: what else flights of a day have in common tells nothing of it.
+    Along what was found: what else flights of a day have in common says nothing of it.
     """
-    along = np.hstack([space.whitened(cause.directions[:, : cause.told]) for cause in found])
+    along = np.hstack([space.whitened(cause.directions[:, : cause.reported]) for cause in found])
     shown = space.whitened(apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
 
     def apart_from(start: int) -> float:
@@ -522,11 +524,11 @@ def _since(space: _Space, apart: Array, found: Sequence[Cause], starts: Sequence
     return min(starts, key=apart_from)
 
 
-def _beside(space: _Space, row: Array, of: Sequence[int], there: Sequence[int]) -> Array:
-    """Compute the logarithm of the evidence of changes beside those that are there, shape (cause,)."""
-    beside = np.hstack([space.white[index] for index in there]) if there else None
+def _evidence_given(space: _Space, row: Array, of: Sequence[int], there: Sequence[int]) -> Array:
+    """Compute the logarithm of the evidence of changes given those that are there, shape (cause,)."""
+    given = np.hstack([space.white[index] for index in there]) if there else None
     names = {space.listed[index].name for index in there}
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
     causes_of = [space.listed[index] for index in of]
     known = [cause.name in names or bool(cause.rotors & rotors) for cause in causes_of]
-    return np.where(known, -np.inf, space.evidence(row[:, None], of, beside)[:, 0])
+    return np.where(known, -np.inf, space.evidence(row[:, None], of, given)[:, 0])

@@ -1,4 +1,4 @@
-"""What one flight tells of its vehicle in numbers that another flight of the same vehicle tells alike."""
+"""Numbers of one flight that are alike in another flight of the same vehicle."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Kind:
 
     `unit`: of a number; 1 for logarithms of ratios.
     `apart`, `together`: standard deviations from day to day of a vehicle that nobody changed: of each number by itself,
-    and of all numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
+    and of all numbers of the kind alike. What is usual where reference flights are too few.
     `agile`: by how much numbers differ in flights that are flown e times as agile: standard deviation, half of its
     variance in common.
     """
@@ -69,7 +69,7 @@ KINDS: dict[str, Kind] = {
     "lean": Kind("m/s^2", 0.3, 0.0, 0.1),
     # Mean of the accelerometer, along z less gravity.
     "felt": Kind("m/s^2", 0.05, 0.0, 0.05),
-    # Mean rate of the gyroscope beside the attitude's.
+    # Mean rate of the gyroscope less the attitude's.
     "drift": Kind("rad/s", 0.01, 0.0, 0.005),
     # Mass that swings on a cable over that of the vehicle.
     "swing": Kind("1", 0.02, 0.0, 0.02),
@@ -81,17 +81,17 @@ KINDS: dict[str, Kind] = {
 """Of each number the first word of its name."""
 
 _SHORTEST_S = 4.0
-"""Of flight, below which it tells nothing."""
+"""Of flight, below which it has no numbers."""
 
 _BLOCKS = 8
-"""That errors are told by."""
+"""Of a flight, for errors."""
 
 _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
 
 _TURNS_S, _ALIKE = 1.0, 0.03
-"""Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are told apart. Of those that turn more alike
+"""Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are separated. Of those that turn more alike
 each has its share, by the squared size below which a difference of theirs counts as none."""
 
 _WINDOW_S, _SWING_S = 0.12, 0.4
@@ -222,14 +222,14 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyros
     if duration < _SHORTEST_S:
         raise InputError(
             f"{name}: flies for {duration:.2g} s of {len(signals) * signals.period:.3g} s, and {_SHORTEST_S:g} s are"
-            f" the least that tell anything{''.join(f'; {why}' for why in flown(signals).cut)}"
+            f" the least{''.join(f'; {why}' for why in flown(signals).cut)}"
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
     below, unsure = [], {}
     cable, swing = _swing(signals, flies)
-    for names, told, error, *ratios in (*_told(signals, flies, has_gyroscope), swing):
-        for index, (each, value, apart) in enumerate(zip(names, told, error, strict=True)):
+    for names, estimates, error, *ratios in (*_estimates(signals, flies, has_gyroscope), swing):
+        for index, (each, value, apart) in enumerate(zip(names, estimates, error, strict=True)):
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
             elif np.isinf(value):
@@ -262,7 +262,7 @@ def in_flight(signals: Signals) -> BoolArray:
 
 
 def _agility(signals: Signals, flies: BoolArray) -> float:
-    """Tell how a flight is flown: the acceleration beside its mean that its attitude and thrust ask for.
+    """Compute how agile a flight is: acceleration that attitude and thrust ask for, about its mean.
 
     Of windows, so that noise counts little.
     """
@@ -288,7 +288,7 @@ _Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array
 """Names, values, errors, and of logarithms that a flight may lack the ratios that they are of."""
 
 
-def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
+def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
     rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
     yield _averaged([f"load {name}" for name in rotors], _loads(signals), flies, np.log)
     if signals.rotor_command is not None:
@@ -357,7 +357,7 @@ def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None
 
 
 def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
-    """Tell the amplitude of what turns with each rotor, m/s^2, whatever the log's rate makes of its frequency.
+    """Estimate the amplitude of what turns with each rotor, m/s^2, whatever the log's rate makes of its frequency.
 
     An unbalanced rotor pulls once a turn. Between samples it turns many times, but by its measured speed it is known
     where it stands at each sample (synchronous averaging).
@@ -397,14 +397,14 @@ def _less_gravity(signals: Signals) -> Array:
 
 
 def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
-    """Tell how late each rotor's speed follows its command, which no gust disturbs."""
+    """Estimate the lag of each rotor's speed behind its command, which no gust disturbs."""
     own, inside = _windows(signals, flies, _WINDOW_S)
     if inside.sum() < FEWEST_WINDOWS:
         return [], np.zeros(0), np.zeros(0)
     assert signals.rotor_command is not None, "asked for"
     found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
-    told = _STEP_S * found[:, 1]
-    return [f"answer {name}" for name in rotors], told[0], _delay_error(told[1:])
+    delays = _STEP_S * found[:, 1]
+    return [f"answer {name}" for name in rotors], delays[0], _delay_error(delays[1:])
 
 
 def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
@@ -415,7 +415,7 @@ def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windo
 
 
 def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
-    """Tell how rotation follows the rotors' torque: how much, how late, and what is left of it."""
+    """Estimate how rotation follows the rotors' torque: tracking gain, delay and residual."""
     own, inside = _windows(signals, flies, _WINDOW_S)
     if inside.sum() < FEWEST_WINDOWS:
         return
@@ -428,8 +428,8 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     moments = np.diag(inertia)
     with np.errstate(divide="ignore"):
         gusts = np.log(found[:, 2] / moments)
-    told = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
-    for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
+    estimates = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
+    for kind, values in zip(("follow", "late", "gusts"), estimates.transpose(1, 0, 2), strict=True):
         with np.errstate(invalid="ignore"):
             error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
         names = [f"{kind} {axis}" for axis in _ROTATIONS]
@@ -474,12 +474,12 @@ def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, per
 
 
 def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
-    """Fit what follows to what drives it at each delay: gain, best delay in steps, what is left, shape (3, column).
+    """Fit what follows to what drives it at each delay: gain, best delay in steps, residual, shape (3, column).
 
     A delay at the end of what is tried is not known.
 
-    Beside what goes with the other columns, and with those that nothing follows: of a weak rotor thrust turns the body
-    too, and so does each torque about all axes.
+    Conditional on the other columns, and on those that nothing follows: of a weak rotor thrust turns the body too, and
+    so does each torque about all axes.
 
     `count`: of windows.
     `sums`: shape (delay, drive and column).
@@ -546,8 +546,8 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     """Regress the horizontal force on the pull of a load that swings under the vehicle, on the cable that fits best.
 
-    Beside a constant force and a drag. What drives the swing is the vehicle's own motion, so a load shows by what comes
-    a period later. The length of the cable, m, comes with it.
+    Jointly with a constant force and a drag. What drives the swing is the vehicle's own motion, so a load shows by what
+    comes a period later. The length of the cable, m, comes with it.
     """
     # Slow to load, and who reads a record computes nothing.
     from scipy.optimize import minimize
@@ -557,7 +557,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
     assert signals.thrust is not None, "rotor speeds are there"
-    # Beside the vehicle's own mass, for a load's is a share of that.
+    # Over the vehicle's own mass, for a load's is a share of that.
     drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
@@ -592,7 +592,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
 
 
 def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, float]:
-    """Fit a pull beside a constant and a drag along each axis: its size, and the squares that it explains."""
+    """Fit a pull jointly with a constant and a drag along each axis: its size, and the squares that it explains."""
     sides = []
     for axis in range(2):
         known = np.column_stack([np.ones(len(left)), drag[:, axis]])

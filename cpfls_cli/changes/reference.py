@@ -1,4 +1,4 @@
-"""What flights of an unchanged vehicle differ by among themselves: the floor that a change has to stand above."""
+"""What flights of an unchanged vehicle differ by among themselves: the floor that a change has to exceed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 FEWEST = 3
-"""Reference flights that tell their scatter; of fewer, what is usual has to stand for it."""
+"""Reference flights that identify their scatter; of fewer, what is usual replaces it."""
 
 _DAYS = 6.0
 """Reference flights that what is usual counts as."""
 
 _SCALE_ERROR = 0.8
-"""By how much numbers of a kind scatter beside what is usual, from vehicle to vehicle: deviation of the logarithm, of
-loads, vibration and batteries of four."""
+"""By how much numbers of a kind scatter relative to what is usual, from vehicle to vehicle: deviation of the logarithm,
+of loads, vibration and batteries of four."""
 
 _FEWEST_LEFT = 4.0
-"""Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more: one kind of numbers in
+"""Degrees of freedom of what is usual of vehicles, where there is hardly any reference flight: one kind of numbers in
 a hundred then scatters by more than 3.7 times what is usual. Of four vehicles none did by more than one and a half."""
 
 FALSE_ALARM = 0.01
@@ -36,7 +36,7 @@ _OFFSET_M = 0.001
 """By which the centre of mass lies elsewhere from day to day: a battery put back."""
 
 _BY_VOLTAGE, _VOLTAGE_ERROR = {"load": -1.0, "turn": 1.0}, 1.0
-"""Power of the voltage that numbers of commands go with, and how far that is off, before any flight tells: none where
+"""Power of the voltage that numbers of commands go with, and how far that is off, before any flight: none where
 the autopilot makes up for the battery, the square where it does not."""
 
 
@@ -48,9 +48,9 @@ _CALM = 1.0
 class Reference:
     """Numbers of reference flights: their mean and covariance.
 
-    `names`: numbers that all flights tell, today's too.
+    `names`: numbers that all flights have, today's too.
     `mean`: shape (number,).
-    `covariance`, shape (number, number): of the mean of flights of one other day beside that of the reference.
+    `covariance`, shape (number, number): of the mean of flights of one other day less that of the reference.
     `freedom`, shape (number,): degrees of freedom of the covariance; of numbers of a kind the same.
     `measured`, shape (number,): mean variance by which a number of one flight is off, by its blocks; it is in the
     covariance.
@@ -81,7 +81,7 @@ class Reference:
         A conjugate prior (inverse Wishart, in blocks by kind) holds what is usual from day to day; it counts as six
         flights. The covariance is that of the predictive distribution, a multivariate t. Numbers go with how agile
         flights are flown by a regression with a prior of its own: where the reference flights are all flown alike,
-        flights that are not tell the less the more they differ.
+        flights that are not count the less the more they differ.
 
         `names`: numbers to take, which all of them have.
         Reference: Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
@@ -108,12 +108,12 @@ class Reference:
         in the covariance. It is that of their mean: flights of a day have their day in common.
         """
         values = np.array([[flight.values[name] for name in self.names] for flight in flights])
-        # Flights that tell a number worse than those of the reference do.
-        beside = _measured(flights, self.names) / len(flights) - self.measured
+        # Flights with a larger error than those of the reference.
+        excess = _measured(flights, self.names) / len(flights) - self.measured
         more = self.more_agile(flights)
         values -= np.outer(more, self.by_agility)
         unlike = np.abs(more).mean() * self.agility_error
-        covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
+        covariance = self.covariance + np.diag(np.maximum(excess, 0.0))
         covariance += np.outer(unlike, unlike) * 0.5 * (_alike(self.names) + np.eye(len(self.names)))
         voltage = np.array([flight.voltage for flight in flights])
         if np.isfinite(self.voltage) and np.isfinite(voltage).all():
@@ -166,20 +166,20 @@ def either(*p_values: float) -> float:
 
 
 def common_numbers(flights: Sequence[FlightNumbers]) -> tuple[str, ...]:
-    """List the numbers that all flights tell, in the order of the first."""
+    """List the numbers that all flights have, in the order of the first."""
     return tuple(name for name in flights[0].values if all(name in flight.values for flight in flights))
 
 
 def expected_covariance(flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Array:
     """Compute the covariance that is expected of flights before any of them is seen, shape (number, number)."""
-    # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
+    # Scatter of flights holds the error of each; what is usual from day to day is added.
     return usual_covariance(names, vehicle) + np.diag(_measured(flights, names))
 
 
 def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, Array]:
     """Learn the covariance of flights from what is expected and what is seen, and degrees of freedom of each number.
 
-    What is expected of a kind counts as six flights, at a scale that the numbers of the kind tell together.
+    What is expected of a kind counts as six flights, at a scale that the numbers of the kind identify together.
 
     `apart`, shape (row, number): whose squares add up to the covariance, times the degrees of freedom that they have.
     """
@@ -193,11 +193,11 @@ def learned_covariance(apart: Array, freedom: float, expected: Array, names: Seq
 
 
 def _scale(expected: Array, seen: Array, freedom: float) -> tuple[float, float]:
-    """Tell by how much numbers of a kind vary beside what is expected of them, a ratio, and the freedom that is left.
+    """Estimate by how much numbers of a kind vary against what is expected, a ratio, and the remaining freedom.
 
     The posterior mean of its logarithm, by the marginal likelihood of what is seen where each covariance is drawn from
-    an inverse Wishart distribution about that scale: numbers of a kind tell it together, and few flights hardly do. How
-    unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
+    an inverse Wishart distribution about that scale: numbers of a kind identify it together, and few flights hardly do.
+    How unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
 
     `expected`: shape (number, number).
     `seen`, shape (number, number): sum of squares, of so many degrees of freedom.
@@ -206,8 +206,8 @@ def _scale(expected: Array, seen: Array, freedom: float) -> tuple[float, float]:
     logarithms = np.linspace(-4.0, 4.0, 81) * 2 * _SCALE_ERROR
     beyond = np.maximum(np.linalg.eigvals(np.linalg.solve(expected, seen)).real, 0.0)
     strength = _DAYS + len(beyond) - 1
-    told = np.log(_DAYS * np.exp(logarithms)[:, None] + beyond).sum(axis=1)
-    likely = 0.5 * (strength * len(beyond) * logarithms - (strength + freedom) * told)
+    determinant = np.log(_DAYS * np.exp(logarithms)[:, None] + beyond).sum(axis=1)
+    likely = 0.5 * (strength * len(beyond) * logarithms - (strength + freedom) * determinant)
     likely -= 0.5 * (logarithms / (2 * _SCALE_ERROR)) ** 2
     share = np.exp(likely - likely.max())
     share /= share.sum()
@@ -288,7 +288,7 @@ def _by_agility(
 ) -> tuple[Array, Array, Array, float, float]:
     """Regress numbers on the logarithm of how agile flights are flown.
 
-    Result `rows`, shape (row, number): what is left, and what the prior adds.
+    Result `rows`, shape (row, number): residuals, and what the prior adds.
     Result `slope`, `prior`, shape (number,): and the variance of the slope before any flight.
     Result `agility`, `spread`: mean of the logarithm, and the sum of squares about it.
     """
@@ -297,10 +297,10 @@ def _by_agility(
     agility = float(more.mean())
     if not np.isfinite(agility):
         return values, np.zeros(len(names)), prior, agility, 0.0
-    beside = more - agility
-    spread = float(beside @ beside)
-    slope = beside @ values / (spread + noise / prior)
-    return np.vstack([values - np.outer(beside, slope), slope * np.sqrt(noise / prior)]), slope, prior, agility, spread
+    centred = more - agility
+    spread = float(centred @ centred)
+    slope = centred @ values / (spread + noise / prior)
+    return np.vstack([values - np.outer(centred, slope), slope * np.sqrt(noise / prior)]), slope, prior, agility, spread
 
 
 def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: Array) -> tuple[Array, Array, float]:

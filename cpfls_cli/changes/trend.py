@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ruptures import KernelCPD
 
 _DRAWS = 1000
-"""Rows of unchanged flights that chance is told by."""
+"""Rows of unchanged flights that chance is drawn from."""
 
 _AT_ONCE = 3
 """Change points whose gain is shared when a row is held against chance."""
@@ -63,7 +63,7 @@ def trend(
     turned = [(flight.name, [name for name in flight.reversed if name in names]) for flight in without]
     if len(kept) < (reference or FEWEST) + 1:
         raise InputError(
-            f"flights that tell the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
+            f"flights with the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
             "those of the reference and one more"
         )
     first = reference or max(FEWEST, len(kept) // 2)
@@ -108,19 +108,19 @@ def trend(
 
 
 def most_complete(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
-    """Choose the numbers and the flights that tell all of them such that they are the most together."""
-    told = list(dict.fromkeys(name for flight in flights for name in flight.values))
+    """Choose the numbers, and the flights that have all of them, such that they are the most together."""
+    every = list(dict.fromkeys(name for flight in flights for name in flight.values))
     if {flight.commanded for flight in flights} == {True, False}:
-        told = [name for name in told if not name.startswith("load ")]
-    count = {name: sum(name in flight.values for flight in flights) for name in told}
+        every = [name for name in every if not name.startswith("load ")]
+    count = {name: sum(name in flight.values for flight in flights) for name in every}
     best: tuple[tuple[str, ...], list[FlightNumbers]] = ((), [])
     for least in sorted(set(count.values()), reverse=True):
-        names = tuple(name for name in told if count[name] >= least)
+        names = tuple(name for name in every if count[name] >= least)
         kept = [flight for flight in flights if all(name in flight.values for name in names)]
         if len(names) * len(kept) > len(best[0]) * len(best[1]):
             best = names, kept
     if not best[0]:
-        raise InputError("the flights tell no number in common; import the same signals")
+        raise InputError("the flights have no number in common; import the same signals")
     return best
 
 
@@ -168,7 +168,7 @@ class Row:
     `expected`, shape (number, number): covariance of a flight before any is seen.
     `voltage`, shape (flight, number): standard deviation of what numbers of a kind have in common by the voltage, whose
     effect is not known well.
-    `noise`, shape (flight, number): standard deviation of what a flight tells worse than others do.
+    `noise`, shape (flight, number): standard deviation by which a flight is less certain than others.
     `agility`, shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of
     its variance numbers of a kind have in common.
     """

@@ -1,4 +1,4 @@
-"""Two vectors that should be the same: axes swapped, reversed or missing, and the gyroscope beside the attitude."""
+"""Two vectors that should be the same: axes swapped, reversed or missing, and the gyroscope against the attitude."""
 
 from collections.abc import Iterator
 from math import log, pi

@@ -1,4 +1,4 @@
-"""Whether a log is right: one check, whose findings every command tells."""
+"""Whether a log is right: one check, whose findings every command reports."""
 
 from collections.abc import Iterator, Sequence
 
@@ -33,13 +33,13 @@ _WEIGHED_S, _WEIGHED = 10.0, (0.7, 5.0)
 30 m/s), or pulls the second without an end."""
 
 ENOUGH = 50_000
-"""Samples that tell units, axes and which rotor is where."""
+"""Samples that identify units, axes and which rotor is where."""
 
 
 def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, ...]:
     """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
 
-    What is not flown, where a touchdown is a motion of its own, tells nothing.
+    What is not flown, where a touchdown is a motion of its own, is left out.
 
     `parts`: stretches of one flight, or flights with the same hardware; those too short for windows are left out.
     `settings`: of the section `gap`, as in the sensor audit.
@@ -53,7 +53,7 @@ def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, 
 
 
 def _flown(part: Signals) -> Signals:
-    """Cut off what is not flown; a part in which that cannot be told is taken as it is."""
+    """Cut off what is not flown; a part in which that is not known is taken as it is."""
     if part.rotor_speed is None or len(part) * part.period < _SHORT_S:
         return part
     span = flown(part).span_s
@@ -96,7 +96,7 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
     if sensors is None or hangs is not None:
         return
     if not sensors.gyroscope.apart:
-        # A gyroscope that the attitude contradicts tells of no rotor.
+        # A gyroscope that the attitude contradicts identifies no rotor.
         yield misplaced(_middle(parts))
     yield from sensors.findings
     if thrust_is_known(parts) and sensors.motion.against_thrust is None:
@@ -133,7 +133,7 @@ def _unlike_gravity(part: Signals) -> Finding | None:
 
 
 def _middle(parts: Sequence[Signals]) -> list[Signals]:
-    """Take no more of a long log than tells units and axes, from the middle of where its rotors turn."""
+    """Take no more of a long log than identifies units and axes, from the middle of where its rotors turn."""
     if sum(len(part) for part in parts) <= ENOUGH:
         return list(parts)
     longest = max(parts, key=len)

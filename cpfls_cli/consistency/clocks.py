@@ -27,7 +27,7 @@ _DELAY_MAX_S = 0.2
 _SMALLEST_R2 = 0.3
 # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
 _SURE_S = 0.002
-# Windows that a fit of five numbers wants, and estimates whose scatter can be told.
+# Windows that a fit of five numbers wants, and estimates that have a scatter.
 _FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2
 # Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
 _ROTORS_OFF_S = 0.008
@@ -44,16 +44,16 @@ _UNDECIDED = "these flights do not show whether the gyroscope or the attitude is
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
-    """Say how late the motion follows commands or a logged torque, median over the flights; nothing where none tells.
+    """Say by which delay the motion follows commands or a logged torque, median over the flights; nothing if unknown.
 
     Behind measured speeds nothing has to come late: what looks so may be an autopilot that answers gusts.
     """
-    told = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
-    estimates = [estimate for signals in told if (estimate := _estimate(signals)) is not None]
+    driven = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
+    estimates = [estimate for signals in driven if (estimate := _estimate(signals)) is not None]
     if not estimates:
         return ()
     delay = float(np.median([estimate.delay_s for estimate in estimates]))
-    whom = "commands" if told[0].commanded else "logged torque"
+    whom = "commands" if driven[0].commanded else "logged torque"
     bound = "at least" if any(estimate.at_bound for estimate in estimates) else "about"
     return (f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms.",)
 
@@ -94,7 +94,7 @@ def attitude_on_clock(
     judged = "the gyroscope and the rotors, whose clocks agree" if agrees else f"the gyroscope: {_UNDECIDED}"
     what = f"the attitude is {off_clock(-gyro_delay)}, judged by {judged}"
     finding = _late(what, "correct its clock in the log", ("attitude", *channels), -gyro_delay)
-    return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, f"It is {_DONE}"),), ()
+    return (ChannelRepair("attitude", delay_s=-gyro_delay).with_finding(finding, f"It is {_DONE}"),), ()
 
 
 def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
@@ -106,15 +106,15 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
 
     None where nothing is wrong, or nobody knows.
     """
-    told = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
-    if len(told) < _FEWEST_SHIFTS:
+    found = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
+    if len(found) < _FEWEST_SHIFTS:
         return None
-    delay = float(np.median(told))
-    if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
+    delay = float(np.median(found))
+    if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(found) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
     what = f"the rotor speeds are {off_clock(delay)}, judged by the gyroscope"
     finding = _late(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
-    return ChannelRepair("rotor_speed", delay_s=delay).told(finding, f"They are {_DONE}")
+    return ChannelRepair("rotor_speed", delay_s=delay).with_finding(finding, f"They are {_DONE}")
 
 
 def _late(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
@@ -148,7 +148,7 @@ class _Half:
 
 
 def _halves(flights: Sequence[Signals], windows: Windows) -> Iterator[_Half]:
-    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, tell nothing."""
+    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, are left out."""
     for signals in flights:
         if signals.rotor_speed is None or signals.commanded:
             continue

@@ -1,4 +1,4 @@
-"""What a check finds: what is wrong with a log, how much, what mends it, and whether a verdict can stand beside it."""
+"""What a check finds: what is wrong with a log, how much, what mends it, and whether it rules out a verdict."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -16,13 +16,13 @@ _CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
 class Finding:
     """Something that is wrong with a log, or with what the config says of its vehicle.
 
-    `what`: who says so and what is wrong, with its numbers; begins small, to stand behind the name of a flight.
+    `what`: who says so and what is wrong, with its numbers; begins small, to follow the name of a flight.
     `remedy`: what would mend it: keys of the config, or a part of the log.
     `channels`: what was held against each other.
     `size`: of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
     `unit`: of the size; empty for a ratio.
-    `contradiction`: whether no verdict can stand beside it: a unit, an axis or a sign is wrong. What is late, noisy or
-    a little off is fitted, repaired or told, and spoils no verdict.
+    `contradiction`: whether it rules out a verdict: a unit, an axis or a sign is wrong. What is delayed, noisy or a
+    little off is fitted, repaired or reported, and spoils no verdict.
     `repairable`: whether `cpfls gap` sets it right before it looks at the model.
     """
 
@@ -41,7 +41,7 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """What is wrong and what would mend it, to stand behind the name of a flight."""
+        """What is wrong and what would mend it, to follow the name of a flight."""
         return f"{self.what}: {self.remedy}"
 
     def of(self, flight: str) -> Self:
@@ -86,7 +86,7 @@ class AuditFinding:
 
 
 def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Give the sentences of the findings that no verdict can stand beside."""
+    """Give the sentences of the findings that rule out a verdict."""
     return tuple(finding.sentence for finding in findings if finding.contradiction)
 
 

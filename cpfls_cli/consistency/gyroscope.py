@@ -27,7 +27,7 @@ FEWEST_BLOCKS = 7
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
 # A coarse delay that Gauss-Newton steps refine, and how many: the last one changes nothing.
 _SCAN_STEP_S, _ROUNDS = 0.005, 4
-# A rate about an axis counts as excited from this multiple of the variance of what is left; below it, noise of the
+# A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
@@ -121,7 +121,7 @@ class DelayScan:
 
     `delay`: positive where the gyroscope is late, s, on a coarse grid.
     `variance`, shape (3,), rad^2/s^2: left about each axis.
-    `excited`, shape (3,): axes that turn enough to tell a scale.
+    `excited`, shape (3,): axes that turn enough to identify a scale.
     `seen`, `read`, shape (window, 3), rad/s: averages of the rate by the attitude, and by the gyroscope at that delay.
     """
 
@@ -171,7 +171,7 @@ class GyroFit:
     (s). The misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
     `error`, shape (13,): standard errors by the jackknife over blocks.
     `pull`, shape (13,): how far noise of the gyroscope can have pulled the value at most.
-    `known`, shape (13,): what the motion could tell.
+    `known`, shape (13,): what the motion identifies.
     `variance`, shape (3,), rad^2/s^2: left about each axis.
     `flight_bias`, shape (flight, 3), rad/s: bias of each flight less that of all.
     `flight_bias_error`: shape (flight, 3), rad/s.
@@ -199,7 +199,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
 
-    None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
+    None where there are too few blocks. Nothing is known where only some of them rotate.
     Reference: Frisch 1934 (bounds of regression with noise on both sides).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])

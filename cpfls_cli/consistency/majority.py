@@ -39,12 +39,12 @@ _MOVES_M_S2 = 0.1
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _ONE_PLANE, _NOT_ONE_PLANE, _REVERSED = 0.8, 0.5, 0.6
-# Logarithms: of a size that is no unit, and of what a unit may be off by beside a sensor and beside the thrust.
+# Logarithms: of a size that is no unit, and of what a unit may be off by against a sensor and against the thrust.
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
 # Share of a channel that other axes have to explain.
 _EXPLAINED = 0.8
-# Growth of what is left between two channels from which on a repair sets them apart; noise and a shift make less.
+# Growth of the residual between two channels from which on a repair sets them apart; noise and a shift make less.
 _APART = 1.2
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 _DONE = "It is corrected before the balance"
@@ -319,7 +319,7 @@ def _tuned(now: _Compared, repair: ChannelRepair, what: tuple[str, ...]) -> _Rea
         if abs(repair.delay_s) > LATEST_S:
             # What does not move together has no delay, and a fit of one runs away.
             return None
-        # Noise shrinks what is left of a delay, so a second look is worth it.
+        # Noise shrinks an estimate of a delay, so it is repeated.
         repair, _ = _with_delay(repair, _clearest(now.checked(repair)))
     against = now.checked(repair)
     # An accelerometer hardly moves in a gentle flight; what it shows of gravity is agreement enough.
@@ -360,7 +360,7 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Read:
         return repair, ()
     size = float(np.sqrt(squares[0] / squares[1]))
     correlation = abs(float((should * reading).sum())) / np.sqrt(squares[0] * squares[1] + TINY)
-    # Noise on one side makes its size too large, by no more than the correlation tells.
+    # Noise on one side makes its size too large, by no more than the correlation allows.
     error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(float(np.clip(correlation, 0.1, 1.0)))
     if abs(np.log(size)) < max(error, _SAME_UNIT):
         return repair, ()
@@ -400,7 +400,7 @@ def _told(
         contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
     )
-    return (first.told(finding, _DONE), *others)
+    return (first.with_finding(finding, _DONE), *others)
 
 
 def _remedy(repair: ChannelRepair) -> str:
@@ -444,4 +444,4 @@ def _left_out(now: _Compared, name: str, witnesses: Sequence[str]) -> ChannelRep
         contradiction=_grave(name, now.checks),
         repairable=True,
     )
-    return ChannelRepair(name, dropped=True).told(finding, f"It is left out: {channel.without}")
+    return ChannelRepair(name, dropped=True).with_finding(finding, f"It is left out: {channel.without}")

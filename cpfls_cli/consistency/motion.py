@@ -31,7 +31,8 @@ ANOTHER_NORTH = np.radians(20.0)
 # Share of what moves in both that agreement asks for, and the ratio within which scales of axes are one.
 _SHARED, _ONE_SCALE = 0.5, 1.05
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
-"""Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
+"""Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that identifies
+it."""
 
 LATEST_S = 0.3
 """Longest delay of an estimator or of telemetry."""
@@ -294,7 +295,7 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
 
 
 def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
-    """Fit the turn of one about the vertical against the other, beside what is late of it; a jackknife over blocks.
+    """Fit the turn of one about the vertical against the other, jointly with its delay; a jackknife over blocks.
 
     In a steady circle what is late is turned: where most of a turn could be a delay, nothing is known of it.
     """

@@ -34,11 +34,11 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
             "check it, vehicle.mass_kg and position_m of vehicle.rotors",
             ("vehicle",),
             stated[name] * _TOO_WIDE / limit,
-            # The motion tells it: a fit finds another.
+            # The motion identifies it: a fit finds another.
             contradiction=False,
         )
         for name, limit in limits.items()
-        # Rotors that stand for others, all in one place, tell no size.
+        # Rotors that replace others, all in one place, have no size.
         if limit > 0
     )
 

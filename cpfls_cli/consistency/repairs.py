@@ -41,7 +41,7 @@ class ChannelRepair:
     )
     finding: Finding | None = None
 
-    def told(self, finding: Finding, done: str) -> Self:
+    def with_finding(self, finding: Finding, done: str) -> Self:
         """Say what is wrong, and what is done about it."""
         return replace(self, finding=finding, sentence=f"{capitalised(finding.what)}. {done}; {finding.remedy}.")
 

@@ -39,7 +39,7 @@ _TYPICAL = 0.03
 """Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05."""
 
 _LEANS = 0.03
-"""Spread of roll and pitch in rad that no vehicle has that stands."""
+"""Spread of roll and pitch in rad that no vehicle at rest has."""
 
 _REMEDY = (
     "check the unit of import.signals.rotor_speed (or of rotor_command, and vehicle.rotor_speed_max_rad_s), "
@@ -64,7 +64,7 @@ def too_fast(parts: Sequence[Signals]) -> Finding | None:
 def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
     """Say where no propellers that fit between the hubs carry the mass at the measured speeds.
 
-    Only where the thrust factor is a guess: one that carries the weight bears witness for the speeds. Rotors that idle
+    Only where the thrust factor is a guess: one that carries the weight confirms the speeds. Rotors that idle
     on the ground lift nothing, so slow ones contradict only flights that lean; of fewer than three any may be small.
     """
     vehicle = parts[0].vehicle
@@ -167,7 +167,7 @@ def thrust_is_known(parts: Sequence[Signals]) -> bool:
 
 
 def weighed(part: Signals) -> Signals:
-    """Scale thrust to the weight where its size says nothing, so that its direction still bears witness."""
+    """Scale thrust to the weight where its size says nothing, so that its direction still counts."""
     if part.rotor_speed is None or part.thrust is None or not part.thrust.any():
         return part
     scale = part.vehicle.mass_kg * part.vehicle.gravity_m_s2 / float(part.thrust.mean())
@@ -186,7 +186,7 @@ def lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Finding | Non
     given, taken = (part[:, 2] + vehicle.gravity_m_s2 for part in (against[0].first, against[0].second))
     most = given.max()
     if most < vehicle.gravity_m_s2 / _THRUST_TO_WEIGHT:
-        # On the ground, or told already.
+        # On the ground, or reported already.
         return None
     flown = given > IDLE * most
     share = float(given[flown].mean() / taken[flown].mean())
@@ -202,7 +202,7 @@ def misplaced(parts: Sequence[Signals]) -> Finding | None:
     Of several flights or stretches one that says so clearly is enough; else the longest is asked.
     """
     found = [(part, _misplaced(part)) for part in sorted(parts, key=len, reverse=True)]
-    clear = (told for _, told in found if told is not None and told.contradiction)
+    clear = (own for _, own in found if own is not None and own.contradiction)
     return next(clear, found[0][1])
 
 
@@ -212,12 +212,12 @@ def _misplaced(part: Signals) -> Finding | None:
     moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
     if moved is None or not moved.by_axes:
         return None
-    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
+    moving = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
     stated = [(place_of(each.position_m[:2]), each.spin) for each in part.vehicle.rotors]
-    # Of rotors that are stated as no X or plus such as it tells of, the motion says nothing.
-    if told == stated or {name for name, _ in told} != {name for name, _ in stated}:
+    # Of rotors that are stated as another X or plus the motion says nothing.
+    if moving == stated or {name for name, _ in moving} != {name for name, _ in stated}:
         return None
-    places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
+    places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in moving)
     shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
     return Finding(
         f"judged by the motion, the rotors are, in the order of their columns: {places} (which explains {shares} of "

@@ -28,7 +28,7 @@ from cpfls_cli.words import joined
 # Largest probability of chance, after Holm over all that is tested: an audit that cries wolf is not read.
 _SIGNIFICANCE = 1e-3
 # Share of the size that matters which must be exceeded significantly: a jackknife over two dozen blocks has heavier
-# tails than Student's t where few of them tell, and what it then calls significant is small.
+# tails than Student's t where few of them are informative, and what it then calls significant is small.
 _SHARE_EXCEEDED = 0.5
 
 
@@ -54,7 +54,7 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
     """Test faults of sensors.
 
     A number is named when its size matters, and Student's t of what exceeds the possible pull of noise and half of
-    that size stays significant after Holm's correction over all numbers that the motion can tell.
+    that size stays significant after Holm's correction over all numbers that the motion identifies.
 
     `period`: sampling period, s. Reference: Holm 1979.
     """
@@ -113,7 +113,7 @@ _SLOWER, _FILTERED_FROM, _NEARER = (8, 4), 0.05, 0.7
 """Times the usual length of windows in which the motion is slow; the logarithm of a ratio of sizes that is looked at,
 and the share of it that a filter leaves there at most: an error of scale leaves all."""
 
-_FILTERED = "its size beside the attitude nears 1 in slow motion, so one of the two is behind a filter"
+_FILTERED = "its size against the attitude nears 1 in slow motion, so one of the two is behind a filter"
 _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
@@ -121,7 +121,7 @@ _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 
 class Gyroscope:
     """The gyroscope held against the attitude.
 
-    `faults`: what can be told.
+    `faults`: what is identified.
     `untested`: faults that cannot, with the reason.
     `apart`: that the two do not show one motion in one unit.
     """
@@ -133,7 +133,7 @@ class Gyroscope:
 
     @classmethod
     def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Self:
-        """Say why none of its faults can be told."""
+        """Say why none of its faults is identified."""
         return cls(untested=dict.fromkeys(_of_gyroscope(), reason), apart=apart)
 
     def late(self, windows: Windows) -> AuditFinding | None:
@@ -143,11 +143,11 @@ class Gyroscope:
 
     def findings(self, windows: Windows) -> tuple[Finding, ...]:
         """Say what is wrong with the gyroscope, far beyond what sensors of multirotors show."""
-        told = findings(self.faults, windows.period)
+        found = findings(self.faults, windows.period)
         if self.apart:
-            scaled = any(each.named and _estimate(each.name) == "scale" for each in told)
+            scaled = any(each.named and _estimate(each.name) == "scale" for each in found)
             return tuple(replace(each, repairable=scaled) for each in self.apart)
-        return tuple(gross for each in told if (gross := _gross(each)) is not None)
+        return tuple(gross for each in found if (gross := _gross(each)) is not None)
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,7 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     if rotors is not None:
         own, flights, doubted = _uncontradicted((rotors,), flights, windows)
         clocks, dropped = (*clocks, *own), (*dropped, *doubted)
-    told = thrust_is_known(flights)
-    motion = settled(flights if told else [weighed(signals) for signals in flights], windows)
+    motion = settled(flights if thrust_is_known(flights) else [weighed(signals) for signals in flights], windows)
     mended = [repair.finding for repair in clocks if repair.finding is not None]
     wrong = (*gyroscope.findings(windows), *mended, *dropped, *motion.findings)
     return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
@@ -201,10 +200,10 @@ def _uncontradicted(
     if not apart:
         return clocks, repaired, ()
     why = f", which {joined(apart)} contradict, so nothing is corrected"
-    told = (repair.finding for repair in clocks if repair.finding is not None)
+    wrong = (repair.finding for repair in clocks if repair.finding is not None)
     dropped = (
         replace(each, what=f"{each.what}{why}", remedy=f"check the clocks of {joined(each.channels)}", repairable=False)
-        for each in told
+        for each in wrong
     )
     return (), flights, tuple(dropped)
 

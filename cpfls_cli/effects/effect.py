@@ -23,7 +23,7 @@ class Coefficient:
 
     `low`, `high`: what is physically possible, not what is usual, in multiples of `scale`.
     `scale`: natural size on a vehicle, in `unit`; None for 1.
-    `of_log`: whether it tells how the motion is logged, and leaves the motion itself as it is.
+    `of_log`: whether it is of the log, and not of the motion.
     """
 
     name: str
@@ -126,7 +126,7 @@ class Effect:
     `coefficients`: physical, as reported; those of `shapes` not among them.
     `needs`: of `Signals.available`.
     `excitation`: the flight that shows it.
-    `rivals`: effects that look alike, each with the flight that tells them apart.
+    `rivals`: effects that look alike, each with the flight that separates them.
     `columns`: ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of
     wrench. None for what only the audit of the sensors can see.
     `physical`: None: the linear coefficients are the physical ones, whose bounds bound them.

@@ -1,4 +1,4 @@
-"""Hooks of an effect beside its columns: its place in the closed loop, and its test by the sensor audit."""
+"""Hooks of an effect other than its columns: its place in the closed loop, and its test by the sensor audit."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ class FaultFit(NamedTuple):
 
     `value`, `error`, shape (number,): with standard errors.
     `pull`, shape (number,): how far noise of the sensor can have pulled the value at most.
-    `known`, shape (number,): what the motion could tell.
+    `known`, shape (number,): what the motion identifies.
     `blocks`: of time that scattered the values.
     """
 
@@ -184,7 +184,7 @@ class SensorTest:
     """How the sensor audit tests a fault, says what it found, and repairs it.
 
     `estimate`: numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or
-    ``delay``; else ``estimate(flights) -> FaultFit``, None where the flights do not tell.
+    ``delay``; else ``estimate(flights) -> FaultFit``, None where the flights do not identify it.
     `labels`: names of the numbers in findings, in the order of the effect's coefficients, then shapes.
     `smallest`: size below which a fault moves no torque by more than the noise of a window, so that nothing is to
     repair.

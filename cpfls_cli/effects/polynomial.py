@@ -32,7 +32,7 @@ STATE_TERMS = (
 
 # More than the products of 34 terms of the motion with 17 of eight rotors, which are fitted to them.
 _PROBES = 900
-# Shares of the largest value: what is left of an effect that is a polynomial, and a weight that is 0, but for rounding.
+# Shares of the largest value: the residual of an effect that is a polynomial, and a weight that is 0, but for rounding.
 _EXACT, _NEGLIGIBLE = 1e-9, 1e-10
 
 

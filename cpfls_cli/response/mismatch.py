@@ -77,8 +77,8 @@ class Mismatch:
 def clearness(coherence: Array, random_error: Array, averages: Array, instrumented: bool) -> Array:
     """Give the coherence that counts: with instruments that of 33 windows with the same random error, where it is more.
 
-    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 stands
-    for the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
+    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 means
+    the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
     is the share that may be the loop's.
 
     `coherence`, `random_error`, `averages`, shape (..., frequency): see `FrequencyResponse`.

@@ -53,7 +53,7 @@ _OPEN = (GapVerdict.NOT_EXCITED, GapVerdict.NO_GAP)
 
 @dataclass(frozen=True)
 class Case:
-    """What is to be told, from which flights on.
+    """What is to be separated, from which flights on.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def _between(study: Study) -> tuple[Question, ...]:
     if not questions:
         names = ", ".join(each.name for each in effects)
         raise InputError(
-            f"trajectory.next_flight.to_tell = [{names}]: nothing to tell; name effects with --to-tell A,B (`cpfls "
+            f"trajectory.next_flight.to_tell = [{names}]: nothing to separate; name effects with --to-tell A,B (`cpfls "
             "effects` lists them), or give a diagnosis with --for DIAGNOSIS"
         )
     return questions
@@ -156,7 +156,7 @@ def _left_open(study: Study, path: Path) -> Case:
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
-    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can tell",)
+    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can show it",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
     logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, floor))
     return Case(questions, flights, logging, notes if more else ())
@@ -169,21 +169,21 @@ def _open_effects(
     asked = _effects(study)
     # Between an effect and two that together do the same no path decides: the log has to.
     rivals = [each for each in found.alternatives if not each.jointly_with]
-    told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
-    rivals = [each for each in rivals if each.name in told and each.instead_of in found.effects_of_motion]
+    visible = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
+    rivals = [each for each in rivals if each.name in visible and each.instead_of in found.effects_of_motion]
     if asked:
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
         require_visible([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
-    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in told]
+    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in visible]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
         return [], []
     if found.verdict not in _OPEN or not unseen:
         raise InputError(
-            f"{path}: its verdict is {found.verdict}, and it leaves nothing to tell apart; to plan a flight all the "
+            f"{path}: its verdict is {found.verdict}, and it leaves nothing to separate; to plan a flight all the "
             "same name effects with --to-tell A,B"
         )
     return [], unseen

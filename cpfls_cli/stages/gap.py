@@ -80,7 +80,7 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     if why:
         raise InputError(
             f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
-            f"arms, or fly what tells its inertia: {WHAT_TO_FLY}"
+            f"arms, or fly what identifies its inertia: {WHAT_TO_FLY}"
         )
     trained = numbered_roles("flight", flights)
     inputs = dict(run.take(trained | ({} if model is None else {"model": model}), "disagreement"))

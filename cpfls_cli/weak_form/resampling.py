@@ -112,7 +112,7 @@ class Folds:
         `base`: not in question: a block that alone shows one of these stays in the fit.
         """
         gram, moment, out = self.gram, self.moment, np.where(self.alone(base), 0.0, 1.0)[:, None, None]
-        # Behind the blocks stands the fit on all of them, judged on all of them.
+        # After the blocks comes the fit on all of them, judged on all of them.
         whole = gram.sum(axis=0, keepdims=True), moment.sum(axis=0, keepdims=True)
         seen, right = (np.concatenate([w - out * own, w]) for w, own in zip(whole, (gram, moment), strict=True))
         own, own_right = (np.concatenate([own, w]) for w, own in zip(whole, (gram, moment), strict=True))

@@ -26,8 +26,8 @@ EFFECT = Effect(
     title="wrong drag (yaw) factor",
     kind="actuator",
     formula="M_z = -e b sum(s_i w_i^2)",
-    sentence="The rotors turn the vehicle in yaw with a torque other than the config says. It shows beside an effect "
-    "that also pushes the vehicle, because the force tells how large its torque is; yaw alone shows only the ratio of "
+    sentence="The rotors turn the vehicle in yaw with a torque other than the config says. It shows with an effect "
+    "that also pushes the vehicle, because the force identifies its torque; yaw alone shows only the ratio of "
     "the drag factor to Izz.",
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="turns in yaw while flying fast; or weigh and swing the vehicle, so that Izz is known",

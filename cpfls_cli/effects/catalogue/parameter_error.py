@@ -139,8 +139,8 @@ def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, 
     point = np.array([values.get(name, 0.0) for name in _MEASURING_POINT])
     moving = np.cross(motion.body_rate, point)
     turning = np.cross(motion.body_acceleration, point) + np.cross(motion.body_rate, moving)
-    beside = {"position": np.tile(point, (len(moving), 1)), "velocity": moving, "acceleration": turning}
-    return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in beside.items()}
+    added = {"position": np.tile(point, (len(moving), 1)), "velocity": moving, "acceleration": turning}
+    return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in added.items()}
 
 
 EFFECT = Effect(

@@ -30,11 +30,11 @@ _NUDGE = 1e-4
 _MOVES = 2
 # Of a part over the one before: a start from two swings is not a swing off after eight.
 _LONGER = 4
-# Squares left at the beginning, over those of a start found there: some swings in gusts tell a start no better.
+# Squares left at the beginning, over those of a start found there: some swings in gusts identify a start no better.
 _WORSE = 2.0
-# As many as the grid of lengths and the dampings and depths beside the best one.
+# As many as the grid of lengths and the dampings and depths around the best one.
 _SWINGS_KEPT = 32
-# Of the swing, over which its start is sought first: two tell it from the driven one.
+# Of the swing, over which its start is sought first: two separate it from the driven one.
 _PERIODS = 2.0
 
 _State = tuple[float, float, float, float, float, float]
@@ -231,9 +231,9 @@ def _start(signals: Signals, way: _Way) -> Array:
     """Find the start from which a load pulls on the vehicle as the force balance says, by least squares.
 
     Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
-    tell the start from the driven swing; from there the search goes on over four times as much, up to the whole flight,
-    so that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
-    contradicts: what rings late is no swing at the start.
+    separate the start from the driven swing; from there the search goes on over four times as much, up to the whole
+    flight, so that it never has to find its way among the swings of a load that has drifted apart. It ends where the
+    beginning contradicts: what rings late is no swing at the start.
 
     Result: shape (4,); as `_Way.swing` takes it; at rest where nothing pulls like a load.
     """
@@ -259,7 +259,7 @@ def _start(signals: Signals, way: _Way) -> Array:
 
 @dataclass(frozen=True)
 class _Balance:
-    """Horizontal forces that something but rotors and weight applies, beside the velocity that a drag goes with."""
+    """Horizontal forces that something but rotors and weight applies, and the velocity that a drag goes with."""
 
     way: _Way
     needed: Array

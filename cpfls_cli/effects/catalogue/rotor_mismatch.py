@@ -18,7 +18,7 @@ _SAME_PLACE = 1e-6
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
     """Find the pairs of rotors that face each other across the middle of all and spin the same way.
 
-    The centre of mass may lie beside the middle, as that of a vehicle out of trim does.
+    The centre of mass may lie off the middle, as that of a vehicle out of trim does.
 
     Result: indices from 0, in the order of the first rotor of each pair.
     """
@@ -91,7 +91,8 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     drags = signals.speed**2 * [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
     drag = _about_z(drags.sum(axis=1))
     modes = gain_modes(signals.vehicle).T
-    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
+    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force separates
+    # them.
     lift = np.zeros((len(signals), 3))
     lift[:, 2] = signals.rotor_thrust @ signals.spins
     # A propeller that pulls less drags less.

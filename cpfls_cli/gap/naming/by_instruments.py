@@ -96,7 +96,8 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
 def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), whose inertia instruments do not identify: a fit shows that of the loop."""
     vehicle = found.hypothesis.places[0][1]
-    return ~np.any([np.zeros(3, dtype=bool), *(each[vehicle][:3] for _, each in _sources(found, given))], axis=0)
+    found_by = [each[vehicle][:3] for _, each in _sources(found, given)]
+    return np.asarray(~np.any([np.zeros(3, dtype=bool), *found_by], axis=0))
 
 
 def significant_effects(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
