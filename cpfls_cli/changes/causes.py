@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.changes.reference import load_directions
+from cpfls_cli.changes.reference import thrust_directions
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -93,9 +93,9 @@ _OFF_CENTRE = 0.1
 _ALONE = {
     "turn": (0.1, "1"),
     "unbalance": (1.0, "1"),
-    "follow": (0.2, "1"),
-    "late": (0.01, "s"),
-    "answer": (0.01, "s"),
+    "gain": (0.2, "1"),
+    "delay": (0.01, "s"),
+    "lag": (0.01, "s"),
     "felt": (0.5, "m/s^2"),
     "gusts": (0.7, "1"),
     "lean": (0.7, "m/s^2"),
@@ -105,7 +105,7 @@ _ALONE = {
 }
 """Of kinds of which each number is a cause: how much it changes where it does, and its unit."""
 
-_ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5, "unbalance": 0.5}
+_ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
 _ONE_TOO = ("unbalance",)
@@ -118,7 +118,7 @@ _AT_ONCE = ("lean", "drift")
 def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
     """List what can have changed, as far as the numbers show it."""
     numbers = _Numbers(names)
-    found = [*_of_loads(numbers, vehicle)] if numbers.of_kind("load") else []
+    found = [*_of_thrust(numbers, vehicle)] if numbers.of_kind("thrust") else []
     if numbers.of_kind("vibration"):
         found = [each for cause in found for each in _shaken_or_not(cause, numbers)]
         # Of each rotor the balance alone.
@@ -147,30 +147,30 @@ class _Numbers:
         """Give what changes, shape (number,); what is not known is left out."""
         return np.array([changes.get(name, 0.0) for name in self.names])
 
-    def loads(self, of: Array) -> Array:
-        """Give the loads of all rotors."""
-        return self.direction({f"load M{index + 1}": value for index, value in enumerate(of)})
+    def thrusts(self, of: Array) -> Array:
+        """Give the shares of thrust of all rotors."""
+        return self.direction({f"thrust M{index + 1}": value for index, value in enumerate(of)})
 
 
-def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
-    """List what the loads of the rotors in hover tell."""
-    own, loads = load_directions(vehicle), numbers.loads
+def _of_thrust(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
+    """List the causes that shares of thrust in hover show."""
+    own, thrusts = thrust_directions(vehicle), numbers.thrusts
     arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     arm = float(np.linalg.norm(arms, axis=1).mean())
     lever = arms[:, ::-1] ** 2 / np.maximum((arms**2).sum(axis=0)[::-1], 1e-12)
-    yaw = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw)]
+    yaw = [_LOSS * _OF_YAW / len(arms) * thrusts(own.yaw)]
     single = []
     for index, (roll, pitch) in enumerate(lever):
         # It turns the body less too, as far as it drives roll and pitch.
-        weaker = numbers.direction({"follow roll": -roll, "follow pitch": -pitch})
-        single.append(_LOSS * (loads(own.rotor[index]) + weaker))
+        weaker = numbers.direction({"gain roll": -roll, "gain pitch": -pitch})
+        single.append(_LOSS * (thrusts(own.rotor[index]) + weaker))
         yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *yaw], axis=1), _LOSS, "1", losses=1, ratio=-1)
     for one, other in combinations(range(len(single)), 2):
         columns = np.stack([single[one], single[other], *yaw], axis=1)
         yield Cause(
             f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, _RARER, losses=2, reported=2, ratio=-1
         )
-    moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
+    moved, heavier = [_OFF_CENTRE * arm * thrusts(each) for each in own.offset], _HEAVIER * thrusts(own.mass)
     yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", 0.5, ratio=1)
     places = [*(share * place for place in arms for share in _ON_ARMS), *map(sum, combinations(0.5 * arms, 2))]
     for place in places:
@@ -192,7 +192,7 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         yield weight
         both = np.stack([hung, single[index]], axis=1)
         yield replace(weight, directions=both, prior=_IN_WASH * share, searched=0.0, losses=2)
-    yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
+    yield Cause("torque about z", _OF_YAW * thrusts(own.yaw)[:, None], _OF_YAW, "1")
 
 
 def _hung(numbers: _Numbers, vehicle: VehicleSettings, place: Array) -> Array:
@@ -200,11 +200,11 @@ def _hung(numbers: _Numbers, vehicle: VehicleSettings, place: Array) -> Array:
 
     By the same number it adds to the weight, moves the centre of mass, and is turned about it.
     """
-    own, (x, y) = load_directions(vehicle), place
+    own, (x, y) = thrust_directions(vehicle), place
     moments = np.diag(symmetric(vehicle.inertia_kg_m2)) / vehicle.mass_kg
     slower = dict(zip(("roll", "pitch", "yaw"), np.array([y * y, x * x, x * x + y * y]) / moments, strict=True))
-    turned = numbers.direction({f"follow {axis}": -share for axis, share in slower.items()})
-    return numbers.loads(own.mass + x * own.offset[0] + y * own.offset[1]) + turned
+    turned = numbers.direction({f"gain {axis}": -share for axis, share in slower.items()})
+    return numbers.thrusts(own.mass + x * own.offset[0] + y * own.offset[1]) + turned
 
 
 def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.changes.causes import Cause, causes
-from cpfls_cli.changes.numbers import FlightNumbers, unit_of
+from cpfls_cli.changes.numbers import KINDS, FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
     FALSE_ALARM,
@@ -73,8 +73,8 @@ _HALF_WIDTH = 1.96
 class Judged(NamedTuple):
     """What flights say against a reference, as `Changed`, with their numbers as arrays.
 
-    `apart`, shape (flight, number): numbers of each of today's flights less those of the reference, loads at its
-    voltage.
+    `apart`, shape (flight, number): numbers of each of today's flights less those of the reference, shares of
+    thrust at its voltage.
     `deviation`: shape (number,).
     `limit`, shape (number,): in deviations.
     """
@@ -108,7 +108,7 @@ def changed(
     if not names:
         raise InputError("flights of today and of the reference have no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
-        names = tuple(name for name in names if not name.startswith("load "))
+        names = tuple(name for name in names if not name.startswith("thrust "))
     reference = Reference.of(before, names, vehicle)
     own = judged(today, reference, vehicle, rng, range(len(today)))
     lost = [name for name in common_numbers(before) if not all(name in flight.values for flight in today)]
@@ -143,12 +143,12 @@ def changed(
 
 
 def _in_common(reference: Reference, today: Sequence[FlightNumbers]) -> tuple[float, float]:
-    """Compute what the loads of all rotors have in common today, less the reference, and its standard deviation."""
-    loads = np.array([name.startswith("load ") for name in reference.names])
-    if not loads.any():
+    """Compute the mean share of thrust today less that of the reference, logarithm, and its standard deviation."""
+    shares = np.array([name.startswith("thrust ") for name in reference.names])
+    if not shares.any():
         return np.nan, np.nan
     apart, covariance = reference.apart(today)
-    mean = loads / loads.sum()
+    mean = shares / shares.sum()
     return float((apart @ mean).mean()), float(np.sqrt(mean @ covariance @ mean))
 
 
@@ -228,7 +228,7 @@ def drawn_by_chance(
 
     Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
     """
-    _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+    _, first, kind = np.unique([list(KINDS).index(each) for each in kinds], return_index=True, return_inverse=True)
     scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (draws, len(first))))[:, kind]
     day, own = rng.normal(size=(2, draws, len(kind)))
     means, total, flights = [], np.zeros_like(own), 0

@@ -49,36 +49,22 @@ class Kind:
 
 
 KINDS: dict[str, Kind] = {
-    # Thrust that a rotor is asked for over its share of the weight, logarithm.
-    "load": Kind("1", 0.02, 0.02, 0.01),
-    # Squared speed of a rotor over what it is commanded, logarithm.
-    "turn": Kind("1", 0.02, 0.02, 0.01),
-    # Time by which a rotor's speed follows its command.
-    "answer": Kind("s", 0.002, 0.002, 0.001),
-    # Root mean square above 20 Hz, logarithm.
-    "vibration": Kind("1", 0.1, 0.25, 0.3),
-    # Acceleration that turns with a rotor, amplitude, logarithm.
-    "unbalance": Kind("1", 0.3, 0.2, 0.2),
-    # Angular acceleration over that of the rotors' torque, logarithm.
-    "follow": Kind("1", 0.1, 0.1, 1.0),
-    # Time by which the body's rotation follows the rotors.
-    "late": Kind("s", 0.002, 0.003, 0.03),
-    # Angular acceleration that the rotors do not explain, root mean square, logarithm.
-    "gusts": Kind("1", 0.2, 0.6, 0.6),
-    # Mean horizontal thrust over mass, world axes.
-    "lean": Kind("m/s^2", 0.3, 0.0, 0.1),
-    # Mean of the accelerometer, along z less gravity.
-    "felt": Kind("m/s^2", 0.05, 0.0, 0.05),
-    # Mean rate of the gyroscope less the attitude's.
-    "drift": Kind("rad/s", 0.01, 0.0, 0.005),
-    # Mass that swings on a cable over that of the vehicle.
-    "swing": Kind("1", 0.02, 0.0, 0.02),
-    # Voltage that flight draws from the battery, share of a full one.
-    "battery": Kind("1", 0.02, 0.0, 0.01),
-    # Rate of the gyroscope over that of the attitude, logarithm.
-    "scale": Kind("1", 0.01, 0.01, 0.02),
+    "lag": Kind("s", 0.002, 0.002, 0.001),  # Of a rotor's speed behind its command.
+    "battery": Kind("1", 0.02, 0.0, 0.01),  # Voltage that flight draws, share of a full one.
+    "drift": Kind("rad/s", 0.01, 0.0, 0.005),  # Mean rate of the gyroscope less the attitude's.
+    "felt": Kind("m/s^2", 0.05, 0.0, 0.05),  # Mean of the accelerometer, along z less gravity.
+    "gain": Kind("1", 0.1, 0.1, 1.0),  # Angular acceleration over that of the rotors' torque, logarithm.
+    "gusts": Kind("1", 0.2, 0.6, 0.6),  # Angular acceleration that rotors do not explain, RMS, logarithm.
+    "delay": Kind("s", 0.002, 0.003, 0.03),  # Of the body's rotation behind the rotors.
+    "lean": Kind("m/s^2", 0.3, 0.0, 0.1),  # Mean horizontal thrust over mass, world axes.
+    "thrust": Kind("1", 0.02, 0.02, 0.01),  # Of a rotor over its share of the weight, logarithm.
+    "scale": Kind("1", 0.01, 0.01, 0.02),  # Rate of the gyroscope over that of the attitude, logarithm.
+    "swing": Kind("1", 0.02, 0.0, 0.02),  # Mass on a cable over that of the vehicle.
+    "turn": Kind("1", 0.02, 0.02, 0.01),  # Squared speed of a rotor over its command, logarithm.
+    "unbalance": Kind("1", 0.3, 0.2, 0.2),  # Acceleration that turns with a rotor, amplitude, logarithm.
+    "vibration": Kind("1", 0.1, 0.25, 0.3),  # Root mean square above 20 Hz, logarithm.
 }
-"""Of each number the first word of its name."""
+"""By the first word of a number's name; chance is drawn in this order."""
 
 _SHORTEST_S = 4.0
 """Of flight, below which it has no numbers."""
@@ -118,7 +104,7 @@ _COLLINEAR = 1e-9
 class NumberOfFlight:
     """A number of one flight."""
 
-    name: str = about("its kind, and the rotor, axis or sensor that it is of: load M3")
+    name: str = about("its kind, and the rotor, axis or sensor that it is of: thrust M3")
     unit: str = about("its unit; 1 of the logarithm of a ratio")
     value: float = about("in its unit")
     error: float = about("its standard error, over blocks of the flight, in its unit", least=0)
@@ -149,7 +135,7 @@ class FlightNumbers:
     name: str = about("of the flight")
     duration_s: float = about("time that it flies, away from take-off and landing", unit="s")
     voltage: float = about("mean of the battery in flight, V, or share of a full one where the log has that", gaps=True)
-    commanded: bool = about("whether loads are of commands, and not of speeds that were measured")
+    commanded: bool = about("whether shares of thrust are of commands, and not of speeds that were measured")
     cable_m: float = about(
         "length of the cable that fits best what swings, if anything does", unit="m", gaps=True, default=np.nan
     )
@@ -290,7 +276,7 @@ _Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array
 
 def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
     rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
-    yield _averaged([f"load {name}" for name in rotors], _loads(signals), flies, np.log)
+    yield _averaged([f"thrust {name}" for name in rotors], _thrust_shares(signals), flies, np.log)
     if signals.rotor_command is not None:
         # Squares, as thrust and drag are.
         both = np.stack([signals.speed**2, signals.rotor_command**2], axis=2)
@@ -330,7 +316,7 @@ def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[A
         return names, of(flown.mean(axis=0)), jackknife_error(left_out)
 
 
-def _loads(signals: Signals) -> Array:
+def _thrust_shares(signals: Signals) -> Array:
     """Give what each rotor is asked for over its share of what carries the vehicle, shape (time, rotor)."""
     vehicle = signals.vehicle
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
@@ -404,7 +390,7 @@ def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
     assert signals.rotor_command is not None, "asked for"
     found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
     delays = _STEP_S * found[:, 1]
-    return [f"answer {name}" for name in rotors], delays[0], _delay_error(delays[1:])
+    return [f"lag {name}" for name in rotors], delays[0], _delay_error(delays[1:])
 
 
 def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
@@ -429,11 +415,11 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     with np.errstate(divide="ignore"):
         gusts = np.log(found[:, 2] / moments)
     estimates = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
-    for kind, values in zip(("follow", "late", "gusts"), estimates.transpose(1, 0, 2), strict=True):
+    for kind, values in zip(("gain", "delay", "gusts"), estimates.transpose(1, 0, 2), strict=True):
         with np.errstate(invalid="ignore"):
-            error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
+            error = _delay_error(values[1:]) if kind == "delay" else jackknife_error(values[1:])
         names = [f"{kind} {axis}" for axis in _ROTATIONS]
-        yield (names, values[0], error, found[0, 0]) if kind == "follow" else (names, values[0], error)
+        yield (names, values[0], error, found[0, 0]) if kind == "gain" else (names, values[0], error)
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         yield _drift(signals, turns, flies)

@@ -20,7 +20,7 @@ _DAYS = 6.0
 
 _SCALE_ERROR = 0.8
 """By how much numbers of a kind scatter relative to what is usual, from vehicle to vehicle: deviation of the logarithm,
-of loads, vibration and batteries of four."""
+of shares of thrust, vibration and batteries of four."""
 
 _FEWEST_LEFT = 4.0
 """Degrees of freedom of what is usual of vehicles, where there is hardly any reference flight: one kind of numbers in
@@ -35,7 +35,7 @@ EACH_TEST = FALSE_ALARM / 2
 _OFFSET_M = 0.001
 """By which the centre of mass lies elsewhere from day to day: a battery put back."""
 
-_BY_VOLTAGE, _VOLTAGE_ERROR = {"load": -1.0, "turn": 1.0}, 1.0
+_BY_VOLTAGE, _VOLTAGE_ERROR = {"thrust": -1.0, "turn": 1.0}, 1.0
 """Power of the voltage that numbers of commands go with, and how far that is off, before any flight: none where
 the autopilot makes up for the battery, the square where it does not."""
 
@@ -223,15 +223,15 @@ def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:
     sensors = np.array([" ".join(name.split()[:-1]) for name in names])
     apart, together = np.array([kind.apart for kind in kinds]), np.array([kind.together for kind in kinds])
     covariance = np.diag(apart**2) + np.outer(together, together) * (sensors[:, None] == sensors)
-    loads = np.array([name.startswith("load ") for name in names])
-    moved = _OFFSET_M * load_directions(vehicle).offset
-    covariance[np.ix_(loads, loads)] += moved[:, _placed(names, loads)].T @ moved[:, _placed(names, loads)]
+    shares = np.array([name.startswith("thrust ") for name in names])
+    moved = _OFFSET_M * thrust_directions(vehicle).offset
+    covariance[np.ix_(shares, shares)] += moved[:, _placed(names, shares)].T @ moved[:, _placed(names, shares)]
     return np.asarray(covariance)
 
 
 @dataclass(frozen=True)
-class LoadDirections:
-    """What a change does to the logarithms of the rotors' loads in hover.
+class ThrustDirections:
+    """What a change does to the logarithms of the rotors' shares of thrust in hover.
 
     `rotor`, shape (rotor, rotor): of each rotor that lacks a share of its thrust and drag, for a whole share.
     `mass`, shape (rotor,): for a relative change of the mass.
@@ -245,8 +245,8 @@ class LoadDirections:
     yaw: Array
 
 
-def load_directions(vehicle: VehicleSettings) -> LoadDirections:
-    """Compute what changes do to the rotors' loads.
+def thrust_directions(vehicle: VehicleSettings) -> ThrustDirections:
+    """Compute what changes do to the rotors' shares of thrust.
 
     An autopilot that hovers asks for squared speeds that balance weight and torques, of least norm where there are more
     than four rotors.
@@ -259,7 +259,7 @@ def load_directions(vehicle: VehicleSettings) -> LoadDirections:
     # A centre of mass further along x leaves the rotors' thrust behind it: they have to raise the nose.
     wanted = weight * np.array([[0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     drag = np.array([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors]) @ hover
-    return LoadDirections(
+    return ThrustDirections(
         rotor=(inverse @ allocation @ np.diag(hover)).T / hover,
         mass=np.ones(len(hover)),
         offset=wanted @ inverse.T / hover,
@@ -267,9 +267,9 @@ def load_directions(vehicle: VehicleSettings) -> LoadDirections:
     )
 
 
-def _placed(names: Sequence[str], loads: BoolArray) -> list[int]:
-    """Give the rotor of each load."""
-    return [int(name.split("M")[-1]) - 1 for name, load in zip(names, loads, strict=True) if load]
+def _placed(names: Sequence[str], shares: BoolArray) -> list[int]:
+    """Give the rotor of each share of thrust."""
+    return [int(name.split("M")[-1]) - 1 for name, own in zip(names, shares, strict=True) if own]
 
 
 def kinds_of(names: Sequence[str]) -> list[str]:
@@ -316,7 +316,7 @@ def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: 
     lower = np.log(voltage / usual)
     for kind, before in _BY_VOLTAGE.items():
         own = kinds == kind
-        if own.any() and (kind != "load" or all(flight.commanded for flight in flights)):
+        if own.any() and (kind != "thrust" or all(flight.commanded for flight in flights)):
             mean = values[:, own].mean(axis=1)
             noise = KINDS[kind].together ** 2 + KINDS[kind].apart ** 2 / own.sum()
             information = (lower**2).sum() / noise + 1 / _VOLTAGE_ERROR**2

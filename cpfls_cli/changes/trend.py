@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import beyond_chance, judged
-from cpfls_cli.changes.numbers import FlightNumbers, unit_of
+from cpfls_cli.changes.numbers import KINDS, FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
     FALSE_ALARM,
@@ -111,7 +111,7 @@ def most_complete(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], li
     """Choose the numbers, and the flights that have all of them, such that they are the most together."""
     every = list(dict.fromkeys(name for flight in flights for name in flight.values))
     if {flight.commanded for flight in flights} == {True, False}:
-        every = [name for name in every if not name.startswith("load ")]
+        every = [name for name in every if not name.startswith("thrust ")]
     count = {name: sum(name in flight.values for flight in flights) for name in every}
     best: tuple[tuple[str, ...], list[FlightNumbers]] = ((), [])
     for least in sorted(set(count.values()), reverse=True):
@@ -214,7 +214,7 @@ class Row:
         """Draw such rows of unchanged vehicles: of each kind its covariance (inverse Wishart), then the flights."""
         covariance, freedom = self.covariance(self.values)
         root, size = np.linalg.cholesky(covariance), len(covariance)
-        kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
+        kind = np.unique([list(KINDS).index(each) for each in kinds_of(self.names)], return_inverse=True)[1]
         for _ in range(count):
             drawn = np.empty((size, len(self.values)))
             for own in (kind == each for each in range(kind.max() + 1)):

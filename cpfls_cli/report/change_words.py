@@ -32,7 +32,7 @@ _SCALES: Mapping[str, Callable[[float], float]] = {
 """From the unit of a change to what the table writes: of logarithms of squares the root, or near 0 half of it."""
 _UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times"}
 
-_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
+_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "delay", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
 _OTHERS = 3
@@ -43,12 +43,12 @@ MOST_MOVED = 3
 """Numbers that are named where no known change explains them."""
 
 _NATURAL = {
-    "load": "",
+    "thrust": "",
     "turn": "",
     "vibration gyroscope": "rad/s",
     "vibration accelerometer": "m/s²",
     "unbalance": "m/s²",
-    "follow": "",
+    "gain": "",
     "scale": "",
     "gusts": "rad/s²",
 }

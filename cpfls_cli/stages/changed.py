@@ -221,8 +221,8 @@ def _compared(run: Run, flights: Mapping[str, FlightNumbers], notes: Sequence[st
     today, before = ([own for role, own in flights.items() if role.startswith(side)] for side in ("today", "since"))
     found = compared(today, before, run.study.vehicle, np.random.default_rng(run.study.seed))
     names = column(found.numbers, "name")
-    loads = any(name.startswith("load ") for name in names)
-    unlike, ranges = of_other_autopilots([*before, *today], loads=loads)
+    thrusts = any(name.startswith("thrust ") for name in names)
+    unlike, ranges = of_other_autopilots([*before, *today], thrusts=thrusts)
     warnings = [
         *notes,
         *_warnings(today, before, names),
@@ -244,8 +244,8 @@ def _warnings(today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], n
     if len({own.commanded for own in flights}) > 1:
         speeds, commands = ([own.name for own in flights if own.commanded == of] for of in (False, True))
         yield (
-            f"speeds of rotors in {joined(speeds)}, commands in {joined(commands)}: loads are not compared; import the "
-            "same signal of all"
+            f"speeds of rotors in {joined(speeds)}, commands in {joined(commands)}: shares of thrust are not "
+            "compared; import the same signal of all"
         )
     elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):
         without = [own.name for own in flights if not np.isfinite(own.voltage)]
@@ -291,7 +291,7 @@ def flown_unlike(
         now, then = ([flight.agility for flight in side if np.isfinite(flight.agility)] for side in (today, before))
         yield (
             f"flown unlike the reference: with accelerations of {_range(now)} m/s^2 (root mean square), those of "
-            f"{_range(then)}; {joined(kinds)} count for less, as they go with it; take reference flights that are "
+            f"{_range(then)}; {joined(kinds)} count for less, as they depend on it; take reference flights that are "
             "flown alike"
         )
 
