@@ -9,10 +9,9 @@ from typing import Any
 
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
-from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks, recorded_models
+from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
@@ -57,7 +56,10 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
         shown = stage_named(name).together(own) if own else ()
-        return [stage_named(name).section(source, number) for number, source in enumerate(shown, start=1)]
+        return [
+            stage_named(name).section(source, number, drawn=name != "extend" or source.sha256 not in sources.answered)
+            for number, source in enumerate(shown, start=1)
+        ]
 
     return sections
 
@@ -67,9 +69,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    _of_each("model", "What the model is", recorded_models, model_blocks, among=True),
+    _of_each("model", "What the model is", _MODELS, model_blocks, among=True),
     _of_stage("diagnose"),
-    _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
+    _of_stage("extend"),
     compared_vehicles_section,
     _of_stage("vehicle"),
     _of_stage("compare"),

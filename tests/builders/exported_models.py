@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.check import Origin
+from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet

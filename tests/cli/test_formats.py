@@ -5,36 +5,27 @@ from pathlib import Path
 
 import pytest
 
-from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 from cpfls_cli.commands.formats import formats
+from cpfls_cli.result import datasets
 
 PAGE = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
 
 
 def test_page_names_the_schema_version_and_every_root_attribute():
     assert f"| `schema_version` | version of this page; {SCHEMA_VERSION} |" in PAGE
-    assert all(f"| `{name}` |" in PAGE for name in ("format", "kind", "cpfls_version", "seed", "config_sha256"))
+    assert all(f"| `{name}` |" in PAGE for name in ("format", "stage", "cpfls_version", "seed", "cautions"))
 
 
-@pytest.mark.parametrize("record", records(), ids=lambda record: record.FORMAT.name)
-def test_every_record_is_found_by_its_format(record):
-    assert record_of_format(record.FORMAT.name, record.FORMAT.kind) is record
-
-
-@pytest.mark.parametrize("spec", formats(), ids=lambda spec: f"{spec.name} {spec.kind}".strip())
-def test_every_dataset_is_described(spec):
-    assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)
-    assert {"config", "inputs"}.isdisjoint(dataset.path.split("/")[0] for dataset in spec.datasets)
-    for dataset in spec.datasets:
-        assert dataset.units
-        assert dataset.frame
-        assert dataset.description
-        assert "|" not in dataset.description
-
-
-def test_unknown_format():
-    assert record_of_format("cpfls/other") is None
+@pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
+def test_every_dataset_is_described(stage):
+    held = dict(datasets(stage.kind))
+    assert {"config", "inputs"}.isdisjoint(path.split("/")[0] for path in held)
+    for each in held.values():
+        assert each.about.unit
+        assert each.about.frame
+        assert each.about.text
+        assert "|" not in each.about.text
 
 
 def described(cpfls, *arguments):
@@ -43,11 +34,8 @@ def described(cpfls, *arguments):
 
 def test_one_format_is_described_without_a_file(cpfls):
     every = described(cpfls, "--format", "flight")
-    assert [(each["format"], each["commands"]) for each in every] == [
-        ("cpfls/flight", ["import"]),
-        ("cpfls/flight", ["simulate"]),
-    ]
-    flight = every[0]
+    (flight,) = every
+    assert (flight["format"], flight["commands"]) == ("cpfls/flight", ["simulate", "import"])
     torque = flight["datasets"]["body_torque"]
     assert (torque["dimensions"], torque["units"], torque["frame"]) == (["time", "axis"], "N m", "body (FLU)")
     lines = cpfls("info", "--format", "cpfls/flight").stdout
