@@ -90,10 +90,7 @@ class Judged(NamedTuple):
 
 
 def changed(
-    today: Sequence[FlightNumbers],
-    before: Sequence[FlightNumbers],
-    vehicle: VehicleSettings,
-    rng: np.random.Generator,
+    today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], vehicle: VehicleSettings, rng: np.random.Generator
 ) -> Changed:
     """Hold flights of today against reference flights.
 

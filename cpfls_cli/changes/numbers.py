@@ -565,11 +565,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     possible = [_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]
     bounds = [(float(np.log(low)), float(np.log(high))) for low, high in possible]
     found = minimize(
-        unexplained,
-        start,
-        method="Nelder-Mead",
-        bounds=bounds,
-        options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60},
+        unexplained, start, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60}
     )
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)

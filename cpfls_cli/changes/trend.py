@@ -39,10 +39,7 @@ _AT_ONCE = 3
 
 
 def trend(
-    flights: Sequence[FlightNumbers],
-    vehicle: VehicleSettings,
-    rng: np.random.Generator,
-    reference: int | None = None,
+    flights: Sequence[FlightNumbers], vehicle: VehicleSettings, rng: np.random.Generator, reference: int | None = None
 ) -> Trend:
     """Find the flights from which on a vehicle is another one; numbers and limits of each flight with it.
 

@@ -411,11 +411,7 @@ def _remedy(repair: ChannelRepair) -> str:
 
 
 def _contradicted(
-    now: _Compared,
-    repair: ChannelRepair,
-    what: Sequence[str],
-    witnesses: Sequence[str],
-    opposed: Sequence[str],
+    now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], opposed: Sequence[str]
 ) -> Finding:
     channel = CHANNELS[repair.channel]
     clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []

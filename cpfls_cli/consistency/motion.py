@@ -72,9 +72,7 @@ _ACCELERATIONS = {
 _NO_FORCE = "the force is taken from other channels, if there are any"
 CHANNELS = {
     "position": MotionChannel(
-        "position",
-        "import.signals.position",
-        {"mm": 0.001, "cm": 0.01, "ft": 0.3048, "m where mm is stated": 1000.0},
+        "position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048, "m where mm is stated": 1000.0}
     ),
     "velocity": MotionChannel(
         "velocity",

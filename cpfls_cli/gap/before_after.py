@@ -74,10 +74,7 @@ class LeftOut(NamedTuple):
     """What one effect of a model does along flights."""
 
     name: Annotated[str, About("identifier, see `cpfls effects`")]
-    wrench: Annotated[
-        Array,
-        About("root mean square of torque (x y z, N m) and force (x y z, N)", ("6",), "SI", BODY),
-    ]
+    wrench: Annotated[Array, About("root mean square of torque (x y z, N m) and force (x y z, N)", ("6",), "SI", BODY)]
     ends: Annotated[
         Array,
         About(
@@ -349,10 +346,5 @@ def _picture(
     logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
     return WorstWindows(
-        flight=recording.name,
-        channel=stretch.channel,
-        time=time[shown],
-        measured=measured,
-        before=logged,
-        after=after,
+        flight=recording.name, channel=stretch.channel, time=time[shown], measured=measured, before=logged, after=after
     )

@@ -16,13 +16,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import (
-    CHANNELS,
-    Candidate,
-    Preparation,
-    WeakFlight,
-    nuisance,
-)
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, Preparation, WeakFlight, nuisance
 from cpfls_cli.gap.naming.by_instruments import by_instruments, unidentified_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out

@@ -64,12 +64,7 @@ class Gap:
         return getattr(self.diagnosis, name)
 
 
-@stage(
-    Gap,
-    words={**WORDS, **of_diagnosis.WORDS},
-    fills=Filled(PARTS),
-    study=True,
-)
+@stage(Gap, words={**WORDS, **of_diagnosis.WORDS}, fills=Filled(PARTS), study=True)
 def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, model: ModelOption = None) -> Gap | None:
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 

@@ -51,8 +51,6 @@ _HEIGHT = Coefficient(
 EFFECT = replace(
     _EFFECT,
     exact=replace(
-        _EFFECT,
-        coefficients=(*_EFFECT.coefficients, _HEIGHT),
-        columns=lambda signals, _shape: _levers(signals, 3),
+        _EFFECT, coefficients=(*_EFFECT.coefficients, _HEIGHT), columns=lambda signals, _shape: _levers(signals, 3)
     ),
 )

@@ -31,9 +31,7 @@ EFFECT = Effect(
     "the drag factor to Izz.",
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="turns in yaw while flying fast; or weigh and swing the vehicle, so that Izz is known",
-    rivals={
-        "linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed",
-    },
+    rivals={"linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed"},
     source="definition; the drag factor is the number that data sheets lack",
     shapes=(Shape("error", "1", (-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8, 1.5), "true factor over stated, less 1"),),
     apply=lambda signals, shape: replace(signals, vehicle=_vehicle(signals.vehicle, shape)),

@@ -109,11 +109,7 @@ def _above(residual: Array, known: BoolArray, most_noise: Array) -> float:
 
 
 def held_out(
-    logged: Sequence[WeakFlight],
-    repaired: Sequence[WeakFlight],
-    fitted: System,
-    linear: Array,
-    floor: Array,
+    logged: Sequence[WeakFlight], repaired: Sequence[WeakFlight], fitted: System, linear: Array, floor: Array
 ) -> HeldOut:
     """Apply a fitted hypothesis to held-out flights, and the model with its own parameters refitted.
 

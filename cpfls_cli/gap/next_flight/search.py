@@ -92,9 +92,7 @@ class NextFlight:
 
 
 def next_flight(
-    asked: Goal,
-    rng: np.random.Generator,
-    progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None,
+    asked: Goal, rng: np.random.Generator, progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None
 ) -> NextFlight:
     """Search for the most informative path.
 

@@ -281,12 +281,7 @@ def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) 
 
 
 def _growing(
-    residual: Array,
-    asked: Array,
-    flight_index: IntArray,
-    block: IntArray,
-    shifts: int,
-    rng: np.random.Generator,
+    residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
 ) -> BoolArray:
     """Mark channels whose residual surely grows with how much a signal moves, by ranks over blocks of time.
 
