@@ -1,7 +1,5 @@
 """Numbers of one flight that are alike in another flight of the same vehicle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What flights say of changes of their vehicle: since reference flights, and over many flights in time."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

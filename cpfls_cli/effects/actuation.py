@@ -1,7 +1,5 @@
 """Actuation that comes late: filtered or shifted, with the change of wrench that follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Hooks of an effect other than its columns: its place in the closed loop, and its test by the sensor audit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol

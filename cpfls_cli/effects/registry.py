@@ -1,7 +1,5 @@
 """The catalogue: every effect that has a module in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from pkgutil import iter_modules

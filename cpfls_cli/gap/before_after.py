@@ -1,7 +1,5 @@
 """A model before and after its effects, on held-out flights: playback, whiteness, and the worst stretches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, NamedTuple, Self

@@ -1,7 +1,5 @@
 """Comparison of a model with flights: the gap by axis, time and state, and effects that were not excited."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

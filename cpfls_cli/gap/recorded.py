@@ -1,7 +1,5 @@
 """Flights as the results of the gap workflow hold them, so that later stages need no logs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Self
 

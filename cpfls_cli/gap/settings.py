@@ -1,7 +1,5 @@
 """Settings of the section `gap`: how flights and simulation are compared, and how an effect is named."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Between what a balance is fitted with and the model of a whole vehicle: each as the other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Changes of a vehicle in words, by the table `templates/causes.yaml`: what changed, how much, what to look at."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache

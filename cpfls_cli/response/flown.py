@@ -1,7 +1,5 @@
 """Which responses flights and a model have: torque to angular acceleration, thrust to specific force, and others."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Centre of mass off the point that the hub positions are measured from."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Delay between a command and the rotors."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.actuation import DelayLine, shifted
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation

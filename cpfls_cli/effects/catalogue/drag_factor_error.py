@@ -1,7 +1,5 @@
 """Wrong drag (yaw) factor of the rotors, the least known number of most vehicles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

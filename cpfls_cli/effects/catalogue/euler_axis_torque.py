@@ -1,7 +1,5 @@
 """Rotor torque taken for the generalised torque on the Euler angles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cpfls_cli import rotations

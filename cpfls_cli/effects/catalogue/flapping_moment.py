@@ -1,7 +1,5 @@
 """Moment at the hubs that flapping blades give in translation; its sign is open."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flexible mount: a part of the vehicle turns on springs against the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

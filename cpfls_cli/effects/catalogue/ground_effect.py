@@ -1,7 +1,5 @@
 """Ground effect: a rotor near the ground pulls more."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A gyro that reads too much or too little of each rate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cpfls_cli.effects.effect import Effect, of_axes

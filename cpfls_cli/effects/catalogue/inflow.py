@@ -1,7 +1,5 @@
 """Inflow: thrust falls where air flows through a rotor from above."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
 

@@ -1,7 +1,5 @@
 """Second-order low-pass between the autopilot's command and the rotors: a filter, or a drive that swings."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation

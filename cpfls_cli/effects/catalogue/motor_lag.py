@@ -1,7 +1,5 @@
 """Motor lag: rotors reach the commanded speed late."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cpfls_cli.effects.actuation import with_actuation

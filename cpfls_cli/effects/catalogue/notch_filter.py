@@ -1,7 +1,5 @@
 """Notch filter of an autopilot between its command and the rotors."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation

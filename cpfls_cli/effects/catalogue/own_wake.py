@@ -1,7 +1,5 @@
 """Wake of the own rotors: sideways flow carries it over the rear of the vehicle, which loses lift there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Wrong numbers of the vehicle: moments of inertia and scale of the thrust."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple

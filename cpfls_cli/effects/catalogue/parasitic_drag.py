@@ -1,7 +1,5 @@
 """Parasitic drag of the fuselage, which acts at a centre of pressure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

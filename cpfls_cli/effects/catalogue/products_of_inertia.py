@@ -1,7 +1,5 @@
 """Products of inertia: the principal axes are not the body axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

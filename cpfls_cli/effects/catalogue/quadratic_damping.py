@@ -1,7 +1,5 @@
 """Rotational damping that grows with the square of the rate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cpfls_cli.effects import scales

@@ -1,7 +1,5 @@
 """Rolling moment: the advancing blades lift more than the retreating ones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cpfls_cli.effects import scales

@@ -1,7 +1,5 @@
 """Reaction to rotors that speed up or slow down."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rotor drag: blade flapping, induced, translational and profile drag, which act in the rotor plane."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

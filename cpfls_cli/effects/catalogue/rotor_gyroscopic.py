@@ -1,7 +1,5 @@
 """Gyroscopic torque of the rotors when their spins do not cancel."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

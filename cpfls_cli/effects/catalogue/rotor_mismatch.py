@@ -1,7 +1,5 @@
 """Rotors that pull or drag differently from what the model says."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

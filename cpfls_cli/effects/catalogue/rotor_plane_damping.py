@@ -1,7 +1,5 @@
 """Damping of roll and pitch by the rotor discs, whose planes lag behind the body."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

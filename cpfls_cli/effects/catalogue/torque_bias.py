@@ -1,7 +1,5 @@
 """A constant torque: bent arms, tilted motors."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cpfls_cli.effects import scales

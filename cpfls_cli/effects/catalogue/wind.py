@@ -1,7 +1,5 @@
 """Steady wind: the rotor drag of a vehicle that does not move over the ground, and the air that all others meet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The noise floor of each channel, from the residual at frequencies above the motion."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

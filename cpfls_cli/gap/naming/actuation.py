@@ -1,7 +1,5 @@
 """Lags, delays and filters between command and rotors in gusts: a loop that answers these looks alike."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

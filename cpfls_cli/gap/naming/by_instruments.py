@@ -1,7 +1,5 @@
 """Parameters of a hypothesis in gusts, by instruments: a loop that answers gusts does not bias them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, product

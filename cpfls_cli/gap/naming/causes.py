@@ -1,7 +1,5 @@
 """Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

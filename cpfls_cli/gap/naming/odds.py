@@ -1,7 +1,5 @@
 """Sets of effects compared by their residual in blocks that no fit saw: which are beaten, and how likely each is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

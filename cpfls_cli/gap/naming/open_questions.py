@@ -1,7 +1,5 @@
 """Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

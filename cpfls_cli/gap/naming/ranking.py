@@ -3,8 +3,6 @@
 Floors are of shape (6,), N m and N, by channel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

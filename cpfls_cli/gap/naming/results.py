@@ -1,7 +1,5 @@
 """Results of a diagnosis as typed objects, and the verdict that follows from them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum

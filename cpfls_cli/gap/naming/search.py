@@ -1,7 +1,5 @@
 """A search over sets of effects: a beam, its sets compared by their residual in blocks that no fit saw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import combinations
 

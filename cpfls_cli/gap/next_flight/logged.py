@@ -1,7 +1,5 @@
 """What would be logged of a flight, planned or flown in closed loop, and the floors that its noise makes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

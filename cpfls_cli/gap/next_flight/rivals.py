@@ -1,7 +1,5 @@
 """The questions that a diagnosis, or a user, asks of the next flight."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import permutations
 

@@ -1,7 +1,5 @@
 """Search for the path along which rivals differ most, within the room that a vehicle has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

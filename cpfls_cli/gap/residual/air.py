@@ -1,7 +1,5 @@
 """Whether a residual is the air: gusts that neither setpoints nor the past predict; size and memory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Which signal of the flight a residual follows, judged on unseen blocks and against shifted residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, NamedTuple
 

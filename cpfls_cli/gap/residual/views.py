@@ -1,7 +1,5 @@
 """Views of a residual: its worst stretches of time, its mean over two signals, and its correlation over lags."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
