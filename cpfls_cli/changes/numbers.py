@@ -282,7 +282,8 @@ def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Itera
             [f"turn {name}" for name in rotors], both, flies, lambda means: np.log(means[:, 0] / means[:, 1])
         )
         yield _answer(signals, flies, rotors)
-    turns, feels = has_gyroscope or bool(signals.body_rate.any()), _felt(signals)
+    turns, feels = has_gyroscope or bool(signals.body_rate.any()), signals.specific_force
+    feels = signals.acceleration if feels is None else feels
     across = _ACROSS_HZ if signals.specific_force is not None else _ABOVE_HZ
     for sensor, values, above in (
         ("gyroscope", signals.body_rate if turns else None, (_ABOVE_HZ,) * 3),
@@ -323,10 +324,6 @@ def _thrust_shares(signals: Signals) -> Array:
     if signals.attitude is not None:
         carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
     return np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
-
-
-def _felt(signals: Signals) -> Array | None:
-    return signals.acceleration if signals.specific_force is None else signals.specific_force
 
 
 def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None:
@@ -420,7 +417,9 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         yield (names, values[0], error, found[0, 0]) if kind == "gain" else (names, values[0], error)
     if signals.attitude is not None:
         turns = _of_attitude(signals)
-        yield _drift(signals, turns, flies)
+        # Of the gyroscope in the middle of two samples, for the attitude turns from one to the other.
+        apart = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:]) - turns[1:]
+        yield _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
         yield _scale(signals, turns, flies)
 
 
@@ -500,13 +499,6 @@ def _of_attitude(signals: Signals) -> Array:
         axis=1,
     )
     return np.concatenate([vector[:1], vector]) / signals.period
-
-
-def _drift(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
-    """Compare the gyroscope's rate with that of the attitude, which turns by the body rate."""
-    middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
-    apart = middle - turns[1:]
-    return _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
 
 
 def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:

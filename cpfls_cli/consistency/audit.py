@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.check import findings_of
 from cpfls_cli.consistency.clocks import actuation_delay
@@ -15,7 +14,6 @@ from cpfls_cli.consistency.findings import AuditFinding, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
-from cpfls_cli.effects.hooks import ReadingError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.result import about, part
@@ -74,15 +72,11 @@ class Audit:
                 test.error(finding.named_values(test.labels)) for test, finding in faults if test.signal == signal
             ]
             if getattr(signals, signal) is not None:
-                truth[signal] = _corrected(getattr(signals, signal), signals.time, errors)
+                reading = shifted(getattr(signals, signal), signals.time, sum(error.delay for error in errors))
+                matrix = reduce(np.matmul, [error.matrix for error in errors])
+                offset = np.sum([error.offset for error in errors], axis=0)
+                truth[signal] = np.asarray((reading - offset) @ np.linalg.inv(matrix).T)
         return replace(signals, **truth) if truth else signals
-
-
-def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> Array:
-    delay = sum(error.delay for error in errors)
-    offset = np.sum([error.offset for error in errors], axis=0)
-    matrix = reduce(np.matmul, [error.matrix for error in errors])
-    return np.asarray((shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
 
 
 def audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals] = ()) -> Audit:

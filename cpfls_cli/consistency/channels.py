@@ -70,14 +70,13 @@ def known_up_to(signals: Signals) -> dict[str, float]:
 
     Result: signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
     """
-    return signals.once(known_up_to, lambda: _known_up_to(signals))
 
+    def found() -> dict[str, float]:
+        names = [name for name in _CHANNEL_WORDS if name != "body_rate" or name in signals.available]
+        logged = {name: values for name in names if (values := getattr(signals, name)) is not None}
+        return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
 
-def _known_up_to(signals: Signals) -> dict[str, float]:
-    logged = {name: values for name in _CHANNEL_WORDS if (values := getattr(signals, name)) is not None}
-    if "body_rate" not in signals.available:
-        del logged["body_rate"]
-    return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
+    return signals.once(known_up_to, found)
 
 
 def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:

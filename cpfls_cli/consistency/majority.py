@@ -1,6 +1,6 @@
 """Which channel of the motion is wrong where two contradict each other, by majority; it is set right or left out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
@@ -136,7 +136,10 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
         return None
     moved = [CHANNELS[check.pair.second].words for check in against]
     who, held = " and ".join(moved), ("thrust of the rotors", "attitude", *moved)
-    if all(_reversed_along_z(check) for check in against):
+    up = [(check.first[:, 2], check.second[:, 2]) for check in against]
+    if all(
+        min(one.std(), other.std()) > _MOVES_M_S2 and np.corrcoef(one, other)[0, 1] < -_REVERSED for one, other in up
+    ):
         what = f"along z, the thrust of the rotors is opposite to {who}"
         return Finding(what, "check import.world_frame and import.body_frame", held)
     turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
@@ -158,12 +161,6 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
             held,
         )
     return None
-
-
-def _reversed_along_z(check: PairCheck) -> bool:
-    first, second = check.first[:, 2], check.second[:, 2]
-    moves = min(first.std(), second.std()) > _MOVES_M_S2
-    return bool(moves and np.corrcoef(first, second)[0, 1] < -_REVERSED)
 
 
 def _about_the_vertical(check: PairCheck) -> tuple[complex, complex]:
@@ -189,7 +186,7 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
             dropped.append(_contradicted(now, *read, witnesses, opposed))
         elif read is not None and (sure or read[0].is_mistake):
             return _told(now, *read, witnesses), ()
-        elif read is not None and _nearer_the_thrust(now, read[0]):
+        elif read is not None and _changed_to_thrust(now, read[0], lambda before, after: _surely_less(after, before)):
             return _told(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
         # Noise on both sides can look like one contradiction, not like two.
         elif sure and read is None and len(set(witnesses)) > 1:
@@ -239,11 +236,11 @@ def _surely_less(after: Array, before: Array) -> bool:
     return bool(parts.mean() > _PARTS_SIGMAS * mean_error(parts))
 
 
-def _nearer_the_thrust(now: _Compared, repair: ChannelRepair) -> bool:
-    """Tell whether a repair surely brings a channel nearer to what the thrust does: the third clock and frame."""
+def _changed_to_thrust(now: _Compared, repair: ChannelRepair, judge: Callable[[Array, Array], bool]) -> bool:
+    """Judge squares of a channel against the thrust, the third clock and frame, before and after a repair."""
     repaired = now.repaired(*now.with_position(repair))
     before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, repaired))
-    return before is not None and after is not None and _surely_less(after, before)
+    return before is not None and after is not None and judge(before, after)
 
 
 def _opposed(now: _Compared, repair: ChannelRepair) -> tuple[str, ...]:
@@ -254,9 +251,7 @@ def _opposed(now: _Compared, repair: ChannelRepair) -> tuple[str, ...]:
         return (CHANNELS["position"].words,)
     if any(signals.commanded for signals in now.flights):
         return ()
-    before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, now.repaired(*along)))
-    farther = before is not None and after is not None and _surely_farther(before, after)
-    return (CHANNELS["thrust"].words,) if farther else ()
+    return (CHANNELS["thrust"].words,) if _changed_to_thrust(now, repair, _surely_farther) else ()
 
 
 def _surely_farther(before: Array, after: Array) -> bool:
@@ -395,19 +390,14 @@ def _told(
     who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        _remedy(repair),
+        "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
+        if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body
+        else f"correct the log, or {channel.keys}",
         (channel.words, *witnesses),
         contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
     )
     return (first.with_finding(finding, _DONE), *others)
-
-
-def _remedy(repair: ChannelRepair) -> str:
-    """Say what mends a channel; no key takes gravity from an acceleration of the world."""
-    if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body:
-        return "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
-    return f"correct the log, or {CHANNELS[repair.channel].keys}"
 
 
 def _contradicted(

@@ -119,18 +119,13 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     if response.model is None:
         return Mismatch(cost=np.nan, band=band)
     ratio = response.model[part] / response.gain[part]
-    apart = _apart(ratio)
+    # Squared differences in decibels and degrees.
+    apart = _decibels(ratio) ** 2 + _PHASE * np.degrees(np.angle(ratio)) ** 2
     chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
     weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
     cost = 20.0 * float((weight * apart[chosen]).mean())
     off = (20.0 * apart > ACCEPTABLE) & (np.abs(ratio - 1) > _SURE * response.random_error[part])
     return Mismatch(cost=cost, band=band, deviations=tuple(_deviations(frequency, ratio, off)))
-
-
-def _apart(ratio: ComplexArray) -> Array:
-    """Add squared differences in decibels and degrees."""
-    phase = np.degrees(np.angle(ratio))
-    return np.asarray(_decibels(ratio) ** 2 + _PHASE * phase**2)
 
 
 def _decibels(ratio: ComplexArray) -> Array:
@@ -139,15 +134,11 @@ def _decibels(ratio: ComplexArray) -> Array:
 
 def _deviations(frequency: Array, ratio: ComplexArray, off: BoolArray) -> list[Deviation]:
     """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
-    kind = np.where(off, _kinds(ratio), 0)
-    kind = _without_scatter(kind)
-    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
-
-
-def _kinds(ratio: ComplexArray) -> Array:
-    """Tell what a difference is: 1 too strong, -1 too weak, 2 early, -2 late."""
     gain, phase = _decibels(ratio), np.degrees(np.angle(ratio))
-    return np.asarray(np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)), dtype=int)
+    # 1 too strong, -1 too weak, 2 early, -2 late.
+    kinds = np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)).astype(int)
+    kind = _without_scatter(np.where(off, kinds, 0))
+    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
 
 
 def _without_scatter(kind: Array) -> Array:

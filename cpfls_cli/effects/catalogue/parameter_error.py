@@ -104,7 +104,9 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     direct = np.zeros_like(momentum)
     momentum[:, :3, :3] = -turning
     direct[:, :3, :3] = -_across(signals.body_rate, turning)
-    direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
+    after, later = [1, 2, 0], [2, 0, 1]
+    coupling = 0.5 * (moments[after] + moments[later]) * signals.body_rate[:, after] * signals.body_rate[:, later]
+    direct[:, :3, 3:6] = -coupling[:, :, None] * np.eye(3)
     direct[:, 5, _THRUST_SCALE] = signals.wrench[:, 5]
     # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
     levers = _across(signals.body_rate, signals.vehicle.mass_kg * np.eye(3)[None])
@@ -123,13 +125,6 @@ def with_thrust(rows: Array, thrust: Array) -> Array:
     rows = rows.copy()
     rows[:, 5, _THRUST_SCALE] = thrust
     return rows
-
-
-def _coupling(body_rate: Array, moments: Array) -> Array:
-    """Multiply the two other rates by the mean of their moments of inertia, shape (time, 3), N m."""
-    after, later = (1, 2, 0), (2, 0, 1)
-    mean = 0.5 * (moments[list(after)] + moments[list(later)])
-    return np.asarray(mean * body_rate[:, after] * body_rate[:, later])
 
 
 def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:

@@ -162,22 +162,29 @@ class Room:
 
         def beyond(share: float) -> float:
             # Free fall is infinitely far beyond.
-            return min(self.load(path.scaled(share)), 1.0 / ROUNDING) - 1.0
+            return min(self.share_of_limits(path.scaled(share)), 1.0 / ROUNDING) - 1.0
 
         return 1.0 if at_most(beyond(1.0), 0.0, 1.0) else float(brentq(beyond, 0.0, 1.0))
 
-    def load(self, path: HarmonicPath) -> float:
+    def share_of_limits(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
         try:
             planned = self.planned(path)
         except ComputationError:
             return np.inf
         signals = vars(planned)
-        loads = [_taken(signals[key.split("_", 1)[0]], limit) for key, limit in self.settings.limits.given.items()]
+        shares = []
+        for key, limit in self.settings.limits.given.items():
+            values = signals[key.split("_", 1)[0]]
+            # Three limits hold by component, one holds along the path.
+            taken = (
+                np.abs(values / np.array(limit)) if isinstance(limit, tuple) else np.linalg.norm(values, axis=1) / limit
+            )
+            shares.append(float(taken.max()))
         tilt = np.arccos(np.clip(np.prod(np.cos(planned.attitude[:, :2]), axis=1), -1, 1)).max()
-        loads.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
+        shares.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
         rotors = rotor_load(signals, self.vehicle)
-        return max(*loads, rotors.fast, rotors.slow)
+        return max(*shares, rotors.fast, rotors.slow)
 
 
 def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: float, period: float) -> Room:
@@ -210,10 +217,3 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
             "thrust factors and the largest rotor speed"
         )
     return Room(half, np.array([0.0, 0.0, ground + asked.height_m]), settings, vehicle, period)
-
-
-def _taken(values: Array, limit: float | tuple[float, float, float]) -> float:
-    """Compute the share of a limit that is taken: three hold by component, one holds along the path."""
-    if isinstance(limit, tuple):
-        return float(np.abs(values / np.array(limit)).max())
-    return float(np.linalg.norm(values, axis=1).max() / limit)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_closing, uniform_filter1d
 from scipy.special import chdtrc
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.arrays import Array, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
@@ -68,17 +68,13 @@ def _of_channel(
     ]
     least = max(level, float(np.quantile(np.concatenate(size), 1 - _WORST_SHARE)))
     for rows, local, hop, pause in zip(flights, size, hops, pauses, strict=True):
-        for run in _runs(local >= least, pause):
-            inside = rows[run]
+        above = local >= least
+        joined = binary_closing(np.pad(above, pause), np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
+        for run in runs(above | joined):
+            inside = rows[slice(*run)]
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
             yield GapStretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
-
-
-def _runs(above: BoolArray, pause: int) -> list[slice]:
-    padded = np.pad(above, pause)
-    joined = above | binary_closing(padded, np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
-    return [slice(*run) for run in runs(joined)]
 
 
 @result

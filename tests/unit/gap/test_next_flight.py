@@ -220,7 +220,7 @@ def test_paths_keep_to_their_room(limits):
             taken = np.abs(values) / limit if isinstance(limit, tuple) else np.linalg.norm(values, axis=1) / limit
             assert taken.max() < 1.02
         # A limit is reached: nothing that could be flown is left.
-        assert there.load(path) > 0.9 or np.abs(outside).min() < 0.05
+        assert there.share_of_limits(path) > 0.9 or np.abs(outside).min() < 0.05
 
 
 @pytest.mark.parametrize(
