@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import interp1d
 
-from cpfls_cli.effects.catalogue.vertical_descent import (
-    descent_ratio,
-    descent_state,
-    induced_velocity,
-    thrust_basis,
-)
+from cpfls_cli.effects.catalogue.vertical_descent import descent_ratio, descent_state, induced_velocity, thrust_basis
 from cpfls_cli.effects.registry import CATALOGUE
 
 

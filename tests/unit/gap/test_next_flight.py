@@ -11,13 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.naming.odds import likely
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
-from cpfls_cli.gap.next_flight.rivals import (
-    open_questions,
-    physical_values,
-    questions_between,
-    require_visible,
-    usual,
-)
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import (

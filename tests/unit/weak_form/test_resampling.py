@@ -153,10 +153,7 @@ def test_a_column_of_zeros_does_no_harm():
     assert not coefficients[:, 1].any()
 
 
-@given(
-    st.lists(st.integers(1, 400), min_size=1, max_size=5),
-    st.floats(0.5, 20),
-)
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=5), st.floats(0.5, 20))
 def test_blocks_are_contiguous_within_flights_and_numbered_without_gaps(lengths, block_s):
     flight = np.repeat(np.arange(len(lengths)), lengths)
     centres = np.concatenate([0.2 * np.arange(length) for length in lengths])
