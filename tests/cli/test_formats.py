@@ -48,19 +48,14 @@ def test_results_of_stages_are_described_too(cpfls):
     assert look["datasets"]["balance/blocks"]["required"] is False
 
 
-def test_a_format_of_several_kinds_is_described_kind_by_kind(cpfls):
-    assert [each["kind"] for each in described(cpfls, "--format", "model")] == ["identified", "extended", "vehicle"]
-    assert [each["kind"] for each in described(cpfls, "--format", "vehicle-model")] == ["vehicle"]
-
-
 def test_without_a_name_all_are_listed(cpfls):
     names = [each["format"] for each in described(cpfls)]
     assert {"cpfls/flight", "cpfls/look"} <= set(names)
-    assert "cpfls info --format identified-model" in cpfls("info").stdout
+    assert "cpfls info --format changed" in cpfls("info").stdout
 
 
 def test_a_wrong_name_lists_those_that_there_are(cpfls):
     result = cpfls("info", "--format", "flihgt")
     assert result.exit_code == 2
-    assert "no such format (did you mean flight?); there are identified-model," in result.stderr
+    assert "no such format (did you mean flight or flight-numbers?); there are changed," in result.stderr
     assert "leave out FILE or --format" in cpfls("info", "flight.h5", "--format", "flight").stderr

@@ -41,6 +41,8 @@ def described_as(name, paths):
     """List which of the paths describe a dataset: `*` is any name, and lines of a table have no path of their own."""
     place, _, last = name.rpartition("/")
     known = [name, place] if last in {"row", "name", "value", "values"} else [name]
+    # Arrays of several lengths have a table of their own.
+    known += [place.rpartition("/")[0]] if place.endswith("/values") else []
     return [path for path in paths if any(fnmatchcase(each, path) for each in known)]
 
 

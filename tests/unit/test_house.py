@@ -178,7 +178,6 @@ SMALL_ALL_THE_SAME = {
     "gap/next_flight/search.py": "what the room is for",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
-    "search/vehicle_search.py": "a search for a model does not load what plays a vehicle back",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

@@ -2,8 +2,7 @@
 
 import pytest
 
-from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.store import read
+from tests.builders.artifacts import read_result
 from tests.builders.command_line import undrawn
 
 
@@ -18,7 +17,7 @@ def two_models(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
 
 
 def learned(path):
-    return [(flight.name, flight.samples, flight.of) for flight in read(path, Extended)[0].learned_from]
+    return [(flight.name, flight.samples, flight.of) for flight in read_result(path).learned_from]
 
 
 def test_the_file_says_what_the_effects_and_what_the_base_learned_from(extended, two_models, pipeline):

@@ -61,7 +61,7 @@ def full(tmp_path_factory):
 
 def test_the_answer_comes_first_and_every_figure_once(full):
     assert full.summary["sections"] == [
-        "summary", "model", "diagnose", "extend", "compare", "stated-vehicle", "provenance",
+        "summary", "diagnose", "extend", "compare", "stated-vehicle", "provenance",
     ]  # fmt: skip
     assert full.summary["figures"] == FIGURES
     assert full.summary["missing"] == []
