@@ -16,29 +16,20 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 @dataclass(frozen=True)
 class Cause:
-    """A change and its directions in the numbers of a flight.
+    """A change and its directions in the numbers of a flight."""
 
-    `name`: what changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
-    `directions`, shape (number, size): of each size of it, the first of which is reported, for as much as is usual
-    where it happens.
-    `usual`: the first size, in its unit, where it happens: standard deviation of a normal prior.
-    `prior`: of the belief in it, relative to the others.
-    `searched`: the same where it is searched for; 0 where another way in which it shows replaces it.
-    `losses`: of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than
-    none.
-    `reported`: how many of the first sizes have the unit of the cause.
-    `ratio`: 1 where the size shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
-    """
-
-    name: str
+    name: str  # What changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
+    # Shape (number, size): of each size of it, the first of which is reported, for as much as is usual where it
+    # happens.
     directions: Array
-    usual: float
+    usual: float  # The first size, in its unit, where it happens: standard deviation of a normal prior.
     unit: str
-    prior: float = 1.0
-    searched: float = 1.0
+    prior: float = 1.0  # Of the belief in it, relative to the others.
+    searched: float = 1.0  # The same where it is searched for; 0 where another way in which it shows replaces it.
+    # Of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than none.
     losses: int = 0
-    reported: int = 1
-    ratio: int = 0
+    reported: int = 1  # How many of the first sizes have the unit of the cause.
+    ratio: int = 0  # 1 where the size shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
 
     def size(self, shown: float) -> float:
         """Turn what shows of it into its size, in its unit."""

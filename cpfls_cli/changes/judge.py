@@ -71,17 +71,13 @@ _HALF_WIDTH = 1.96
 
 
 class Judged(NamedTuple):
-    """What flights say against a reference, as `Changed`, with their numbers as arrays.
+    """What flights say against a reference, as `Changed`, with their numbers as arrays."""
 
-    `apart`, shape (flight, number): numbers of each of today's flights less those of the reference, shares of
-    thrust at its voltage.
-    `deviation`: shape (number,).
-    `limit`, shape (number,): in deviations.
-    """
-
+    # Shape (flight, number): numbers of each of today's flights less those of the reference, shares of thrust at its
+    # voltage.
     apart: Array
-    deviation: Array
-    limit: Array
+    deviation: Array  # Shape (number,).
+    limit: Array  # Shape (number,): in deviations.
     p: float
     by_flight: Array
     since: int
@@ -391,17 +387,12 @@ class _Space:
 
 
 class _Held(NamedTuple):
-    """Flights that are held against what they can be off by.
-
-    `mean`, shape (number,): whitened.
-    `evidence`: logarithm of the largest evidence of a change.
-    `furthest`: at most how probable it is that any number is as far off.
-    """
+    """Flights that are held against what they can be off by."""
 
     space: _Space
-    mean: Array
-    evidence: float
-    furthest: float
+    mean: Array  # Shape (number,): whitened.
+    evidence: float  # Logarithm of the largest evidence of a change.
+    furthest: float  # At most how probable it is that any number is as far off.
 
     def p_value(self, chance: Array) -> float:
         """Tell how probable it is that an unchanged vehicle looks as much changed, by either test."""

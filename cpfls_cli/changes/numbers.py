@@ -31,18 +31,15 @@ _AXES, _ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of numbers.
+    """One kind of numbers."""
 
-    `unit`: of a number; 1 for logarithms of ratios.
-    `apart`, `together`: standard deviations from day to day of a vehicle that nobody changed: of each number by itself,
-    and of all numbers of the kind alike. What is usual where reference flights are too few.
-    `agile`: by how much numbers differ in flights that are flown e times as agile: standard deviation, half of its
-    variance in common.
-    """
-
-    unit: str
+    unit: str  # Of a number; 1 for logarithms of ratios.
+    # `apart`, `together`: Standard deviations from day to day of a vehicle that nobody changed: of each number by
+    # itself, and of all numbers of the kind alike. What is usual where reference flights are too few.
     apart: float
     together: float
+    # By how much numbers differ in flights that are flown e times as agile: standard deviation, half of its variance in
+    # common.
     agile: float
 
 

@@ -46,33 +46,22 @@ _CALM = 1.0
 
 @dataclass(frozen=True)
 class Reference:
-    """Numbers of reference flights: their mean and covariance.
+    """Numbers of reference flights: their mean and covariance."""
 
-    `names`: numbers that all flights have, today's too.
-    `mean`: shape (number,).
-    `covariance`, shape (number, number): of the mean of flights of one other day less that of the reference.
-    `freedom`, shape (number,): degrees of freedom of the covariance; of numbers of a kind the same.
-    `measured`, shape (number,): mean variance by which a number of one flight is off, by its blocks; it is in the
-    covariance.
-    `by_voltage`, `voltage_error`, shape (number,): power of the voltage that a number goes with, and its error, which
-    all of a kind have in common; 0 where it goes with none.
-    `voltage`: of the mean; NaN where it does not count.
-    `by_agility`, shape (number,): by how much a number goes with the logarithm of how agile a flight is flown.
-    `agility_error`, shape (number,): its standard error; 0 where it does not count.
-    `agility`: that logarithm of the mean; NaN where it does not count.
-    """
-
-    names: tuple[str, ...]
-    mean: Array
-    covariance: Array
-    freedom: Array
+    names: tuple[str, ...]  # Numbers that all flights have, today's too.
+    mean: Array  # Shape (number,).
+    covariance: Array  # Shape (number, number): of the mean of flights of one other day less that of the reference.
+    freedom: Array  # Shape (number,): degrees of freedom of the covariance; of numbers of a kind the same.
+    # Shape (number,): mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
     measured: Array
+    # `by_voltage`, `voltage_error`: shape (number,): power of the voltage that a number goes with, and its error, which
+    # all of a kind have in common; 0 where it goes with none.
     by_voltage: Array
     voltage_error: Array
-    voltage: float
-    by_agility: Array
-    agility_error: Array
-    agility: float
+    voltage: float  # Of the mean; NaN where it does not count.
+    by_agility: Array  # Shape (number,): by how much a number goes with the logarithm of how agile a flight is flown.
+    agility_error: Array  # Shape (number,): its standard error; 0 where it does not count.
+    agility: float  # That logarithm of the mean; NaN where it does not count.
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Reference:
@@ -231,18 +220,12 @@ def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:
 
 @dataclass(frozen=True)
 class ThrustDirections:
-    """What a change does to the logarithms of the rotors' shares of thrust in hover.
+    """What a change does to the logarithms of the rotors' shares of thrust in hover."""
 
-    `rotor`, shape (rotor, rotor): of each rotor that lacks a share of its thrust and drag, for a whole share.
-    `mass`, shape (rotor,): for a relative change of the mass.
-    `offset`, shape (2, rotor): of the centre of mass along x and y, per m.
-    `yaw`, shape (rotor,): of a torque about z, for as much as all rotors' drag.
-    """
-
-    rotor: Array
-    mass: Array
-    offset: Array
-    yaw: Array
+    rotor: Array  # Shape (rotor, rotor): of each rotor that lacks a share of its thrust and drag, for a whole share.
+    mass: Array  # Shape (rotor,): for a relative change of the mass.
+    offset: Array  # Shape (2, rotor): of the centre of mass along x and y, per m.
+    yaw: Array  # Shape (rotor,): of a torque about z, for as much as all rotors' drag.
 
 
 def thrust_directions(vehicle: VehicleSettings) -> ThrustDirections:

@@ -159,22 +159,17 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
 
 @dataclass(frozen=True)
 class Row:
-    """Flights one after another, and what is expected of such a row.
-
-    `values`: shape (flight, number).
-    `expected`, shape (number, number): covariance of a flight before any is seen.
-    `voltage`, shape (flight, number): standard deviation of what numbers of a kind have in common by the voltage, whose
-    effect is not known well.
-    `noise`, shape (flight, number): standard deviation by which a flight is less certain than others.
-    `agility`, shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of
-    its variance numbers of a kind have in common.
-    """
+    """Flights one after another, and what is expected of such a row."""
 
     names: tuple[str, ...]
-    values: Array
-    expected: Array
+    values: Array  # Shape (flight, number).
+    expected: Array  # Shape (number, number): covariance of a flight before any is seen.
+    # Shape (flight, number): standard deviation of what numbers of a kind have in common by the voltage, whose effect
+    # is not known well.
     voltage: Array
-    noise: Array
+    noise: Array  # Shape (flight, number): standard deviation by which a flight is less certain than others.
+    # Shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of its
+    # variance numbers of a kind have in common.
     agility: Array
 
     @classmethod

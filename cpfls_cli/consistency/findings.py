@@ -14,25 +14,18 @@ _CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong with a log, or with what the config says of its vehicle.
+    """Something that is wrong with a log, or with what the config says of its vehicle."""
 
-    `what`: who says so and what is wrong, with its numbers; begins small, to follow the name of a flight.
-    `remedy`: what would mend it: keys of the config, or a part of the log.
-    `channels`: what was held against each other.
-    `size`: of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
-    `unit`: of the size; empty for a ratio.
-    `contradiction`: whether it rules out a verdict: a unit, an axis or a sign is wrong. What is delayed, noisy or a
-    little off is fitted, repaired or reported, and spoils no verdict.
-    `repairable`: whether `cpfls gap` sets it right before it looks at the model.
-    """
-
-    what: str
-    remedy: str
-    channels: tuple[str, ...]
+    what: str  # Who says so and what is wrong, with its numbers; begins small, to follow the name of a flight.
+    remedy: str  # What would mend it: keys of the config, or a part of the log.
+    channels: tuple[str, ...]  # What was held against each other.
+    # Of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
     size: float = float("nan")
-    unit: str = ""
+    unit: str = ""  # Of the size; empty for a ratio.
+    # Whether it rules out a verdict: a unit, an axis or a sign is wrong. What is delayed, noisy or a little off is
+    # fitted, repaired or reported, and spoils no verdict.
     contradiction: bool = True
-    repairable: bool = False
+    repairable: bool = False  # Whether `cpfls gap` sets it right before it looks at the model.
 
     @property
     def of_constants(self) -> bool:

@@ -40,19 +40,15 @@ class Kinematics:
     """Windows of one flight, ``d/dt r = 1/2 (r0 omega + r x omega)`` with r relative to the middle of the window.
 
     The equation keeps its form under any fixed rotation of r, so noise of the middle sample does not enter.
-
-    `rate`, shape (window, 3), rad/s: averages of the rate that the attitude shows, body axes at the middle of the
-    window; nothing is differentiated.
-    `turning`, shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those
-    axes.
-    `time`: shape (window, sample), s.
-    `gyro`: body rate over time; through smooth windows its interpolation error is nothing.
     """
 
+    # Shape (window, 3), rad/s: averages of the rate that the attitude shows, body axes at the middle of the window;
+    # nothing is differentiated.
     rate: Array
+    # Shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
     turning: Array
-    time: Array
-    gyro: "CubicSpline"
+    time: Array  # Shape (window, sample), s.
+    gyro: "CubicSpline"  # Body rate over time; through smooth windows its interpolation error is nothing.
 
     @property
     def centres(self) -> Array:
@@ -117,19 +113,13 @@ def _relative(turned: Array) -> Array:
 
 @dataclass(frozen=True)
 class DelayScan:
-    """The delay at which the readings as they are fit best.
+    """The delay at which the readings as they are fit best."""
 
-    `delay`: positive where the gyroscope is late, s, on a coarse grid.
-    `variance`, shape (3,), rad^2/s^2: left about each axis.
-    `excited`, shape (3,): axes that turn enough to identify a scale.
-    `seen`, `read`, shape (window, 3), rad/s: averages of the rate by the attitude, and by the gyroscope at that delay.
-    """
-
-    delay: float
-    variance: Array
-    excited: BoolArray
-    seen: Array
-    read: Array
+    delay: float  # Positive where the gyroscope is late, s, on a coarse grid.
+    variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
+    excited: BoolArray  # Shape (3,): axes that turn enough to identify a scale.
+    seen: Array  # Shape (window, 3), rad/s: averages of the rate by the attitude, and by the gyroscope at that delay.
+    read: Array  # The same.
 
 
 def scan(flights: Sequence[Kinematics]) -> DelayScan:
@@ -165,26 +155,18 @@ def _precision(read: Array) -> Array:
 
 @dataclass(frozen=True)
 class GyroFit:
-    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
+    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated."""
 
-    `value`, shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay
-    (s). The misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
-    `error`, shape (13,): standard errors by the jackknife over blocks.
-    `pull`, shape (13,): how far noise of the gyroscope can have pulled the value at most.
-    `known`, shape (13,): what the motion identifies.
-    `variance`, shape (3,), rad^2/s^2: left about each axis.
-    `flight_bias`, shape (flight, 3), rad/s: bias of each flight less that of all.
-    `flight_bias_error`: shape (flight, 3), rad/s.
-    """
-
+    # Shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
+    # misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
     value: Array
-    error: Array
-    pull: Array
-    known: BoolArray
+    error: Array  # Shape (13,): standard errors by the jackknife over blocks.
+    pull: Array  # Shape (13,): how far noise of the gyroscope can have pulled the value at most.
+    known: BoolArray  # Shape (13,): what the motion identifies.
     blocks: int
-    variance: Array
-    flight_bias: Array
-    flight_bias_error: Array
+    variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
+    flight_bias: Array  # Shape (flight, 3), rad/s: bias of each flight less that of all.
+    flight_bias_error: Array  # Shape (flight, 3), rad/s.
 
     def of(self, name: str) -> FaultFit:
         """Select the numbers of one kind of fault: bias, scale, misalignment or delay."""

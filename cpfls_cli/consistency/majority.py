@@ -55,18 +55,13 @@ _Read = tuple[ChannelRepair, tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Settled:
-    """What a majority of the channels decides.
-
-    `checks`: of the repaired flights.
-    `against_thrust`: that the world is upside down, turned or mirrored against thrust and attitude; None where it is
-    not.
-    `dropped`: of repairs that another channel contradicts, so that nothing is done.
-    """
+    """What a majority of the channels decides."""
 
     repairs: tuple[ChannelRepair, ...]
-    checks: tuple[PairCheck, ...]
+    checks: tuple[PairCheck, ...]  # Of the repaired flights.
+    # That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
     against_thrust: Finding | None = None
-    dropped: tuple[Finding, ...] = ()
+    dropped: tuple[Finding, ...] = ()  # Of repairs that another channel contradicts, so that nothing is done.
 
     @property
     def findings(self) -> tuple[Finding, ...]:

@@ -48,18 +48,12 @@ TINY = 1e-100
 
 
 class MotionChannel(NamedTuple):
-    """A channel of the motion.
+    """A channel of the motion."""
 
-    `words`: what it is called.
-    `keys`: what of the config says how it is read.
-    `units`: units that logs hold it in by mistake, in SI.
-    `without`: what follows where it is left out; empty for one that is never mended or left out.
-    """
-
-    words: str
-    keys: str
-    units: Mapping[str, float] = {}
-    without: str = ""
+    words: str  # What it is called.
+    keys: str  # What of the config says how it is read.
+    units: Mapping[str, float] = {}  # Units that logs hold it in by mistake, in SI.
+    without: str = ""  # What follows where it is left out; empty for one that is never mended or left out.
 
 
 _ACCELERATIONS = {
@@ -135,27 +129,18 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True)
 class PairCheck:
-    """Two channels held against each other.
-
-    `first`, `second`, shape (window, 3): what should be the same.
-    `scale`, `r2`, shape (3,): of the second against the first along each axis, and the share of what moves in both.
-    `delay`: of the second against the first, s.
-    `turn`: of the second against the first about the vertical, rad.
-    `hop_s`: from one window to the next, s.
-    `problems`: what is wrong between the two; empty where nothing is.
-    `agrees`: whether what moves moves together.
-    """
+    """Two channels held against each other."""
 
     pair: Pair
-    first: Array
-    second: Array
-    scale: Array
-    r2: Array
-    delay: Sure
-    turn: Sure
-    hop_s: float
-    problems: tuple[Finding, ...] = field(default=())
-    agrees: bool = False
+    first: Array  # Shape (window, 3): what should be the same.
+    second: Array  # The same.
+    scale: Array  # Shape (3,): of the second against the first along each axis, and the share of what moves in both.
+    r2: Array  # The same.
+    delay: Sure  # Of the second against the first, s.
+    turn: Sure  # Of the second against the first about the vertical, rad.
+    hop_s: float  # From one window to the next, s.
+    problems: tuple[Finding, ...] = field(default=())  # What is wrong between the two; empty where nothing is.
+    agrees: bool = False  # Whether what moves moves together.
 
     @property
     def moving(self) -> BoolArray:

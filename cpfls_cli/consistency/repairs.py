@@ -22,10 +22,7 @@ _SCALED = 0.1
 
 @dataclass(frozen=True)
 class ChannelRepair:
-    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
-
-    `finding`: the same as the sentence, where nothing is done about it.
-    """
+    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing."""
 
     channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")
     dropped: bool = about("1 where it is left out, and nothing else counts", default=False)
@@ -39,7 +36,7 @@ class ChannelRepair:
     sentence: str = about(
         "what is wrong, what shows it, and what to correct; empty for a channel that goes with another", default=""
     )
-    finding: Finding | None = None
+    finding: Finding | None = None  # The same as the sentence, where nothing is done about it.
 
     def with_finding(self, finding: Finding, done: str) -> Self:
         """Say what is wrong, and what is done about it."""

@@ -119,17 +119,12 @@ _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 
 
 @dataclass(frozen=True)
 class Gyroscope:
-    """The gyroscope held against the attitude.
+    """The gyroscope held against the attitude."""
 
-    `faults`: what is identified.
-    `untested`: faults that cannot, with the reason.
-    `apart`: that the two do not show one motion in one unit.
-    """
-
-    faults: tuple[CheckedFault, ...] = ()
-    untested: Mapping[str, str] = field(default_factory=dict)
+    faults: tuple[CheckedFault, ...] = ()  # What is identified.
+    untested: Mapping[str, str] = field(default_factory=dict)  # Faults that cannot, with the reason.
     fit: GyroFit | None = None
-    apart: tuple[Finding, ...] = ()
+    apart: tuple[Finding, ...] = ()  # That the two do not show one motion in one unit.
 
     @classmethod
     def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Self:
@@ -152,22 +147,14 @@ class Gyroscope:
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the sensors of flights say of each other.
+    """What the sensors of flights say of each other."""
 
-    `gyroscope`: once a late attitude is set right.
-    `clocks`: what sets a late attitude and late rotors right.
-    `notes`: what nobody knows of a clock.
-    `flights`: on one clock.
-    `motion`: what a majority says of the channels of the motion.
-    `findings`: what is wrong.
-    """
-
-    gyroscope: Gyroscope
-    clocks: tuple[ChannelRepair, ...]
-    notes: tuple[str, ...]
-    flights: tuple[Signals, ...]
-    motion: Settled
-    findings: tuple[Finding, ...]
+    gyroscope: Gyroscope  # Once a late attitude is set right.
+    clocks: tuple[ChannelRepair, ...]  # What sets a late attitude and late rotors right.
+    notes: tuple[str, ...]  # What nobody knows of a clock.
+    flights: tuple[Signals, ...]  # On one clock.
+    motion: Settled  # What a majority says of the channels of the motion.
+    findings: tuple[Finding, ...]  # What is wrong.
 
 
 def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:

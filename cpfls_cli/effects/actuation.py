@@ -39,13 +39,10 @@ def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
 
 @dataclass
 class DelayLine:
-    """Rotors behind a delay, step by step, in straight lines; before the first have arrived they keep their speed.
+    """Rotors behind a delay, step by step, in straight lines; before the first have arrived they keep their speed."""
 
-    `steps`: delay in steps, at least 0; `past`: what is still under way.
-    """
-
-    steps: float
-    past: list[RotorMotion] = field(default_factory=list)
+    steps: float  # Delay in steps, at least 0.
+    past: list[RotorMotion] = field(default_factory=list)  # What is still under way.
 
     def __call__(self, rotors: RotorMotion) -> RotorMotion:
         """Take up the rotors of a step, and give those that arrive."""
@@ -63,13 +60,10 @@ class DelayLine:
 
 @dataclass(frozen=True)
 class CommandFilter:
-    """A second-order filter between command and rotors, with the functions that an effect is made of.
+    """A second-order filter between command and rotors, with the functions that an effect is made of."""
 
-    `damping`: name of the shape that is zeta; the other one is ``frequency_hz``; `upper`: (a, b, c) of `SecondOrder`.
-    """
-
-    damping: str
-    upper: tuple[float, float, float]
+    damping: str  # Name of the shape that is zeta; the other one is ``frequency_hz``.
+    upper: tuple[float, float, float]  # (a, b, c) of `SecondOrder`.
 
     def _passing(self, shape: Mapping[str, float], period: float) -> SecondOrder:
         return second_order(shape["frequency_hz"], shape[self.damping], period, self.upper)

@@ -19,20 +19,15 @@ Kind = Literal["wrench", "actuator", "sensor", "parameter"]
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One number that an effect needs.
-
-    `low`, `high`: what is physically possible, not what is usual, in multiples of `scale`.
-    `scale`: natural size on a vehicle, in `unit`; None for 1.
-    `of_log`: whether it is of the log, and not of the motion.
-    """
+    """One number that an effect needs."""
 
     name: str
     unit: str
-    low: float
-    high: float
+    low: float  # What is physically possible, not what is usual, in multiples of `scale`.
+    high: float  # The same.
     meaning: str
-    scale: Callable[[VehicleSettings], float] | None = None
-    of_log: bool = False
+    scale: Callable[[VehicleSettings], float] | None = None  # Natural size on a vehicle, in `unit`; None for 1.
+    of_log: bool = False  # Whether it is of the log, and not of the motion.
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle, in `unit`."""
@@ -58,19 +53,14 @@ def of_axes(
 
 @dataclass(frozen=True)
 class Shape:
-    """A parameter that an effect depends on nonlinearly.
-
-    `grid`: ascending; values that a search starts from. The first and the last bound it.
-    `first`: where a search stays until the effect is chosen; None: it tries the whole grid.
-    `valley`: where the residual has many valleys over it: their width, as a share of the value.
-    """
+    """A parameter that an effect depends on nonlinearly."""
 
     name: str
     unit: str
-    grid: tuple[float, ...]
+    grid: tuple[float, ...]  # Ascending; values that a search starts from. The first and the last bound it.
     meaning: str
-    first: float | None = None
-    valley: float | None = None
+    first: float | None = None  # Where a search stays until the effect is chosen; None: it tries the whole grid.
+    valley: float | None = None  # Where the residual has many valleys over it: their width, as a share of the value.
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the shape, on any vehicle, in `unit`."""
@@ -84,15 +74,12 @@ class Shape:
 
 @dataclass(frozen=True)
 class Columns:
-    """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``.
+    """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``."""
 
-    `direct`, shape (time, 6, coefficient): torque (3) and force (3) about the body axes for one unit of each
-    coefficient.
-    `momentum`, shape (time, 6, coefficient): what has to be differentiated in time; None for nothing. Nobody
-    differentiates it: windows are integrated by parts.
-    """
-
+    # Shape (time, 6, coefficient): torque (3) and force (3) about the body axes for one unit of each coefficient.
     direct: Array
+    # Shape (time, 6, coefficient): what has to be differentiated in time; None for nothing. Nobody differentiates it:
+    # windows are integrated by parts.
     momentum: Array | None = None
 
     def at_samples(self, coefficients: Array, time: Array) -> Array:
@@ -115,74 +102,56 @@ class Columns:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """A physical effect that a model may miss.
+    """A physical effect that a model may miss."""
 
-    `name`: identifier.
-    `title`: what people call it.
-    `kind`: adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the
-    vehicle.
-    `formula`: one line.
-    `sentence`: what a pilot understands.
-    `coefficients`: physical, as reported; those of `shapes` not among them.
-    `needs`: of `Signals.available`.
-    `excitation`: the flight that shows it.
-    `rivals`: effects that look alike, each with the flight that separates them.
-    `columns`: ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of
-    wrench. None for what only the audit of the sensors can see.
-    `physical`: None: the linear coefficients are the physical ones, whose bounds bound them.
-    `apply`: for effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without
-    the effect's error, or with its air, so that all other columns can be computed from them.
-    `describe`: ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by
-    name.
-    `rate_derivative`: whether the columns hold the derivative of the body rates, and with it the noise of the
-    gyroscope.
-    `holds`: effects that are special cases of this one, which is then not their rival.
-    `scatter`: for effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque
-    and force for a unit of relative scatter.
-    `order`: place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
-    `of_all_forces`: whether the columns have a lever for the forces of all other effects.
-    `actuation`: for effects between command and rotors: how they are simulated.
-    `carried`: for effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of
-    the columns.
-    `log`: for effects on the log: how they are simulated.
-    `test`: for effects that the sensor audit finds.
-    `accounts`: ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself
-    leaves, so that the number is not called wrong.
-    `in_vehicle`: ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in
-    the model of a whole vehicle.
-    `exact`: what takes the place of this one once it is chosen: the same effect with numbers for which alone another
-    effect would do as well, or with those that others depend on as shapes, under the same names.
-    `lever`: ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others
-    leave possible, a torque being no larger than its force on a lever as long as the body.
-    """
-
-    name: str
-    title: str
+    name: str  # Identifier.
+    title: str  # What people call it.
+    # Adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the vehicle.
     kind: Kind
-    formula: str
-    sentence: str
-    needs: frozenset[str]
-    excitation: str
-    rivals: Mapping[str, str]
+    formula: str  # One line.
+    sentence: str  # What a pilot understands.
+    needs: frozenset[str]  # Of `Signals.available`.
+    excitation: str  # The flight that shows it.
+    rivals: Mapping[str, str]  # Effects that look alike, each with the flight that separates them.
     source: str
-    coefficients: tuple[Coefficient, ...] = ()
+    coefficients: tuple[Coefficient, ...] = ()  # Physical, as reported; those of `shapes` not among them.
     shapes: tuple[Shape, ...] = ()
+    # ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
+    # None for what only the audit of the sensors can see.
     columns: Callable[[Signals, Mapping[str, float]], Columns] | None = None
+    # None: the linear coefficients are the physical ones, whose bounds bound them.
     physical: PhysicalNumbers | None = None
+    # For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
+    # effect's error, or with its air, so that all other columns can be computed from them.
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
+    # For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
+    # force for a unit of relative scatter.
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
+    # ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
-    holds: frozenset[str] = frozenset()
+    holds: frozenset[str] = frozenset()  # Effects that are special cases of this one, which is then not their rival.
+    # Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     rate_derivative: bool = False
+    # Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
     order: int = 1000
-    of_all_forces: bool = False
-    actuation: Actuation | None = None
+    of_all_forces: bool = False  # Whether the columns have a lever for the forces of all other effects.
+    actuation: Actuation | None = None  # For effects between command and rotors: how they are simulated.
+    # For effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of the
+    # columns.
     carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
-    log: SensorLog | None = None
-    test: SensorTest | None = None
+    log: SensorLog | None = None  # For effects on the log: how they are simulated.
+    test: SensorTest | None = None  # For effects that the sensor audit finds.
+    # ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves, so
+    # that the number is not called wrong.
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
+    # ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model of a
+    # whole vehicle.
     in_vehicle: Callable[[VehicleParts, Mapping[str, float], Array], VehicleParts] | None = None
+    # What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
+    # would do as well, or with those that others depend on as shapes, under the same names.
     exact: Effect | None = None
+    # ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
+    # possible, a torque being no larger than its force on a lever as long as the body.
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
 
     def __post_init__(self) -> None:

@@ -12,13 +12,10 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 class RotorMotion(NamedTuple):
-    """Rotors in the middle of a step.
+    """Rotors in the middle of a step."""
 
-    `speed`: shape (rotor,), rad/s; `acceleration`: shape (rotor,), rad/s^2.
-    """
-
-    speed: Array
-    acceleration: Array
+    speed: Array  # Shape (rotor,), rad/s.
+    acceleration: Array  # Shape (rotor,), rad/s^2.
 
 
 Link = Callable[[RotorMotion], RotorMotion]
@@ -27,75 +24,52 @@ Link = Callable[[RotorMotion], RotorMotion]
 
 @dataclass(frozen=True, kw_only=True)
 class Actuation:
-    """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds.
+    """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds."""
 
-    `lag`: ``lag(values) -> float``: time constant in s that replaces that of the rotors.
-    `link`: ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
-    `delay`: ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
-    `supply`: ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is
-    logged.
-    """
-
+    # ``lag(values) -> float``: time constant in s that replaces that of the rotors.
     lag: Callable[[Mapping[str, float]], float] | None = None
+    # ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
     link: Callable[[Mapping[str, float], float], Link] | None = None
+    # ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
     delay: Callable[[Mapping[str, float]], float] | None = None
+    # ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
     supply: Callable[[Mapping[str, float], float], float] | None = None
 
 
 class PhysicalNumbers(NamedTuple):
-    """How linear coefficients are written as physical ones, which are not linear in the columns.
+    """How linear coefficients are written as physical ones, which are not linear in the columns."""
 
-    `of`: ``of(linear) -> physical``, NaN where the data left one open; `linear`: the reverse.
-    """
-
-    of: Callable[[Array], Array]
-    linear: Callable[[Array], Array]
+    of: Callable[[Array], Array]  # ``of(linear) -> physical``, NaN where the data left one open.
+    linear: Callable[[Array], Array]  # The reverse.
 
 
 class VehicleParts(NamedTuple):
-    """What effects become in the model of a whole vehicle.
-
-    `inertia`, shape (3, 3), kg m^2: added to that of the vehicle.
-    `wind`: m/s, world frame.
-    `effects`: those without a place of their own: name, shape, linear coefficients.
-    """
+    """What effects become in the model of a whole vehicle."""
 
     vehicle: VehicleSettings
-    inertia: Array
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: Array  # Shape (3, 3), kg m^2: added to that of the vehicle.
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)  # M/s, world frame.
+    # Those without a place of their own: name, shape, linear coefficients.
     effects: tuple[tuple[str, Mapping[str, float], Array], ...] = ()
 
 
 class Carrier(NamedTuple):
-    """The vehicle that carries a body.
+    """The vehicle that carries a body."""
 
-    `mass`: kg.
-    `inertia`: shape (3, 3), kg m^2, body frame.
-    `rotation`, shape (3, 3): body to world.
-    `body_rate`: shape (3,), rad/s, body frame.
-    `acceleration`, shape (3,), m/s^2, world frame: without the carried body.
-    `turning`, shape (3,), rad/s^2, body frame: the same.
-    """
-
-    mass: float
-    inertia: Array
-    rotation: Array
-    body_rate: Array
-    acceleration: Array
-    turning: Array
+    mass: float  # Kg.
+    inertia: Array  # Shape (3, 3), kg m^2, body frame.
+    rotation: Array  # Shape (3, 3): body to world.
+    body_rate: Array  # Shape (3,), rad/s, body frame.
+    acceleration: Array  # Shape (3,), m/s^2, world frame: without the carried body.
+    turning: Array  # Shape (3,), rad/s^2, body frame: the same.
 
 
 class Pull(NamedTuple):
-    """Acceleration of the carrier by a carried body, and the derivative of its state.
+    """Acceleration of the carrier by a carried body, and the derivative of its state."""
 
-    `acceleration`: shape (3,), m/s^2, world frame.
-    `turning`: shape (3,), rad/s^2, body frame.
-    `change`, shape (state,): derivative of the state of the body.
-    """
-
-    acceleration: Array
-    turning: Array
-    change: Array
+    acceleration: Array  # Shape (3,), m/s^2, world frame.
+    turning: Array  # Shape (3,), rad/s^2, body frame.
+    change: Array  # Shape (state,): derivative of the state of the body.
 
 
 class CarriedBody(Protocol):
@@ -112,18 +86,12 @@ class CarriedBody(Protocol):
 
 
 class TrueMotion(NamedTuple):
-    """True motion at the samples of a simulated flight.
+    """True motion at the samples of a simulated flight."""
 
-    `time`: shape (time,), s.
-    `rotation`, shape (time, 3, 3): body to world.
-    `body_rate`: shape (time, 3), rad/s, body frame.
-    `body_acceleration`: shape (time, 3), rad/s^2, body frame.
-    """
-
-    time: Array
-    rotation: Array
-    body_rate: Array
-    body_acceleration: Array
+    time: Array  # Shape (time,), s.
+    rotation: Array  # Shape (time, 3, 3): body to world.
+    body_rate: Array  # Shape (time, 3), rad/s, body frame.
+    body_acceleration: Array  # Shape (time, 3), rad/s^2, body frame.
 
     @property
     def period(self) -> float:
@@ -133,15 +101,11 @@ class TrueMotion(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorLog:
-    """How the log of a sensor differs from the truth.
+    """How the log of a sensor differs from the truth."""
 
-    `change`: ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without
-    noise.
-    `does`: the same in words, for refusals.
-    """
-
+    # ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without noise.
     change: Callable[[Mapping[str, Array], TrueMotion, Mapping[str, float]], dict[str, Array]]
-    does: str = "needs measured rotor speeds"
+    does: str = "needs measured rotor speeds"  # The same in words, for refusals.
 
 
 def gyroscope_log(reading: Callable[[Array, Array], Array]) -> SensorLog:
@@ -162,46 +126,31 @@ class ReadingError(NamedTuple):
 
 
 class FaultFit(NamedTuple):
-    """Estimated numbers of a fault.
+    """Estimated numbers of a fault."""
 
-    `value`, `error`, shape (number,): with standard errors.
-    `pull`, shape (number,): how far noise of the sensor can have pulled the value at most.
-    `known`, shape (number,): what the motion identifies.
-    `blocks`: of time that scattered the values.
-    """
-
-    value: Array
-    error: Array
-    pull: Array
-    known: BoolArray
-    blocks: int
+    value: Array  # Shape (number,): with standard errors.
+    error: Array  # The same.
+    pull: Array  # Shape (number,): how far noise of the sensor can have pulled the value at most.
+    known: BoolArray  # Shape (number,): what the motion identifies.
+    blocks: int  # Of time that scattered the values.
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorTest:
-    """How the sensor audit tests a fault, says what it found, and repairs it.
+    """How the sensor audit tests a fault, says what it found, and repairs it."""
 
-    `estimate`: numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or
-    ``delay``; else ``estimate(flights) -> FaultFit``, None where the flights do not identify it.
-    `labels`: names of the numbers in findings, in the order of the effect's coefficients, then shapes.
-    `smallest`: size below which a fault moves no torque by more than the noise of a window, so that nothing is to
-    repair.
-    `smallest_samples`: the same in sampling periods, for a time.
-    `number`: ``number(label, value) -> str``: a number in words.
-    `found`: sentence with ``{}`` for the numbers.
-    `nothing`: sentence where no number is named.
-    `error`: ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
-    `signal`: field of `Signals`, shape (time, 3).
-    `integrated`: whether an attitude that is integrated from the gyroscope would not show the fault.
-    """
-
+    # Numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or ``delay``;
+    # else ``estimate(flights) -> FaultFit``, None where the flights do not identify it.
     estimate: str | Callable[[Sequence[Signals]], FaultFit | None]
+    # Size below which a fault moves no torque by more than the noise of a window, so that nothing is to repair.
     smallest: float
-    number: Callable[[str, float], str]
-    found: str
-    nothing: str
+    number: Callable[[str, float], str]  # ``number(label, value) -> str``: a number in words.
+    found: str  # Sentence with ``{}`` for the numbers.
+    nothing: str  # Sentence where no number is named.
+    # ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
     error: Callable[[Array], ReadingError]
+    # Names of the numbers in findings, in the order of the effect's coefficients, then shapes.
     labels: tuple[str, ...] = ("x", "y", "z")
-    smallest_samples: float = 0.0
-    signal: str = "body_rate"
-    integrated: bool = False
+    smallest_samples: float = 0.0  # The same in sampling periods, for a time.
+    signal: str = "body_rate"  # Field of `Signals`, shape (time, 3).
+    integrated: bool = False  # Whether an attitude that is integrated from the gyroscope would not show the fault.

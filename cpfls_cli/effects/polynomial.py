@@ -61,13 +61,11 @@ def rotor_terms(speed: Array, acceleration: Array) -> Array:
 
 @dataclass(frozen=True)
 class Probe:
-    """Motions and rotor speeds at random, and their terms, for one vehicle.
-
-    `share`, shape (time, rotor): rotor speeds as shares of the one at which the vehicle hovers; the same for all
-    vehicles of as many rotors.
-    """
+    """Motions and rotor speeds at random, and their terms, for one vehicle."""
 
     signals: Signals
+    # Shape (time, rotor): rotor speeds as shares of the one at which the vehicle hovers; the same for all vehicles of
+    # as many rotors.
     share: Array
     rotor: Array
     state: Array

@@ -32,49 +32,33 @@ _OF_FORCE = ("force", "available", "of_motion", "made")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Signals:
-    """A flight on a uniform clock, in SI, body frame FLU, world z up.
+    """A flight on a uniform clock, in SI, body frame FLU, world z up."""
 
-    `time`: shape (time,), s.
-    `body_rate`: shape (time, 3), rad/s, body frame.
-    `attitude`, shape (time, 3), rad: roll, pitch, yaw.
-    `velocity`, shape (time, 3), m/s, world frame: relative to the ground.
-    `position`: shape (time, 3), m, world frame.
-    `acceleration`: shape (time, 3), m/s^2, world frame.
-    `specific_force`, shape (time, 3), m/s^2, body frame: what an accelerometer senses; with attitude it follows from
-    the acceleration too.
-    `rotor_speed`, shape (time, rotor), rad/s: measured, or commanded where `commanded`.
-    `commanded`: whether actuation is what was asked for, not what was measured.
-    `rotor_command`, shape (time, rotor), rad/s: what was asked for, where speeds were measured too.
-    `stated_torque`, shape (time, 3), N m, body frame: torque of a log that has no rotor speeds.
-    `stated_thrust`, shape (time,), N: thrust of such a log.
-    `voltage`, shape (time,): as a fraction of the full battery.
-    `ground_height_m`: height of the ground in the world frame.
-    `wind`, shape (3,), m/s, world frame: None for still air.
-    `known_wrench`, shape (time, 6), N m and N, body frame: torque and force of a known model beyond
-    the squares of its rotor speeds.
-    `setpoints`, each shape (time, column): what was asked of the autopilot and of its loops, where it is known at all
-    samples: ``position`` and ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad;
-    ``body_rate``, rad/s, body frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks``
-    as roll, pitch, yaw, throttle, shares of full deflection as logged. Each stays until the next sample.
-    """
-
-    time: Array
-    body_rate: Array
+    time: Array  # Shape (time,), s.
+    body_rate: Array  # Shape (time, 3), rad/s, body frame.
     vehicle: VehicleSettings
-    attitude: Array | None = None
-    velocity: Array | None = None
-    position: Array | None = None
-    acceleration: Array | None = None
+    attitude: Array | None = None  # Shape (time, 3), rad: roll, pitch, yaw.
+    velocity: Array | None = None  # Shape (time, 3), m/s, world frame: relative to the ground.
+    position: Array | None = None  # Shape (time, 3), m, world frame.
+    acceleration: Array | None = None  # Shape (time, 3), m/s^2, world frame.
+    # Shape (time, 3), m/s^2, body frame: what an accelerometer senses; with attitude it follows from the acceleration
+    # too.
     specific_force: Array | None = None
-    rotor_speed: Array | None = None
-    commanded: bool = False
+    rotor_speed: Array | None = None  # Shape (time, rotor), rad/s: measured, or commanded where `commanded`.
+    commanded: bool = False  # Whether actuation is what was asked for, not what was measured.
+    # Shape (time, rotor), rad/s: what was asked for, where speeds were measured too.
     rotor_command: Array | None = None
-    stated_torque: Array | None = None
-    stated_thrust: Array | None = None
-    voltage: Array | None = None
-    ground_height_m: float = 0.0
-    wind: Array | None = None
+    stated_torque: Array | None = None  # Shape (time, 3), N m, body frame: torque of a log that has no rotor speeds.
+    stated_thrust: Array | None = None  # Shape (time,), N: thrust of such a log.
+    voltage: Array | None = None  # Shape (time,): as a fraction of the full battery.
+    ground_height_m: float = 0.0  # Height of the ground in the world frame.
+    wind: Array | None = None  # Shape (3,), m/s, world frame: None for still air.
+    # Shape (time, 6), N m and N, body frame: torque and force of a known model beyond the squares of its rotor speeds.
     known_wrench: Array | None = None
+    # Each shape (time, column): what was asked of the autopilot and of its loops, where it is known at all samples:
+    # ``position`` and ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad; ``body_rate``,
+    # rad/s, body frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks`` as roll,
+    # pitch, yaw, throttle, shares of full deflection as logged. Each stays until the next sample.
     setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:

@@ -31,12 +31,9 @@ _EVERY = 5
 
 @dataclass(frozen=True)
 class PlayedPair(Played):
-    """A flight, a model with effects, and the model as given, which takes the log as it is.
+    """A flight, a model with effects, and the model as given, which takes the log as it is."""
 
-    `logged`: with the faults of the sensors, so that a fault shows.
-    """
-
-    logged: PlaybackFlight
+    logged: PlaybackFlight  # With the faults of the sensors, so that a fault shows.
 
     def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
         """Predict from samples of the flight."""
@@ -257,20 +254,16 @@ class PlaybackChange(AlongFlights):
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Errors of the model as given and of the model with effects on held-out flights.
-
-    `stretches`: of the model as given, largest gap first.
-    `repeatability_before`, `repeatability_after`: of training flights too; None where no flight repeats another.
-    """
+    """Errors of the model as given and of the model with effects on held-out flights."""
 
     playback: PlaybackChange
     residual: ResidualChange
-    stretches: tuple[GapStretch, ...]
+    stretches: tuple[GapStretch, ...]  # Of the model as given, largest gap first.
     whiteness: WhitenessChange
     picture: WorstWindows
     run: FreeRuns
-    repeatability_before: Repeatability | None
-    repeatability_after: Repeatability | None
+    repeatability_before: Repeatability | None  # Of training flights too; None where no flight repeats another.
+    repeatability_after: Repeatability | None  # The same.
 
 
 def before_after(

@@ -59,16 +59,13 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 @dataclass(frozen=True)
 class DiagnosisRun:
-    """A diagnosis with the fits and residuals that it was made from.
-
-    `air`: gusts in the training flights; None where nothing but noise is left, or the flights are too short.
-    `hypothesis`: of the training flights, with the chosen effects.
-    """
+    """A diagnosis with the fits and residuals that it was made from."""
 
     diagnosis: Conclusion
+    # Gusts in the training flights; None where nothing but noise is left, or the flights are too short.
     air: Air | None
     audit: Audit
-    hypothesis: System
+    hypothesis: System  # Of the training flights, with the chosen effects.
     estimates: Estimates
     held_out: HeldOut
 

@@ -28,28 +28,21 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
 class FittedEffect(NamedTuple):
-    """An effect of a model with its linear coefficients.
-
-    `linear`, shape (coefficient,): of its columns; empty where everything is in the shape.
-    """
+    """An effect of a model with its linear coefficients."""
 
     candidate: Candidate
-    linear: Array
+    linear: Array  # Shape (coefficient,): of its columns; empty where everything is in the shape.
 
 
 @dataclass(frozen=True)
 class ExtendedModel:
-    """A model with effects; without any and with zero parameters it is the base.
+    """A model with effects; without any and with zero parameters it is the base."""
 
-    `base`: None for the rigid body of the vehicle.
-    `parameters`, shape (parameter,): relative errors of the vehicle's own numbers, in the order of the catalogue.
-    `audit`: faults of the sensors, which are taken out of signals first.
-    """
-
-    base: InertiaModel | None
+    base: InertiaModel | None  # None for the rigid body of the vehicle.
+    # Shape (parameter,): relative errors of the vehicle's own numbers, in the order of the catalogue.
     parameters: Array
     effects: tuple[FittedEffect, ...] = ()
-    audit: Audit | None = None
+    audit: Audit | None = None  # Faults of the sensors, which are taken out of signals first.
 
     @classmethod
     def of(cls, base: InertiaModel | None, hypothesis: System, estimates: Estimates, audit: Audit) -> ExtendedModel:
@@ -98,13 +91,10 @@ def plain(base: InertiaModel | None) -> ExtendedModel:
 
 @dataclass(frozen=True)
 class Refit:
-    """A refitted model with effects and its residuals on held-out flights.
-
-    `effects`: with refitted numbers.
-    """
+    """A refitted model with effects and its residuals on held-out flights."""
 
     model: ExtendedModel
-    effects: tuple[NamedEffect, ...]
+    effects: tuple[NamedEffect, ...]  # With refitted numbers.
     estimates: Estimates
     unseen: HeldOut
 

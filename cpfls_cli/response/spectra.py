@@ -45,13 +45,10 @@ _TINY = np.finfo(float).tiny
 
 
 class Channel(NamedTuple):
-    """A signal, or the derivative of one that is never differentiated, or the sum of both.
+    """A signal, or the derivative of one that is never differentiated, or the sum of both."""
 
-    `values`: shape (time,); `integral`, shape (time,): of which the derivative is meant, unit times s.
-    """
-
-    values: Array | None = None
-    integral: Array | None = None
+    values: Array | None = None  # Shape (time,).
+    integral: Array | None = None  # Shape (time,): of which the derivative is meant, unit times s.
 
     def cut(self, part: slice) -> Channel:
         """Take a part of it."""
@@ -59,20 +56,14 @@ class Channel(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Signals without a pause, evenly sampled.
+    """Signals without a pause, evenly sampled."""
 
-    `input`: shape (time,).
-    `model`: what a model gives for the output.
-    `instrument`, shape (time, column): NaN where there is none. None: the input, which is right where nothing disturbs
-    the output.
-    `start`: first sample, counted from where the path begins that a flight has in common with its repeats.
-    """
-
-    input: Array
+    input: Array  # Shape (time,).
     output: Channel
-    model: Channel | None = None
+    model: Channel | None = None  # What a model gives for the output.
+    # Shape (time, column): NaN where there is none. None: the input, which is right where nothing disturbs the output.
     instrument: Array | None = None
-    start: int = 0
+    start: int = 0  # First sample, counted from where the path begins that a flight has in common with its repeats.
 
 
 @result

@@ -23,14 +23,11 @@ _ALONE = 0.95
 
 @dataclass(frozen=True)
 class BlockRows:
-    """What normal equations are made of.
+    """What normal equations are made of."""
 
-    `columns`: shape (window, channel, column); `right`: shape (window, channel, draw); `parts`: windows of each block.
-    """
-
-    columns: Array
-    right: Array
-    parts: list[slice | BoolArray]
+    columns: Array  # Shape (window, channel, column).
+    right: Array  # Shape (window, channel, draw).
+    parts: list[slice | BoolArray]  # Windows of each block.
 
     def products(self, first: Array, second: Array) -> Array:
         """Multiply columns, shape (window, channel, column), over each block: shape (block, first, second column)."""
@@ -50,18 +47,13 @@ class BlockRows:
 
 @dataclass(frozen=True)
 class Folds:
-    """Normal equations of each block.
+    """Normal equations of each block."""
 
-    `gram`: shape (block, column, column).
-    `moment`, shape (block, column, draw): columns times right side; several right sides are draws.
-    `square`, shape (block, draw): sums of squares of the right side.
-    `prior`, shape (column,): information that bounds give before any data: one over the square of the largest possible
-    coefficient.
-    """
-
-    gram: Array
-    moment: Array
-    square: Array
+    gram: Array  # Shape (block, column, column).
+    moment: Array  # Shape (block, column, draw): columns times right side; several right sides are draws.
+    square: Array  # Shape (block, draw): sums of squares of the right side.
+    # Shape (column,): information that bounds give before any data: one over the square of the largest possible
+    # coefficient.
     prior: Array
     made_of: BlockRows
 
@@ -136,24 +128,18 @@ class Folds:
 
 @dataclass(frozen=True)
 class ConditionalNormalEquations:
-    """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all.
-
-    `gram`, shape (block + 1, column, column): of columns without what the base explains of them, over the blocks that a
-    fit sees.
-    `moment`: shape (block + 1, column, draw).
-    `length`, shape (block + 1, column): of whole columns.
-    `own`, `own_moment`: as `gram` and `moment`, on the block that a fit does not see, or on all blocks.
-    `left`, shape (block + 1, draw): sum of squares that the base leaves there.
-    """
+    """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all."""
 
     normal: Folds
     base: IntArray
+    # Shape (block + 1, column, column): of columns without what the base explains of them, over the blocks that a fit
+    # sees.
     gram: Array
-    moment: Array
-    length: Array
-    own: Array
-    own_moment: Array
-    left: Array
+    moment: Array  # Shape (block + 1, column, draw).
+    length: Array  # Shape (block + 1, column): of whole columns.
+    own: Array  # As `gram` and `moment`, on the block that a fit does not see, or on all blocks.
+    own_moment: Array  # The same.
+    left: Array  # Shape (block + 1, draw): sum of squares that the base leaves there.
 
     @property
     def before(self) -> Array:

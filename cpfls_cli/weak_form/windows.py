@@ -22,18 +22,12 @@ _SAME_RATE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop.
+    """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop."""
 
-    `weight`, shape (window,): phi dt.
-    `slope`, shape (window,), 1/s: phi' dt.
-    `hop`: samples from one window to the next.
-    `period`: sampling period, s.
-    """
-
-    weight: Array
-    slope: Array
-    hop: int
-    period: float
+    weight: Array  # Shape (window,): phi dt.
+    slope: Array  # Shape (window,), 1/s: phi' dt.
+    hop: int  # Samples from one window to the next.
+    period: float  # Sampling period, s.
 
     def count(self, samples: int) -> int:
         """Count the windows that fit into a flight."""

@@ -51,17 +51,12 @@ def shown(turns: BoolArray) -> Array:
 
 
 class Change(NamedTuple):
-    """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle.
+    """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle."""
 
-    `offset`: shape (10,).
-    `matrix`, shape (10, 10): columns of numbers that stay as they are, are zero.
-    `low`, `high`: shape (10,).
-    """
-
-    offset: Array
-    matrix: Array
-    low: Array
-    high: Array
+    offset: Array  # Shape (10,).
+    matrix: Array  # Shape (10, 10): columns of numbers that stay as they are, are zero.
+    low: Array  # Shape (10,).
+    high: Array  # Shape (10,).
 
 
 def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Change:

@@ -25,17 +25,12 @@ _QUIET_AXIS = 0.3
 
 @dataclass(frozen=True)
 class System:
-    """The balance of all flights under a hypothesis; windows of all flights one after another.
-
-    `chosen`: effects of the hypothesis.
-    `signals`: of each flight, with the actuator effects among `chosen` applied.
-    `cache`: columns by effect and shape.
-    """
+    """The balance of all flights under a hypothesis; windows of all flights one after another."""
 
     flights: tuple[WeakFlight, ...]
-    chosen: tuple[Candidate, ...]
-    signals: tuple[Signals, ...]
-    cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
+    chosen: tuple[Candidate, ...]  # Effects of the hypothesis.
+    signals: tuple[Signals, ...]  # Of each flight, with the actuator effects among `chosen` applied.
+    cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)  # Columns by effect and shape.
 
     def columns(self, candidate: Candidate) -> Array:
         """Evaluate a candidate, shape (window, 6, coefficient); zeros for a flight that lacks a signal it needs."""

@@ -52,27 +52,24 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WeakFlight:
-    """A flight with its inertial torque and force.
-
-    `inertial`: momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
-    `known`, shape (6,): channels that the flight has.
-    `turns`, shape (parameter,): 1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes
-    that hardly turn.
-    `cut_off`, shape (6,), Hz: of the filters that the signals of each channel went through before they were logged;
-    infinite for none.
-    `air`, shape (6,), N m and N: standard deviation that gusts and noise give averages over the windows; 0 where no
-    gusts are known.
-    `seen`: rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
-    """
+    """A flight with its inertial torque and force."""
 
     name: str
     signals: Signals
     windows: Windows
+    # Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
     inertial: Columns
-    known: BoolArray
+    known: BoolArray  # Shape (6,): channels that the flight has.
+    # Shape (parameter,): 1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that
+    # hardly turn.
     turns: Array
+    # Shape (6,), Hz: of the filters that the signals of each channel went through before they were logged; infinite for
+    # none.
     cut_off: Array = field(default_factory=lambda: np.full(6, np.inf))
+    # Shape (6,), N m and N: standard deviation that gusts and noise give averages over the windows; 0 where no gusts
+    # are known.
     air: Array = field(default_factory=lambda: np.zeros(6))
+    # Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -242,15 +239,12 @@ def translation_balance(signals: Signals) -> Columns:
 
 @dataclass(frozen=True)
 class Preparation:
-    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
-
-    `model`: None for the rigid body of the vehicle; `audit`: faults that are repaired.
-    """
+    """Windows, model, settings and sensor repair that all flights of a diagnosis share."""
 
     windows: Windows
-    model: InertiaModel | None
+    model: InertiaModel | None  # None for the rigid body of the vehicle.
     settings: GapSettings
-    audit: Audit
+    audit: Audit  # Faults that are repaired.
 
     def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
         """Prepare flights with the faults of their sensors, but with channels that belong together."""

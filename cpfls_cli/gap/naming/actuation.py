@@ -24,15 +24,12 @@ _Names = tuple[str, ...]
 
 
 class ActuationFit(NamedTuple):
-    """Lags between command and rotors: fits with the set that leaves the least residual, and with none.
-
-    `chances`: p-value of each effect of the set; `alike`: sets that leave as little.
-    """
+    """Lags between command and rotors: fits with the set that leaves the least residual, and with none."""
 
     found: NamedFit
     without: NamedFit
-    chances: dict[str, float]
-    alike: tuple[Alternative, ...]
+    chances: dict[str, float]  # P-value of each effect of the set.
+    alike: tuple[Alternative, ...]  # Sets that leave as little.
 
 
 def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: Instruments) -> ActuationFit:
@@ -75,16 +72,14 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
 
 @dataclass
 class _Sets:
-    """Sets of lags by their names, each fitted by instruments jointly with all other effects.
-
-    `fits`: of the sets that were tried and whose numbers instruments identify.
-    `predictable`: products of the residual of each with its prediction from the past, shape (block,).
-    """
+    """Sets of lags by their names, each fitted by instruments jointly with all other effects."""
 
     found: NamedFit
     effects: Mapping[str, Effect]
     given: Instruments
+    # Of the sets that were tried and whose numbers instruments identify.
     fits: dict[_Names, NamedFit] = field(default_factory=dict)
+    # Products of the residual of each with its prediction from the past, shape (block,).
     predictable: dict[_Names, Array] = field(default_factory=dict)
 
     @property

@@ -27,14 +27,10 @@ _Numbers = tuple[Estimate, ...]
 
 
 class _Source(NamedTuple):
-    """Products of instruments and regressors.
+    """Products of instruments and regressors."""
 
-    `products`, shape (block, number + 1, number + 1): ZtX of each number, and Ztr in the last column.
-    `numbers`, shape (number,): those that are free and that it identifies, and no source before it does.
-    """
-
-    products: Array
-    numbers: BoolArray
+    products: Array  # Shape (block, number + 1, number + 1): ZtX of each number, and Ztr in the last column.
+    numbers: BoolArray  # Shape (number,): those that are free and that it identifies, and no source before it does.
 
 
 def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
@@ -247,14 +243,11 @@ def _with_unidentified(before: NamedFit, after: Estimates, moved: BoolArray) -> 
 
 
 class _Windows(NamedTuple):
-    """Windows of a run in floors: regressors and last the residual, and what instruments predict of both.
+    """Windows of a run in floors: regressors and last the residual, and what instruments predict of both."""
 
-    `rows`, `known`: shape (window, 6, number + 1); `block`: shape (window,).
-    """
-
-    rows: Array
-    known: Array
-    block: IntArray
+    rows: Array  # Shape (window, 6, number + 1).
+    known: Array  # The same.
+    block: IntArray  # Shape (window,).
 
 
 def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:

@@ -28,14 +28,11 @@ _MATTERS = 0.02
 
 @dataclass(frozen=True)
 class JudgedEffect:
-    """A chosen effect and its rivals.
-
-    `odds`: of each set with others in its place, against the chosen one: logarithm of the predictive density of each
-    block.
-    """
+    """A chosen effect and its rivals."""
 
     effect: NamedEffect
     alternatives: tuple[Alternative, ...]
+    # Of each set with others in its place, against the chosen one: logarithm of the predictive density of each block.
     odds: Mapping[tuple[str, ...], Array]
 
 

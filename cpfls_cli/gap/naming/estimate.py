@@ -32,17 +32,12 @@ formulas leave out terms as small."""
 
 @dataclass(frozen=True)
 class Estimates:
-    """A fitted hypothesis.
+    """A fitted hypothesis."""
 
-    `linear`, shape (column,): of the base of the hypothesis.
-    `effects`: of each chosen effect: physical coefficients, then shapes.
-    `parameters`: of the vehicle's own numbers.
-    `of_effect`, each shape (coefficient,): linear coefficients of each chosen effect; empty where it has none.
-    """
-
-    linear: Array
-    effects: tuple[tuple[Estimate, ...], ...]
-    parameters: tuple[Estimate, ...]
+    linear: Array  # Shape (column,): of the base of the hypothesis.
+    effects: tuple[tuple[Estimate, ...], ...]  # Of each chosen effect: physical coefficients, then shapes.
+    parameters: tuple[Estimate, ...]  # Of the vehicle's own numbers.
+    # Each shape (coefficient,): linear coefficients of each chosen effect; empty where it has none.
     of_effect: tuple[Array, ...]
 
     @property
@@ -238,13 +233,11 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
 
 
 class Refusal(NamedTuple):
-    """An effect that is no name, and why, as the end of a sentence.
-
-    `in_the_way`: whether others are to be looked for without it: on a bound it may take the place of another one.
-    """
+    """An effect that is no name, and why, as the end of a sentence."""
 
     name: str
     reason: str
+    # Whether others are to be looked for without it: on a bound it may take the place of another one.
     in_the_way: bool = False
 
     @property

@@ -33,26 +33,17 @@ from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Residuals of held-out flights under three models.
+    """Residuals of held-out flights under three models."""
 
-    `before`, shape (window, 6), N m and N: of the model as given, on signals as logged.
-    `parameters`, shape (window, 6): of the model with its own numbers refitted on the training flights.
-    `after`, shape (window, 6): of the model with effects.
-    `floor`: shape (6,).
-    `known`: shape (window, 6).
-    `noise`, shape (window, 6): floor of each window with the scatter that belongs to the effects.
-    `most_noise`, shape (6,): mean square of each channel in squared floors up to which it is noise.
-    `unlearned`: effects of which these flights ask for a number that no flight learned from shows, such as that of a
-    faster descent, with the share of the windows that do; nothing is judged there.
-    """
-
-    before: Array
-    parameters: Array
-    after: Array
-    floor: Array
-    known: BoolArray
-    noise: Array
-    most_noise: Array
+    before: Array  # Shape (window, 6), N m and N: of the model as given, on signals as logged.
+    parameters: Array  # Shape (window, 6): of the model with its own numbers refitted on the training flights.
+    after: Array  # Shape (window, 6): of the model with effects.
+    floor: Array  # Shape (6,).
+    known: BoolArray  # Shape (window, 6).
+    noise: Array  # Shape (window, 6): floor of each window with the scatter that belongs to the effects.
+    most_noise: Array  # Shape (6,): mean square of each channel in squared floors up to which it is noise.
+    # Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
+    # descent, with the share of the windows that do; nothing is judged there.
     unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
@@ -151,14 +142,11 @@ class Judgement(NamedTuple):
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges fits on held-out flights.
-
-    `logged`, `repaired`: the held-out flights as logged, and after repair of the sensors.
-    """
+    """Judges fits on held-out flights."""
 
     training: Sequence[WeakFlight]
-    logged: Sequence[WeakFlight]
-    repaired: Sequence[WeakFlight]
+    logged: Sequence[WeakFlight]  # The held-out flights as logged, and after repair of the sensors.
+    repaired: Sequence[WeakFlight]  # The same.
     rng: np.random.Generator
 
     def judge(self, found: NamedFit) -> Judgement:
@@ -214,18 +202,12 @@ class Judge:
 
 
 class Without(NamedTuple):
-    """Held-out flights without one of the effects, the others refitted.
+    """Held-out flights without one of the effects, the others refitted."""
 
-    `raised`, shape (6,): mean square of each channel beyond that with the effect, in squared floors.
-    `error`, shape (6,): standard error of it over blocks.
-    `left`, shape (6,): root mean square without it, in floors.
-    `gusts`, shape (6,): channels whose floor holds gusts.
-    """
-
-    raised: Array
-    error: Array
-    left: Array
-    gusts: BoolArray = np.zeros(6, dtype=bool)
+    raised: Array  # Shape (6,): mean square of each channel beyond that with the effect, in squared floors.
+    error: Array  # Shape (6,): standard error of it over blocks.
+    left: Array  # Shape (6,): root mean square without it, in floors.
+    gusts: BoolArray = np.zeros(6, dtype=bool)  # Shape (6,): channels whose floor holds gusts.
 
     @property
     def seen(self) -> Array:

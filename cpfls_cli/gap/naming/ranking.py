@@ -23,19 +23,13 @@ from cpfls_cli.weak_form.resampling import ConditionalNormalEquations, blocks_of
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate, the last of its set, with its cross-validated gain.
+    """A candidate, the last of its set, with its cross-validated gain."""
 
-    `chosen`: the hypothesis, and itself.
-    `gain`: sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where
-    refused.
-    `block_error`, shape (block,): sum of squares of the residual.
-    `coefficients`, shape (coefficient,): linear, of a fit on all blocks; 0 where a bound took one out.
-    """
-
-    chosen: tuple[Candidate, ...]
+    chosen: tuple[Candidate, ...]  # The hypothesis, and itself.
+    # Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     gain: float
-    block_error: Array
-    coefficients: Array
+    block_error: Array  # Shape (block,): sum of squares of the residual.
+    coefficients: Array  # Shape (coefficient,): linear, of a fit on all blocks; 0 where a bound took one out.
 
     @property
     def candidate(self) -> Candidate:
@@ -45,20 +39,14 @@ class Scored:
 
 @dataclass(frozen=True)
 class RankedStep:
-    """All candidates ranked given a hypothesis.
-
-    `ranking`: best first, each effect once, at its best shape.
-    `chance`, shape (shift,): what the best candidate explains of shifted residuals.
-    `above_floor`: residual sum of squares above the floor, in squared floors.
-    `block`, shape (window,): of the cross-validation.
-    """
+    """All candidates ranked given a hypothesis."""
 
     hypothesis: System
     floor: Array
-    ranking: tuple[Scored, ...]
-    chance: Array
-    above_floor: float
-    block: IntArray
+    ranking: tuple[Scored, ...]  # Best first, each effect once, at its best shape.
+    chance: Array  # Shape (shift,): what the best candidate explains of shifted residuals.
+    above_floor: float  # Residual sum of squares above the floor, in squared floors.
+    block: IntArray  # Shape (window,): of the cross-validation.
 
     def least_gain(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of a gap, of which a part is explained, in squared floors."""
@@ -148,18 +136,13 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
 
 
 class ScoringMatrix(NamedTuple):
-    """Base columns and candidates side by side.
+    """Base columns and candidates side by side."""
 
-    `matrix`: shape (window, 6, column), floors.
-    `base`: columns of the base, and behind them derivatives by the shapes of its effects.
-    `candidates`: each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
-    `prior`, shape (column,): what bounds say of the coefficients before any data.
-    """
-
-    matrix: Array
-    base: IntArray
+    matrix: Array  # Shape (window, 6, column), floors.
+    base: IntArray  # Columns of the base, and behind them derivatives by the shapes of its effects.
+    # Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
     candidates: list[tuple[Candidate, IntArray, Array]]
-    prior: Array
+    prior: Array  # Shape (column,): what bounds say of the coefficients before any data.
 
 
 def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:

@@ -136,13 +136,10 @@ class NotExcited:
 
 
 class GapSize(NamedTuple):
-    """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown.
+    """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown."""
 
-    `value`: shape (6,), N m and N; `floors`: shape (6,).
-    """
-
-    value: Array
-    floors: Array
+    value: Array  # Shape (6,), N m and N.
+    floors: Array  # Shape (6,).
 
     @property
     def as_summary(self) -> dict[str, Any]:

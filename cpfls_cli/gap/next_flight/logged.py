@@ -50,21 +50,14 @@ def logged_signals(signals: Signals) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Logging:
-    """What will be logged, with which noise, and how it is looked at.
+    """What will be logged, with which noise, and how it is looked at."""
 
-    `signals`: of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
-    `commanded`: whether commands are logged in place of rotor speeds.
-    `floor`, shape (6,), N m and N: standard deviation of window averages by noise.
-    `off`: what formulas are off by, see `formulas_off`.
-    `base`: of the model that misses something; None for the rigid body of the vehicle.
-    """
-
-    signals: frozenset[str]
-    commanded: bool
-    floor: Array
+    signals: frozenset[str]  # Of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
+    commanded: bool  # Whether commands are logged in place of rotor speeds.
+    floor: Array  # Shape (6,), N m and N: standard deviation of window averages by noise.
     settings: GapSettings
-    base: InertiaModel | None = None
-    off: float = 0.0
+    base: InertiaModel | None = None  # Of the model that misses something; None for the rigid body of the vehicle.
+    off: float = 0.0  # What formulas are off by, see `formulas_off`.
 
     def gathered(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what flights would say on a question."""

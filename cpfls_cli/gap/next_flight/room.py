@@ -24,19 +24,13 @@ _SLOPES = (0.5, 3.5)
 
 @dataclass(frozen=True)
 class HarmonicPath:
-    """Position and yaw over a duration, ``centre + sum_k cosine_k cos(w_k t) + sine_k sin(w_k t)``.
+    """Position and yaw over a duration, ``centre + sum_k cosine_k cos(w_k t) + sine_k sin(w_k t)``."""
 
-    `centre`: shape (4,), m and rad.
-    `order`, shape (4, harmonic): periods in the duration.
-    `cosine`, `sine`: shape (4, harmonic), m and rad.
-    `duration`: s.
-    """
-
-    centre: Array
-    order: IntArray
-    cosine: Array
-    sine: Array
-    duration: float
+    centre: Array  # Shape (4,), m and rad.
+    order: IntArray  # Shape (4, harmonic): periods in the duration.
+    cosine: Array  # Shape (4, harmonic), m and rad.
+    sine: Array  # The same.
+    duration: float  # S.
 
     def sample(self, time: Array) -> Array:
         """Evaluate position and yaw with six derivatives, shape (7, time, 4), m, rad and s.
@@ -117,19 +111,13 @@ _HARMONICS = 10
 
 @dataclass(frozen=True)
 class Room:
-    """Space, limits and rotors that a path may use.
+    """Space, limits and rotors that a path may use."""
 
-    `half`, shape (3,), m: half of the box, less the vehicle's own size.
-    `middle`: shape (3,), m, world frame.
-    `settings`: limits, tilt and duration.
-    `period`: between the samples that are looked at, s.
-    """
-
-    half: Array
-    middle: Array
-    settings: TrajectorySettings
+    half: Array  # Shape (3,), m: half of the box, less the vehicle's own size.
+    middle: Array  # Shape (3,), m, world frame.
+    settings: TrajectorySettings  # Limits, tilt and duration.
     vehicle: VehicleSettings
-    period: float
+    period: float  # Between the samples that are looked at, s.
 
     def planned(self, path: HarmonicPath, period: float | None = None) -> Trajectory:
         """Sample a path, about the middle of the room."""

@@ -19,17 +19,13 @@ from cpfls_cli.weak_form.windows import windows
 
 @dataclass(frozen=True)
 class Goal:
-    """What the next flight has to show, given what is known from others.
-
-    `known`: what the flights already flown say on each question; no blocks without such flights.
-    `noise`: see `shared_noise`.
-    """
+    """What the next flight has to show, given what is known from others."""
 
     questions: tuple[Question, ...]
-    known: tuple[Evidence, ...]
+    known: tuple[Evidence, ...]  # What the flights already flown say on each question; no blocks without such flights.
     room: Room
     logging: Logging
-    noise: float
+    noise: float  # See `shared_noise`.
 
     def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
         """Judge what the known flights say together with one along given signals; None: with themselves once more."""
@@ -78,15 +74,12 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
 
 @dataclass(frozen=True)
 class NextFlight:
-    """The best path that was found.
-
-    `random`: drawn at random within the same room, from the worst to the best; the best was improved.
-    `history`, shape (iteration,): scores in the course of the search.
-    """
+    """The best path that was found."""
 
     path: HarmonicPath
+    # Drawn at random within the same room, from the worst to the best; the best was improved.
     random: tuple[HarmonicPath, ...]
-    history: Array
+    history: Array  # Shape (iteration,): scores in the course of the search.
 
 
 def next_flight(

@@ -26,47 +26,34 @@ DRAWS, FEW_DRAWS = 200, 8
 
 @dataclass(frozen=True)
 class SizedEffect:
-    """An effect with a value for each of its numbers.
-
-    `linear`, shape (coefficient,): 1 where everything is in the shape.
-    """
+    """An effect with a value for each of its numbers."""
 
     candidate: Candidate
-    linear: Array
+    linear: Array  # Shape (coefficient,): 1 where everything is in the shape.
 
 
 @dataclass(frozen=True)
 class Question:
-    """Whether an effect would be separated from a rival, if it is the true one.
-
-    `rival`: None: whether the effect shows at all, beyond the vehicle's own numbers.
-    `besides`: effects that are there whichever is true; their coefficients are free.
-    """
+    """Whether an effect would be separated from a rival, if it is the true one."""
 
     true: SizedEffect
-    rival: Effect | None
-    besides: tuple[SizedEffect, ...] = ()
+    rival: Effect | None  # None: whether the effect shows at all, beyond the vehicle's own numbers.
+    besides: tuple[SizedEffect, ...] = ()  # Effects that are there whichever is true; their coefficients are free.
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What flights would say on a question, by the products of all columns that it takes over each block.
+    """What flights would say on a question, by the products of all columns that it takes over each block."""
 
-    `gram`, shape (block, column, column): in squared floors: the true effect, then base columns, then the rival at each
-    point of its grid.
-    `base`: places of the columns that are free whichever is true.
-    `rivals`, each : places of the rival's, one for each point of its grid; one empty array where there is no rival.
-    `unit`: whether the rival has the coefficient 1.
-    `off`: what formulas are off by, see `formulas_off`.
-    `known`: blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
-    """
-
+    # Shape (block, column, column): in squared floors: the true effect, then base columns, then the rival at each point
+    # of its grid.
     gram: Array
-    base: IntArray
+    base: IntArray  # Places of the columns that are free whichever is true.
+    # Each : places of the rival's, one for each point of its grid; one empty array where there is no rival.
     rivals: tuple[IntArray, ...]
-    unit: bool
-    off: float
-    known: int = 0
+    unit: bool  # Whether the rival has the coefficient 1.
+    off: float  # What formulas are off by, see `formulas_off`.
+    known: int = 0  # Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
 
     @classmethod
     def none(cls, blocks: int) -> Evidence:
@@ -156,17 +143,14 @@ def gathered(
 
 @dataclass(frozen=True)
 class Answer:
-    """What flights would say on a question.
-
-    `own`, `likely`: how likely the true effect and the rival are expected to be after them, among all rivals of the
-    true one.
-    `sure`: probability that the rival is then so unlikely against the true effect that it is no rival.
-    """
+    """What flights would say on a question."""
 
     evidence: Evidence
+    # `own`, `likely`: How likely the true effect and the rival are expected to be after them, among all rivals of the
+    # true one.
     own: float
     likely: float
-    sure: float
+    sure: float  # Probability that the rival is then so unlikely against the true effect that it is no rival.
     noise: float
 
     @property

@@ -45,16 +45,11 @@ _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
 
 @dataclass(frozen=True)
 class Air:
-    """Gusts in flights.
+    """Gusts in flights."""
 
-    `found`: of all channels; a bound where nothing separates gusts from what the model lacks.
-    `gusts_only`, shape (6,): channels whose residual is gusts and noise, by instruments.
-    `split`, shape (6,): channels whose gusts instruments size; what is repeatable is a gap above them.
-    """
-
-    found: FoundGusts
-    gusts_only: BoolArray
-    split: BoolArray
+    found: FoundGusts  # Of all channels; a bound where nothing separates gusts from what the model lacks.
+    gusts_only: BoolArray  # Shape (6,): channels whose residual is gusts and noise, by instruments.
+    split: BoolArray  # Shape (6,): channels whose gusts instruments size; what is repeatable is a gap above them.
 
     def floor(self, learned: Sequence[WeakFlight], flights: Sequence[WeakFlight]) -> Array:
         """Compute what gusts and noise do to averages over windows: standard deviation, 0 where none are split off.
@@ -155,18 +150,13 @@ def air(
 
 @dataclass(frozen=True)
 class _Residual:
-    """The residual of flights under a hypothesis, and what is known of them.
-
-    `residual`: shape (window, 6).
-    `block`: shape (window,).
-    `moved`, shape (6,): mean square, in squared floors of the sensors; 0 of a channel that is not known.
-    """
+    """The residual of flights under a hypothesis, and what is known of them."""
 
     hypothesis: System
     linear: Array
-    residual: Array
-    block: IntArray
-    moved: Array
+    residual: Array  # Shape (window, 6).
+    block: IntArray  # Shape (window,).
+    moved: Array  # Shape (6,): mean square, in squared floors of the sensors; 0 of a channel that is not known.
     given: Instruments
     settings: GapSettings
 

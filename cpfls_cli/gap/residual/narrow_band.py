@@ -33,24 +33,16 @@ _MEDIAN_CYCLES = 24
 
 @dataclass(frozen=True)
 class NarrowBand:
-    """The most significant narrow band.
+    """The most significant narrow band."""
 
-    `channel`: one of `CHANNELS`.
-    `share`: of the variance of the channel, above the background.
-    `p_value`: probability that noise with the same smooth spectrum has a band as prominent, at any frequency of any
-    channel.
-    `energy`: whether the band feeds energy into the rotation about its axis, drains it, or neither for sure.
-    `power`: mean of residual times body rate in the band, in the unit of the residual times rad/s; 0 for forces.
-    `power_error`: its standard error.
-    """
-
-    channel: str
+    channel: str  # One of `CHANNELS`.
     frequency_hz: float
-    share: float
+    share: float  # Of the variance of the channel, above the background.
+    # Probability that noise with the same smooth spectrum has a band as prominent, at any frequency of any channel.
     p_value: float
-    energy: Energy
-    power: float
-    power_error: float
+    energy: Energy  # Whether the band feeds energy into the rotation about its axis, drains it, or neither for sure.
+    power: float  # Mean of residual times body rate in the band, in the unit of the residual times rad/s; 0 for forces.
+    power_error: float  # Its standard error.
 
 
 def narrow_band(
@@ -148,13 +140,10 @@ def _mean_power(
 
 @dataclass(frozen=True)
 class Grid:
-    """Frequencies of the periodograms, four to each reciprocal of the longest flight.
+    """Frequencies of the periodograms, four to each reciprocal of the longest flight."""
 
-    `samples`: to which series are filled up with zeros; `frequency`: shape (frequency,), Hz.
-    """
-
-    samples: int
-    frequency: Array
+    samples: int  # To which series are filled up with zeros.
+    frequency: Array  # Shape (frequency,), Hz.
 
 
 def grid(lengths: Sequence[int], period: float) -> Grid:

@@ -203,14 +203,11 @@ class Repeatability:
 
 @dataclass(frozen=True)
 class RepeatedRuns:
-    """Runs of flights that repeat each other, and which of them are compared with which.
+    """Runs of flights that repeat each other, and which of them are compared with which."""
 
-    `names`: of the flights; `pairs`: numbers of runs.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Of the flights.
     given: Instruments
-    pairs: tuple[tuple[int, int], ...]
+    pairs: tuple[tuple[int, int], ...]  # Numbers of runs.
     bands: tuple[Band, ...]
 
     @classmethod

@@ -132,16 +132,11 @@ def _edges(signal: Array, bins: int) -> Array:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Autocorrelation of a residual, and the test whether it is that of noise.
+    """Autocorrelation of a residual, and the test whether it is that of noise."""
 
-    `autocorrelation`, shape (lag, channel): at lags of 1, 2, ... windows without common samples.
-    `p_value`, shape (channel,): small where the residual is not noise; 1 for channels that are 0.
-    `windows`: used, over all flights.
-    """
-
-    autocorrelation: Array
-    p_value: Array
-    windows: int
+    autocorrelation: Array  # Shape (lag, channel): at lags of 1, 2, ... windows without common samples.
+    p_value: Array  # Shape (channel,): small where the residual is not noise; 1 for channels that are 0.
+    windows: int  # Used, over all flights.
 
 
 def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: int = 10) -> Whiteness:
