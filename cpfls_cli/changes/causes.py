@@ -53,34 +53,16 @@ class Cause:
 _SEEN_IN = {"mass": "weight near", "hover": "mass", "centre of mass": "mass"}
 """Changes that hold more than another, by the beginnings of their names."""
 
-_LOSS = 0.15
-"""Share of thrust that a damaged propeller lacks."""
-
-_OF_YAW = 0.2
-"""By how much its drag changes by another share than its thrust, of that share."""
-
-_RARER = 0.5
-"""Prior of two rotors relative to that of one."""
-
-_SHAKES = 1.0
-"""Logarithm of vibration relative to the reference, of something that came loose or out of balance."""
-
-_OF_AXIS = 0.5
-"""Of that, by how much each axis differs from the others."""
-
-_DAMAGE_SHAKES = 0.8
-"""Probability that a rotor which pulls less shakes otherwise too."""
-
+_LOSS = 0.15  # Share of thrust that a damaged propeller lacks.
+_OF_YAW = 0.2  # By how much its drag changes by another share than its thrust, of that share.
+_RARER = 0.5  # Prior of two rotors relative to that of one.
+_SHAKES = 1.0  # Logarithm of vibration relative to the reference, of something that came loose or out of balance.
+_OF_AXIS = 0.5  # Of that, by how much each axis differs from the others.
+_DAMAGE_SHAKES = 0.8  # Probability that a rotor which pulls less shakes otherwise too.
 _HEAVIER = 0.1
-_IN_WASH = 0.5
-"""Probability that what hangs near a rotor takes of its thrust."""
-
-_ON_ARMS = (1 / 3, 2 / 3)
-"""Of the way from the middle to a rotor: places of a mass, and half way between two rotors."""
-
-_OFF_CENTRE = 0.1
-"""Of the arm: by how much a centre of mass moves."""
-
+_IN_WASH = 0.5  # Probability that what hangs near a rotor takes of its thrust.
+_ON_ARMS = (1 / 3, 2 / 3)  # Of the way from the middle to a rotor: places of a mass, and half way between two rotors.
+_OFF_CENTRE = 0.1  # Of the arm: by how much a centre of mass moves.
 _ALONE = {
     "turn": (0.1, "1"),
     "unbalance": (1.0, "1"),
@@ -102,8 +84,7 @@ _ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
 _ONE_TOO = ("unbalance",)
 """Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
 
-_AT_ONCE = ("lean", "drift")
-"""Kinds of which all numbers change at once, each by itself."""
+_AT_ONCE = ("lean", "drift")  # Kinds of which all numbers change at once, each by itself.
 
 
 def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:

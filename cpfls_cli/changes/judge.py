@@ -29,24 +29,12 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.result import Estimate
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-NAMED = 0.95
-"""Share of the belief from which on a change is named; below, it is one of several that look alike."""
-
-LISTED = 0.03
-"""Share of the belief from which on a change is said to look alike."""
-
-_MOST = 3
-"""Changes at once."""
-
-_LOSES = 0.95
-"""Probability that what is damaged pulls less, and not more."""
-
-_NEARER = 0.5
-"""Share of the usual ratio below which one is likelier nothing, whatever its error is."""
-
-_ANY = 10.0
-"""Times what is usual: a prior so wide says nothing of a size."""
-
+NAMED = 0.95  # Share of the belief from which on a change is named; below, it is one of several that look alike.
+LISTED = 0.03  # Share of the belief from which on a change is said to look alike.
+_MOST = 3  # Changes at once.
+_LOSES = 0.95  # Probability that what is damaged pulls less, and not more.
+_NEARER = 0.5  # Share of the usual ratio below which one is likelier nothing, whatever its error is.
+_ANY = 10.0  # Times what is usual: a prior so wide says nothing of a size.
 _WIDTHS = ((1.0, 0.9), (_ANY, 0.1))
 """Times what is usual, and how probable a size is drawn so wide. With the usual width alone a change would count the
 less the larger it is, for large numbers of an unchanged vehicle, a t, are rare by a power of their size alone."""
@@ -63,9 +51,7 @@ starts find as much by chance, or less."""
 _NODES, _MOST_NODES = 8, 256
 """Of the scatter of one kind, and at most so many of kinds that go together: densities within 3 %."""
 
-_FARTHEST = 20.0
-"""Deviations up to which densities are right."""
-
+_FARTHEST = 20.0  # Deviations up to which densities are right.
 _NONE = np.arange(0)
 _HALF_WIDTH = 1.96
 

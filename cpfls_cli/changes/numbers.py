@@ -23,8 +23,7 @@ _LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.nam
 _SHAPES = {shape.name: shape for shape in _LOAD.shapes}
 _CABLES = _SHAPES["length_m"].grid
 _MASS = [each.name for each in _LOAD.coefficients].index("mass")
-(_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried
-"""Of a load on a cable: lengths that are tried, m, and a damping, 1/s."""
+(_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried  # Of a load on a cable: lengths that are tried, m, and a damping, 1/s.
 
 _AXES, _ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
@@ -61,12 +60,8 @@ KINDS: dict[str, Kind] = {
 }
 """By the first word of a number's name; chance is drawn in this order."""
 
-_SHORTEST_S = 4.0
-"""Of flight, below which it has no numbers."""
-
-_BLOCKS = 8
-"""Of a flight, for errors."""
-
+_SHORTEST_S = 4.0  # Of flight, below which it has no numbers.
+_BLOCKS = 8  # Of a flight, for errors.
 _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
@@ -79,20 +74,14 @@ _WINDOW_S, _SWING_S = 0.12, 0.4
 """Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
 answers gusts, and only above it does torque drive the body."""
 
-_LATEST_S = 0.12
-"""Of rotors and autopilot."""
-
+_LATEST_S = 0.12  # Of rotors and autopilot.
 _STEP_S = 0.002
 _DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
-
-_CLEARLY = 3.0
-"""Standard errors beyond which a ratio is said to be below 0."""
-
+_CLEARLY = 3.0  # Standard errors beyond which a ratio is said to be below 0.
 _ABOVE = 1.96
 """Standard errors by which a ratio is above 0 that has a logarithm: of exchanged rotors hardly any is left."""
 
-_COLLINEAR = 1e-9
-"""Squared share of a signal of its own below which it goes with the others."""
+_COLLINEAR = 1e-9  # Squared share of a signal of its own below which it goes with the others.
 
 
 @result

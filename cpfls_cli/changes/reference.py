@@ -12,12 +12,8 @@ from cpfls_cli.changes.numbers import KINDS, FlightNumbers
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-FEWEST = 3
-"""Reference flights that identify their scatter; of fewer, what is usual replaces it."""
-
-_DAYS = 6.0
-"""Reference flights that what is usual counts as."""
-
+FEWEST = 3  # Reference flights that identify their scatter; of fewer, what is usual replaces it.
+_DAYS = 6.0  # Reference flights that what is usual counts as.
 _SCALE_ERROR = 0.8
 """By how much numbers of a kind scatter relative to what is usual, from vehicle to vehicle: deviation of the logarithm,
 of shares of thrust, vibration and batteries of four."""
@@ -26,22 +22,17 @@ _FEWEST_LEFT = 4.0
 """Degrees of freedom of what is usual of vehicles, where there is hardly any reference flight: one kind of numbers in
 a hundred then scatters by more than 3.7 times what is usual. Of four vehicles none did by more than one and a half."""
 
-FALSE_ALARM = 0.01
-"""Probability at which flights of an unchanged vehicle are said to have changed."""
-
+FALSE_ALARM = 0.01  # Probability at which flights of an unchanged vehicle are said to have changed.
 EACH_TEST = FALSE_ALARM / 2
 """The same of each of the two tests, of which either says so: of known changes, and of each number by itself."""
 
-_OFFSET_M = 0.001
-"""By which the centre of mass lies elsewhere from day to day: a battery put back."""
-
+_OFFSET_M = 0.001  # By which the centre of mass lies elsewhere from day to day: a battery put back.
 _BY_VOLTAGE, _VOLTAGE_ERROR = {"thrust": -1.0, "turn": 1.0}, 1.0
 """Power of the voltage that numbers of commands go with, and how far that is off, before any flight: none where
 the autopilot makes up for the battery, the square where it does not."""
 
 
-_CALM = 1.0
-"""Acceleration below which flights are flown alike, m/s^2."""
+_CALM = 1.0  # Acceleration below which flights are flown alike, m/s^2.
 
 
 @dataclass(frozen=True)

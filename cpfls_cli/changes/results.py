@@ -7,20 +7,13 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.result import Estimate, about, part, result
 
-CANNOT_TELL = "CANNOT TELL"
-"""The verdict where no change would have shown, or a log is wrong."""
-
-_BY_CHANCE = ("delay", "lag", "unbalance", "swing", "battery")
-"""Kinds of which a good flight can hold too little."""
-
+CANNOT_TELL = "CANNOT TELL"  # The verdict where no change would have shown, or a log is wrong.
+_BY_CHANCE = ("delay", "lag", "unbalance", "swing", "battery")  # Kinds of which a good flight can hold too little.
 _OF_THRUST = ("rotor ", "mass", "centre of mass")
 """Changes one of which has to have a size where shares of thrust are compared, by the beginnings of their names."""
 
-_OF_AIR = ("gusts", "lean")
-"""Kinds that go with the weather."""
-
-CABLE = "load on a cable"
-"""The change that has a length."""
+_OF_AIR = ("gusts", "lean")  # Kinds that go with the weather.
+CABLE = "load on a cable"  # The change that has a length.
 
 
 @result

@@ -31,11 +31,8 @@ from cpfls_cli.words import joined
 if TYPE_CHECKING:
     from ruptures import KernelCPD
 
-_DRAWS = 1000
-"""Rows of unchanged flights that chance is drawn from."""
-
-_AT_ONCE = 3
-"""Change points whose gain is shared when a row is held against chance."""
+_DRAWS = 1000  # Rows of unchanged flights that chance is drawn from.
+_AT_ONCE = 3  # Change points whose gain is shared when a row is held against chance.
 
 
 def trend(

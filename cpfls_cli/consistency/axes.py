@@ -10,30 +10,20 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.rounding import levelled
 
 AXES = ("x", "y", "z")
-SAME = 0.9
-"""Correlation that noise does not reach over a flight."""
-
-_OTHER = 0.5
-"""Correlation that noise does not hide where the motion is worth a look."""
-
-TWICE = 2.0
-"""Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7."""
-
+SAME = 0.9  # Correlation that noise does not reach over a flight.
+_OTHER = 0.5  # Correlation that noise does not hide where the motion is worth a look.
+TWICE = 2.0  # Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7.
 _BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
 """Standard deviation from which on an axis is judged, also as a share of that of the axis which turns most: about one
 that hardly turns, errors of the others decide."""
 
-_POOR = 0.6
-"""Correlation below which gyroscope and attitude do not show one motion."""
-
+_POOR = 0.6  # Correlation below which gyroscope and attitude do not show one motion.
 _SURE_SIGMAS, _OVERLAP = 4.0, 4
 """Standard errors of a correlation from which on it is none by chance, and windows that share a sample."""
 
 _DEGREES_PER_RADIAN = 180 / pi
-_UNIT_TOLERANCE = 1.3
-"""Ratio within which a gain is that of a unit."""
-
+_UNIT_TOLERANCE = 1.3  # Ratio within which a gain is that of a unit.
 _SENSORS = ("attitude", "gyroscope")
 
 

@@ -12,8 +12,7 @@ from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.stretches import clipped
 
-# No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
-_LOWEST_LIMIT_RAD_S = 1.0
+_LOWEST_LIMIT_RAD_S = 1.0  # No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
 # Rounding to this step adds as much noise as a poor gyroscope has.
 _COARSE_STEP_RAD_S = 0.02
 _ANGLES = ("roll", "pitch", "yaw")

@@ -22,18 +22,13 @@ from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
 
-_HANGS = -0.5
-"""Mean upward part of body z below which an attitude is turned over; full rotations come to 0."""
-
-_SHORT_S = 5.0
-"""A shorter part is no log with a take-off and a landing."""
-
+_HANGS = -0.5  # Mean upward part of body z below which an attitude is turned over; full rotations come to 0.
+_SHORT_S = 5.0  # A shorter part is no log with a take-off and a landing.
 _WEIGHED_S, _WEIGHED = 10.0, (0.7, 5.0)
 """Seconds in which nobody falls or climbs enough to feel less than the first share of gravity on average (that takes
 30 m/s), or pulls the second without an end."""
 
-ENOUGH = 50_000
-"""Samples that identify units, axes and which rotor is where."""
+ENOUGH = 50_000  # Samples that identify units, axes and which rotor is where.
 
 
 def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, ...]:

@@ -17,26 +17,18 @@ from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import capitalised
 
-# The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
-_STEPS = 41
+_STEPS = 41  # The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
 # Above the motion of a multirotor and below most of the noise of its derivative.
 _LOWPASS_HZ, _SHARE_OF_RATE = 8.0, 0.2
-# Rotors of the largest multirotors follow within a fifth of a second.
-_DELAY_MAX_S = 0.2
-# A rigid body that explains less of the torque leaves the delay to chance.
-_SMALLEST_R2 = 0.3
-# Missing effects shift the motion against the torque by about this much; a damping is allowed for.
-_SURE_S = 0.002
-# Windows that a fit of five numbers wants, and estimates that have a scatter.
-_FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2
-# Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
-_ROTORS_OFF_S = 0.008
+_DELAY_MAX_S = 0.2  # Rotors of the largest multirotors follow within a fifth of a second.
+_SMALLEST_R2 = 0.3  # A rigid body that explains less of the torque leaves the delay to chance.
+_SURE_S = 0.002  # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
+_FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2  # Windows that a fit of five numbers wants, and estimates that have a scatter.
+_ROTORS_OFF_S = 0.008  # Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
 # Telemetry comes up to a quarter of a second late; steps of 20 ms, then of 5.
 _TELEMETRY_S, _TELEMETRY_STEPS, _FINER = 0.24, 25, 9
-# Estimates of one clock scatter by less than this, or by less than this share of it.
-_SCATTER_S, _SCATTER = 0.004, 0.2
-# Two halves of one flight about roll and pitch.
-_FEWEST_SHIFTS = 4
+_SCATTER_S, _SCATTER = 0.004, 0.2  # Estimates of one clock scatter by less than this, or by less than this share of it.
+_FEWEST_SHIFTS = 4  # Two halves of one flight about roll and pitch.
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
 _DONE = "corrected before the balance"

@@ -21,8 +21,7 @@ from cpfls_cli.weak_form.windows import Windows
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-FEWEST_BLOCKS = 7
-"""Blocks below which a jackknife says too little about significance of one in a thousand."""
+FEWEST_BLOCKS = 7  # Blocks below which a jackknife says too little about significance of one in a thousand.
 # Short flights are cut into so many blocks, but into none that knows its neighbour.
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
 # A coarse delay that Gauss-Newton steps refine, and how many: the last one changes nothing.
@@ -118,8 +117,8 @@ class DelayScan:
     delay: float  # Positive where the gyroscope is late, s, on a coarse grid.
     variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
     excited: BoolArray  # Shape (3,): axes that turn enough to identify a scale.
-    seen: Array  # Shape (window, 3), rad/s: averages of the rate by the attitude, and by the gyroscope at that delay.
-    read: Array  # The same.
+    seen: Array  # Shape (window, 3), rad/s: averages of the rate by the attitude.
+    read: Array  # Shape (window, 3), rad/s: the same by the gyroscope at that delay.
 
 
 def scan(flights: Sequence[Kinematics]) -> DelayScan:

@@ -30,27 +30,23 @@ from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 from cpfls_cli.words import joined
 
-# Channels that are mended one after the other: there are no more.
-_ROUNDS = 3
+_ROUNDS = 3  # Channels that are mended one after the other: there are no more.
 # Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
 _PARTS, _PARTS_SIGMAS = 16, 4.0
-# Below this a vehicle hovers, and noise points anywhere.
-_MOVES_M_S2 = 0.1
+_MOVES_M_S2 = 0.1  # Below this a vehicle hovers, and noise points anywhere.
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _ONE_PLANE, _NOT_ONE_PLANE, _REVERSED = 0.8, 0.5, 0.6
 # Logarithms: of a size that is no unit, and of what a unit may be off by against a sensor and against the thrust.
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
-# Share of a channel that other axes have to explain.
-_EXPLAINED = 0.8
+_EXPLAINED = 0.8  # Share of a channel that other axes have to explain.
 # Growth of the residual between two channels from which on a repair sets them apart; noise and a shift make less.
 _APART = 1.2
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 _DONE = "It is corrected before the balance"
 
-_Read = tuple[ChannelRepair, tuple[str, ...]]
-"""A way to read a channel, and the mistakes that it takes."""
+_Read = tuple[ChannelRepair, tuple[str, ...]]  # A way to read a channel, and the mistakes that it takes.
 
 
 @dataclass(frozen=True)

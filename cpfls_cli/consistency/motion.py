@@ -30,21 +30,16 @@ ANOTHER_NORTH = np.radians(20.0)
 
 # Share of what moves in both that agreement asks for, and the ratio within which scales of axes are one.
 _SHARED, _ONE_SCALE = 0.5, 1.05
+# Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that identifies it.
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
-"""Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that identifies
-it."""
-
-LATEST_S = 0.3
-"""Longest delay of an estimator or of telemetry."""
-
+LATEST_S = 0.3  # Longest delay of an estimator or of telemetry.
 _COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
 """Share of a turn that a delay could be, share of what a delay leaves that a turn has to leave at most, and delays that
 are tried from one window to the next."""
 
 _QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _UP = np.array([0.0, 0.0, 1.0])
-TINY = 1e-100
-"""Square of what does not move."""
+TINY = 1e-100  # Square of what does not move.
 
 
 class MotionChannel(NamedTuple):
@@ -133,9 +128,9 @@ class PairCheck:
 
     pair: Pair
     first: Array  # Shape (window, 3): what should be the same.
-    second: Array  # The same.
-    scale: Array  # Shape (3,): of the second against the first along each axis, and the share of what moves in both.
-    r2: Array  # The same.
+    second: Array  # Alike.
+    scale: Array  # Shape (3,): of the second against the first along each axis.
+    r2: Array  # Shape (3,): share of what moves in both.
     delay: Sure  # Of the second against the first, s.
     turn: Sure  # Of the second against the first about the vertical, rad.
     hop_s: float  # From one window to the next, s.

@@ -13,11 +13,8 @@ _TOO_WIDE = 5.0
 """A frame may be wider than its rotors, and a paper may round; a slipped digit or g cm^2 is more than that."""
 
 _INERTIAS = ("inertia_x", "inertia_y", "inertia_z")
-_REVERSED = 0.005
-"""Ratio below which a torque has the wrong sign, or belongs to another axis."""
-
-_ALIKE = 0.3
-"""Largest logarithm of a ratio of two numbers that one mistake makes wrong."""
+_REVERSED = 0.005  # Ratio below which a torque has the wrong sign, or belongs to another axis.
+_ALIKE = 0.3  # Largest logarithm of a ratio of two numbers that one mistake makes wrong.
 
 
 def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:

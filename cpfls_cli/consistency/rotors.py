@@ -18,29 +18,16 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room_between, thrust_number
 _THRUST_TO_WEIGHT = 5.0
 """Thrust over weight, or the reverse, that no flight keeps up; a wrong unit or a slipped digit is farther off."""
 
-_CARRIES = 2.0
-"""Thrust over weight, or the reverse, that a flight has on average where unit and factors are right."""
-
-_FEWEST_ROTORS = 3
-"""Of fewer, propellers may be small."""
-
+_CARRIES = 2.0  # Thrust over weight, or the reverse, that a flight has on average where unit and factors are right.
+_FEWEST_ROTORS = 3  # Of fewer, propellers may be small.
 _SPEEDS = {"rad/s": 1.0, "rpm": pi / 30, "Hz": 2 * pi}
-
 _ABOVE_THE_LIMIT = 1.5
 """Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least."""
 
-_LIFTS = 1.25
-"""Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to."""
-
-IDLE = 0.5
-"""Share of the largest thrust below which rotors idle."""
-
-_TYPICAL = 0.03
-"""Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05."""
-
-_LEANS = 0.03
-"""Spread of roll and pitch in rad that no vehicle at rest has."""
-
+_LIFTS = 1.25  # Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to.
+IDLE = 0.5  # Share of the largest thrust below which rotors idle.
+_TYPICAL = 0.03  # Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05.
+_LEANS = 0.03  # Spread of roll and pitch in rad that no vehicle at rest has.
 _REMEDY = (
     "check the unit of import.signals.rotor_speed (or of rotor_command, and vehicle.rotor_speed_max_rad_s), "
     "vehicle.mass_kg, vehicle.gravity_m_s2 and thrust_factor_n_s2 of vehicle.rotors"

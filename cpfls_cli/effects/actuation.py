@@ -11,8 +11,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.lag import delayed
 
-_HIGHEST = 0.45
-"""Frequency of a filter over that of the sampling, above which it is taken to be there."""
+_HIGHEST = 0.45  # Frequency of a filter over that of the sampling, above which it is taken to be there.
 
 
 def second_order(frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:

@@ -128,8 +128,8 @@ class ReadingError(NamedTuple):
 class FaultFit(NamedTuple):
     """Estimated numbers of a fault."""
 
-    value: Array  # Shape (number,): with standard errors.
-    error: Array  # The same.
+    value: Array  # Shape (number,).
+    error: Array  # Standard errors, shape (number,).
     pull: Array  # Shape (number,): how far noise of the sensor can have pulled the value at most.
     known: BoolArray  # Shape (number,): what the motion identifies.
     blocks: int  # Of time that scattered the values.

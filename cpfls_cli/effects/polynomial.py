@@ -30,8 +30,7 @@ STATE_TERMS = (
 )
 """Terms of the motion: constant, linear, products, and speed times velocity, rate times rate with its sign."""
 
-# More than the products of 34 terms of the motion with 17 of eight rotors, which are fitted to them.
-_PROBES = 900
+_PROBES = 900  # More than the products of 34 terms of the motion with 17 of eight rotors, which are fitted to them.
 # Shares of the largest value: the residual of an effect that is a polynomial, and a weight that is 0, but for rounding.
 _EXACT, _NEGLIGIBLE = 1e-9, 1e-10
 

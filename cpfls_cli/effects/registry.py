@@ -17,9 +17,7 @@ def _discover() -> Mapping[str, Effect]:
     return MappingProxyType({known.name: known for known in effects})
 
 
-CATALOGUE: Mapping[str, Effect] = _discover()
-"""Effects by identifier."""
-
+CATALOGUE: Mapping[str, Effect] = _discover()  # Effects by identifier.
 VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
 """The vehicle's own numbers, which stay free in every fit."""
 

@@ -15,17 +15,13 @@ from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _T = TypeVar("_T")
-
-_SHORTEST = 8
-"""Samples up to which a signal is taken as it is."""
-
+_SHORTEST = 8  # Samples up to which a signal is taken as it is.
 _OF_MOTION = (
     *("rotation", "ground_velocity", "air_velocity"),
     *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
 )
 """Cached properties that no rotor speed changes."""
-_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")
-"""Cached properties that no motion changes."""
+_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")  # Cached properties that no motion changes.
 _OF_FORCE = ("force", "available", "of_motion", "made")
 """What is kept of a flight and may hang on the force that is felt."""
 

@@ -25,8 +25,7 @@ from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
-_EVERY = 5
-"""Samples between starts of free runs, which are alike."""
+_EVERY = 5  # Samples between starts of free runs, which are alike.
 
 
 @dataclass(frozen=True)

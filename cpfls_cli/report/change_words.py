@@ -15,9 +15,7 @@ from cpfls_cli.report.numbers import number
 from cpfls_cli.result import Estimate
 from cpfls_cli.words import joined
 
-_HEAVY = 1000.0
-"""Grams that are written in kg."""
-
+_HEAVY = 1000.0  # Grams that are written in kg.
 _SCALES: Mapping[str, Callable[[float], float]] = {
     "%": lambda size: 100 * size,
     "root": lambda size: 100 * math.expm1(0.5 * size),
@@ -29,17 +27,12 @@ _SCALES: Mapping[str, Callable[[float], float]] = {
 }
 """From the unit of a change to what the table writes: of logarithms of squares the root, or near 0 half of it."""
 _UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times"}
-
 _SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "delay", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
-_OTHERS = 3
-"""Of what would have shown, where nothing of that does."""
-
+_OTHERS = 3  # Of what would have shown, where nothing of that does.
 _CHECKED = 2
-MOST_MOVED = 3
-"""Numbers that are named where no known change explains them."""
-
+MOST_MOVED = 3  # Numbers that are named where no known change explains them.
 _NATURAL = {
     "thrust": "",
     "turn": "",

@@ -31,12 +31,10 @@ from cpfls_cli.response.mismatch import (
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
 from cpfls_cli.result import about, part, result
 
+# Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
+# The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
+# not depend on them.
 InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
-"""Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
-
-The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
-not depend on them.
-"""
 
 
 NO_INSTRUMENTS = "none"

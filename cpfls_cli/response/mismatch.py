@@ -17,29 +17,18 @@ if TYPE_CHECKING:
 ROTATION, THRUST, ROTOR_SPEED = ("roll", "pitch", "yaw"), "thrust", "rotor speed"
 """Names of the responses of rotation and specific force, and of that of the rotors' speeds to their commands."""
 
-COHERENT = 0.6
-"""Coherence above which a response is judged (Tischler and Remple)."""
-
-ACCEPTABLE, GOOD = 100.0, 50.0
-"""Costs up to which a model is acceptable and good (Tischler and Remple)."""
-
-_SURE_WINDOWS = 33
-"""With which a coherence of 0.6 leaves a random error of 10 %."""
+COHERENT = 0.6  # Coherence above which a response is judged (Tischler and Remple).
+ACCEPTABLE, GOOD = 100.0, 50.0  # Costs up to which a model is acceptable and good (Tischler and Remple).
+_SURE_WINDOWS = 33  # With which a coherence of 0.6 leaves a random error of 10 %.
 _STRONG = 10.0
 """F statistic from which on instruments are strong (Staiger and Stock 1997): weaker ones give the loop again."""
 _MOST_POINTS = 20
-_FEWEST_POINTS = 8
-"""Of a band that is judged: an octave."""
-_DIP = 2
-"""Points in which the coherence may dip without ending a band."""
-_PHASE = 0.01745
-"""Weight of a squared degree against a squared decibel: 7.6 degrees count as 1 dB."""
-_SURE = 2.0
-"""Random errors from which on a difference is none of chance."""
-_SHORTEST = 3
-"""Points of a stretch: a single one is scatter."""
-_LEAST = 1e-6
-"""Gain over another, to which a model that does nothing is set: decibels of nothing are none."""
+_FEWEST_POINTS = 8  # Of a band that is judged: an octave.
+_DIP = 2  # Points in which the coherence may dip without ending a band.
+_PHASE = 0.01745  # Weight of a squared degree against a squared decibel: 7.6 degrees count as 1 dB.
+_SURE = 2.0  # Random errors from which on a difference is none of chance.
+_SHORTEST = 3  # Points of a stretch: a single one is scatter.
+_LEAST = 1e-6  # Gain over another, to which a model that does nothing is set: decibels of nothing are none.
 
 
 NOT_JUDGED, NOT_ACCEPTABLE = "not-judged", "not-acceptable"

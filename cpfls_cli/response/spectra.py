@@ -18,14 +18,11 @@ from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, 
 from cpfls_cli.response.mismatch import clearness
 from cpfls_cli.result import about, result
 
-_LENGTHS = 5
-"""Windows of so many lengths, from the shortest to the longest by equal ratios."""
+_LENGTHS = 5  # Windows of so many lengths, from the shortest to the longest by equal ratios.
 _LONGEST_S = 20.0
 _SHORTEST_S = 1.0
-_FEWEST_SAMPLES = 16
-"""Of a window: fewer do not follow its curve."""
-_FEWEST_WINDOWS = 5
-"""Lengths of the longest window that all flights together have: fewer say nothing of the error."""
+_FEWEST_SAMPLES = 16  # Of a window: fewer do not follow its curve.
+_FEWEST_WINDOWS = 5  # Lengths of the longest window that all flights together have: fewer say nothing of the error.
 _PERIODS, _FEWEST_PERIODS = 8.0, 2.0
 """Of a frequency in windows that identify it, and in the longest: within fewer, lower ones leak in by some per cent."""
 _OVERLAP = 0.75
@@ -34,12 +31,9 @@ _LOWEST_HZ = 0.1
 _HIGHEST_HZ = 100.0
 _OF_SAMPLING = 0.2
 """Highest frequency, share of that of sampling: above it a straight line between samples is no signal any more."""
-_MOST_BLOCKS = 40
-"""Of windows, in which combinations of instruments are found apart: more cost time."""
-_BLOCKS_BESIDE = 2
-"""Blocks of half a window: windows of those further away have no sample in common."""
-_RIDGE = 1e-6
-"""Share of the power of a column of instruments, so that two equal ones leave something to solve."""
+_MOST_BLOCKS = 40  # Of windows, in which combinations of instruments are found apart: more cost time.
+_BLOCKS_BESIDE = 2  # Blocks of half a window: windows of those further away have no sample in common.
+_RIDGE = 1e-6  # Share of the power of a column of instruments, so that two equal ones leave something to solve.
 _ROUNDING = 1e-9
 _TINY = np.finfo(float).tiny
 

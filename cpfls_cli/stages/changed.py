@@ -44,23 +44,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NO_COLUMN = re.compile(r"import\.signals\.(?P<signal>\w+)\.columns: the log has no column '(?P<column>[^']+)'")
-
-_RATE = 0.01
-"""By which sampling rates differ that are another."""
-
+_RATE = 0.01  # By which sampling rates differ that are another.
 _UNLIKE = 0.7
 """Share of what a number may be off by that is not known for how flights are flown, from which on it is said: a half of
 the variance."""
 
-_MARKERS = "osD^vP"
-"""Of today's flights; more look alike."""
-
-_LONG = 18
-"""Letters of a flight's name from which on names stand one below the other."""
-
-_ROW, _HEAD = 0.19, 0.8
-"""Inches of a picture for each number, and around them."""
-
+_MARKERS = "osD^vP"  # Of today's flights; more look alike.
+_LONG = 18  # Letters of a flight's name from which on names stand one below the other.
+_ROW, _HEAD = 0.19, 0.8  # Inches of a picture for each number, and around them.
 _REFERENCE: dict[str, Any] = {"color": GREY, "marker": "|", "markersize": 7, "linestyle": "none", "zorder": 2}
 _TODAY: dict[str, Any] = {
     "color": "black",

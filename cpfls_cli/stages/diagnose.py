@@ -62,8 +62,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BAND = 1.96
-_VISIBLE = 0.05
-"""Share of the error without a model by which a playback has to grow to be called worse."""
+_VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
 
 
 def _curves(run: FreeRuns) -> dict[str, Array]:

@@ -8,17 +8,13 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous
 
-BLOCK_S = 4.0
-"""Length of the blocks that are left out in turn, s: longer than noise and motion remember."""
+BLOCK_S = 4.0  # Length of the blocks that are left out in turn, s: longer than noise and motion remember.
 
 # Of blocks: the work grows with them, and intervals by Student's t are 6 % wider than for infinitely many.
 _LARGEST_NUMBER = 24
-# Of columns brought to one length: far below noise, far above rounding.
-_RIDGE = 1e-9
-# A shift is at least this part of a flight, so that slow motion does not meet itself.
-_LEAST_SHARE = 10
-_ALONE = 0.95
-"""Share of the information on a coefficient from which on one block alone shows it."""
+_RIDGE = 1e-9  # Of columns brought to one length: far below noise, far above rounding.
+_LEAST_SHARE = 10  # A shift is at least this part of a flight, so that slow motion does not meet itself.
+_ALONE = 0.95  # Share of the information on a coefficient from which on one block alone shows it.
 
 
 @dataclass(frozen=True)
@@ -137,8 +133,8 @@ class ConditionalNormalEquations:
     gram: Array
     moment: Array  # Shape (block + 1, column, draw).
     length: Array  # Shape (block + 1, column): of whole columns.
-    own: Array  # As `gram` and `moment`, on the block that a fit does not see, or on all blocks.
-    own_moment: Array  # The same.
+    own: Array  # As `gram`, on the block that a fit does not see, or on all blocks.
+    own_moment: Array  # As `moment`, alike.
     left: Array  # Shape (block + 1, draw): sum of squares that the base leaves there.
 
     @property

@@ -12,12 +12,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
-FEWEST_SAMPLES = 8
-"""Of a window: fewer do not follow its curve."""
-FEWEST_WINDOWS = 16
-"""Windows below which a flight is too short."""
-_SAME_RATE = 1e-3
-"""Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
+FEWEST_SAMPLES = 8  # Of a window: fewer do not follow its curve.
+FEWEST_WINDOWS = 16  # Windows below which a flight is too short.
+_SAME_RATE = 1e-3  # Relative difference of sampling periods that clocks of one logger have, and that no floor shows.
 
 
 @dataclass(frozen=True, eq=False)

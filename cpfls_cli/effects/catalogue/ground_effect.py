@@ -7,8 +7,7 @@ import numpy as np
 from cpfls_cli.effects.effect import Columns, Effect, Shape, a_few_percent, thrust_column
 from cpfls_cli.effects.signals import Signals
 
-# Below this share the formula leaves its range: the thrust at most doubles.
-_SMALLEST_DENOMINATOR = 0.5
+_SMALLEST_DENOMINATOR = 0.5  # Below this share the formula leaves its range: the thrust at most doubles.
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:

@@ -5,7 +5,6 @@ from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 
 _FILTER = CommandFilter("damping", (0.0, 0.0, 1.0))
-
 EFFECT = Effect(
     name="low_pass_filter",
     order=156,

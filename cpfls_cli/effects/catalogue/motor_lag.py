@@ -6,7 +6,6 @@ from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.lag import lagged
 
 _TIMES = (0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.125, 0.15)
-
 EFFECT = Effect(
     name="motor_lag",
     order=150,

@@ -5,7 +5,6 @@ from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 
 _FILTER = CommandFilter("width", (1.0, 0.0, 1.0))
-
 EFFECT = Effect(
     name="notch_filter",
     order=155,

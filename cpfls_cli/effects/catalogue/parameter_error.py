@@ -14,8 +14,7 @@ from cpfls_cli.effects.hooks import SensorLog, TrueMotion
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-# Places among the coefficients.
-_THRUST_SCALE = 6
+_THRUST_SCALE = 6  # Places among the coefficients.
 # A tenth and four times of what is stated: farther off the number was not measured but mistyped.
 _BOUNDS = (-0.9, 3.0)
 _COUPLED = (
@@ -24,7 +23,6 @@ _COUPLED = (
 )
 _MEASURED = "where acceleration or velocity is measured, relative to the centre of mass; seen in force only"
 _MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
-
 NUMBERS = {
     "inertia_x": "the inertia about x",
     "inertia_y": "the inertia about y",

@@ -17,25 +17,18 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-# A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
-_STEP_S = 0.04
-# Half width of the parabolas: a tenth of the shortest swing, over which it hardly bends.
-_SMOOTHING_S = 0.1
+_STEP_S = 0.04  # A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
+_SMOOTHING_S = 0.1  # Half width of the parabolas: a tenth of the shortest swing, over which it hardly bends.
 # Of the cable across, 30 degrees: a larger free swing at the start is a fit to something else.
 _LARGEST_START = 0.5
 _AT_REST = np.zeros(4)
-# Of the start, for its derivatives: a swing bends by a thousandth of it over that.
-_NUDGE = 1e-4
-# Of Gauss and Newton over the first part; over each later one a single one, from so near.
-_MOVES = 2
-# Of a part over the one before: a start from two swings is not a swing off after eight.
-_LONGER = 4
+_NUDGE = 1e-4  # Of the start, for its derivatives: a swing bends by a thousandth of it over that.
+_MOVES = 2  # Of Gauss and Newton over the first part; over each later one a single one, from so near.
+_LONGER = 4  # Of a part over the one before: a start from two swings is not a swing off after eight.
 # Squares left at the beginning, over those of a start found there: some swings in gusts identify a start no better.
 _WORSE = 2.0
-# As many as the grid of lengths and the dampings and depths around the best one.
-_SWINGS_KEPT = 32
-# Of the swing, over which its start is sought first: two separate it from the driven one.
-_PERIODS = 2.0
+_SWINGS_KEPT = 32  # As many as the grid of lengths and the dampings and depths around the best one.
+_PERIODS = 2.0  # Of the swing, over which its start is sought first: two separate it from the driven one.
 
 _State = tuple[float, float, float, float, float, float]
 

@@ -8,8 +8,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
 from cpfls_cli.effects.signals import Signals
 
-IN_PLANE = np.array([1.0, 1.0, 0.0])
-"""What of a vector lies in the rotor plane, body axes."""
+IN_PLANE = np.array([1.0, 1.0, 0.0])  # What of a vector lies in the rotor plane, body axes.
 
 
 def drag(signals: Signals, _shape: Mapping[str, float]) -> Columns:

@@ -9,8 +9,7 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-# Share of the arm by which hubs may miss each other and be opposite: digits of a config.
-_SAME_PLACE = 1e-6
+_SAME_PLACE = 1e-6  # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
 
 
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:

@@ -10,8 +10,7 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, a_few_
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-# kg/m^3, at sea level and 15 degrees.
-_AIR_DENSITY = 1.225
+_AIR_DENSITY = 1.225  # kg/m^3, at sea level and 15 degrees.
 # Ratios of descent: the end of the data, knots where their curves bend, where thrust shakes, and ends of the states.
 _LARGEST_RATIO = 2.5
 _KNOTS = (0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5)

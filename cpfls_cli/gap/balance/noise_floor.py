@@ -17,15 +17,12 @@ _FREQUENCIES = 16
 _LONGER = 2
 # In reciprocals of a window: from near the first zero of its spectrum, at 3, it passes nothing of slow motion.
 _LOWEST_PER_WINDOW = 2.8
-# Of the sampling rate: above, filters against aliasing bend a spectrum.
-_HIGHEST_OF_RATE = 0.4
+_HIGHEST_OF_RATE = 0.4  # Of the sampling rate: above, filters against aliasing bend a spectrum.
 # Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
 _PASSED = 0.6
 _BAND = 1.5
-# From sample to sample; each halves the band of the one before about.
-CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
-# Frequencies for each that a window resolves, so that a sum over them is an integral.
-_PADDED = 8
+CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)  # From sample to sample; each halves the band of the one before about.
+_PADDED = 8  # Frequencies for each that a window resolves, so that a sum over them is an integral.
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:

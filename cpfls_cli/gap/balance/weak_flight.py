@@ -23,9 +23,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.newness import PER_WINDOW
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-TURNING = 4.0
-"""Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
-
+TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
 

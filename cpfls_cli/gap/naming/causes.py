@@ -22,8 +22,7 @@ from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in
 from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
-_MATTERS = 0.02
-"""Relative error of a moment of inertia or of the thrust from which on it is named."""
+_MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
 
 
 @dataclass(frozen=True)

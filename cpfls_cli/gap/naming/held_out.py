@@ -145,8 +145,8 @@ class Judge:
     """Judges fits on held-out flights."""
 
     training: Sequence[WeakFlight]
-    logged: Sequence[WeakFlight]  # The held-out flights as logged, and after repair of the sensors.
-    repaired: Sequence[WeakFlight]  # The same.
+    logged: Sequence[WeakFlight]  # Held out, as logged.
+    repaired: Sequence[WeakFlight]  # The same, after repair of the sensors.
     rng: np.random.Generator
 
     def judge(self, found: NamedFit) -> Judgement:

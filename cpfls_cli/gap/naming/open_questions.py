@@ -23,8 +23,7 @@ from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_USUAL_OF_BOUND = 0.2
-"""A coefficient that is large but not unheard of, as a share of its bound."""
+_USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
 
 
 def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
@@ -162,8 +161,7 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
-_RADIUS = "rotor radius"
-"""A signal that comes from the config, not from a log."""
+_RADIUS = "rotor radius"  # A signal that comes from the config, not from a log.
 
 
 def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:

@@ -17,8 +17,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.weak_form.resampling import folds
 
-_BEAM = 3
-"""Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
+_BEAM = 3  # Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do.
 
 
 def forward_selection(

@@ -24,9 +24,7 @@ from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 
-_BATTERY_USE = 0.2
-"""Share of its voltage that the battery loses over the flight."""
-
+_BATTERY_USE = 0.2  # Share of its voltage that the battery loses over the flight.
 _OPTIONAL = ("attitude", "position", "velocity", "acceleration", "specific_force", "voltage")
 _CARRIES = {
     "attitude": ("attitude",),

@@ -18,8 +18,7 @@ from cpfls_cli.trajectory.planning import Trajectory, sample_times
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_SLOPES = (0.5, 3.5)
-"""Powers of the frequency by which amplitudes fall: from shaking to drifting."""
+_SLOPES = (0.5, 3.5)  # Powers of the frequency by which amplitudes fall: from shaking to drifting.
 
 
 @dataclass(frozen=True)
@@ -102,11 +101,8 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
     )
 
 
-TILT_MAX = np.radians(35.0)
-"""Largest tilt where the settings leave it open."""
-
-_HARMONICS = 10
-"""Waves of an axis, as many as a person could still fly."""
+TILT_MAX = np.radians(35.0)  # Largest tilt where the settings leave it open.
+_HARMONICS = 10  # Waves of an axis, as many as a person could still fly.
 
 
 @dataclass(frozen=True)

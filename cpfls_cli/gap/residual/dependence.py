@@ -15,14 +15,9 @@ from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
-_DEGREE = 4
-"""Of curves, and of waves around a circle: what formulas leave out is hardly more crooked."""
-
-OUTER_PERCENT = 0.5
-"""Of a signal at either end, where a few windows would decide."""
-
-ANGLES = ("roll", "yaw")
-"""Signals that come back after a full turn."""
+_DEGREE = 4  # Of curves, and of waves around a circle: what formulas leave out is hardly more crooked.
+OUTER_PERCENT = 0.5  # Of a signal at either end, where a few windows would decide.
+ANGLES = ("roll", "yaw")  # Signals that come back after a full turn.
 
 
 class Dependence(NamedTuple):

@@ -21,14 +21,9 @@ Energy = Literal["feeds", "drains", "neither"]
 _LOBE_CYCLES = 2
 """Half width of the main lobe of a Hann taper, in reciprocals of the flight: slower is no band but a drift."""
 
-_FINER = 4
-"""Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power."""
-
-LOWEST = _FINER * _LOBE_CYCLES
-"""First bin above those that the mean leaks into."""
-
-_MEDIAN_CYCLES = 24
-"""Width of the running median, six times a line's."""
+_FINER = 4  # Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power.
+LOWEST = _FINER * _LOBE_CYCLES  # First bin above those that the mean leaks into.
+_MEDIAN_CYCLES = 24  # Width of the running median, six times a line's.
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 
 _SURE = 1 - 0.05 / 36
 """Confidence from which on something is repeatable: of 36 numbers, chance shall pass none in 95 %."""
-OPEN = 0.5
-"""Share of a gap above which it is not ruled out that it is repeatable."""
+OPEN = 0.5  # Share of a gap above which it is not ruled out that it is repeatable.
 _LARGEST_ERROR = 0.2
 """Standard error of an explained share above which it says nothing: hardly any motion is repeatable there."""
 

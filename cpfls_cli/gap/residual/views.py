@@ -16,9 +16,7 @@ from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
-_WORST_SHARE = 0.1
-"""Of the time is called worst."""
-
+_WORST_SHARE = 0.1  # Of the time is called worst.
 _LONGEST_PAUSE_S = 1.0
 """With pauses up to this long in it, over which the residual is averaged: a zero crossing makes no gap small."""
 
