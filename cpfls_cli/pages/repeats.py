@@ -29,7 +29,6 @@ NOT_SPLIT = (
     "model lacks) and the rest (gusts, noise). Logged setpoints of position or velocity do that too. To fly: "
     f"{WHAT_TO_FLY}"
 )
-NO_EFFECT = "The residual is not repeatable: no effect of the vehicle explains it."
 _COLUMNS = 3
 _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("repeatable, explained", {"facecolor": "white"}),

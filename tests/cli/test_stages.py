@@ -251,18 +251,18 @@ def looked(cpfls, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_csv(tmp_path / "log.csv", flat_log(flight(seconds=12.0)))
     (tmp_path / "study.yaml").write_text(TINY + VEHICLE)
-    assert cpfls("look", "log.csv", "-o", "out").exit_code == 0
+    cpfls.done("look", "log.csv", "-o", "out")
     return tmp_path / "out" / "log.h5"
 
 
 def test_info_check_and_report_know_results(cpfls, looked):
-    told = json.loads(cpfls("info", looked, "--json").stdout)
+    told = cpfls.told("info", looked)
     assert (told["format"], told["result"]["name"]) == ("cpfls/look", "log.csv")
     said = cpfls("info", looked, "-v").stdout
     assert "log.csv (sha256 " in said
     assert cpfls("check", looked).stdout.startswith(f"{looked}: good (cpfls/look)\n")
     for name in ("r.html", "r.md", "r.json"):
-        assert cpfls("report", "study.yaml", looked, "-o", name).exit_code == 0
+        cpfls.done("report", "study.yaml", looked, "-o", name)
         assert "log.csv" in (looked.parents[1] / name).read_text()
     assert (looked.parents[1] / "r.html").read_text() == looked.with_suffix(".html").read_text()
 
