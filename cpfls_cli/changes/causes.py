@@ -42,7 +42,7 @@ class Cause:
         return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
     def holds(self, other: Cause) -> bool:
-        """Tell whether another change is this one, or this one with something more: a second rotor, a place.
+        """Check whether another change is this one, or this one with something more: a second rotor, a place.
 
         What is heavier needs more thrust in hover, and off its centre it moves that.
         """

@@ -132,7 +132,7 @@ def _in_common(reference: Reference, today: Sequence[FlightNumbers]) -> tuple[fl
 
 
 def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightNumbers]) -> bool:
-    """Tell whether a ratio that may be zero is nearer to that than to what it is in the reference.
+    """Check whether a ratio that may be zero is nearer to that than to what it is in the reference.
 
     One that is badly identified, as in a quiet hover, agrees with the reference as well as with zero.
     """
@@ -381,7 +381,7 @@ class _Held(NamedTuple):
     furthest: float  # At most how probable it is that any number is as far off.
 
     def p_value(self, chance: Array) -> float:
-        """Tell how probable it is that an unchanged vehicle looks as much changed, by either test."""
+        """Compute how probable it is that an unchanged vehicle looks as much changed, by either test."""
         return either(beyond_chance(chance, self.evidence), self.furthest)
 
 

@@ -104,7 +104,7 @@ class Reference:
         return values - self.mean, covariance
 
     def more_agile(self, flights: Sequence[FlightNumbers]) -> Array:
-        """Tell how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if not known."""
+        """Compute how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if unknown."""
         more = _logarithms(flights) - self.agility
         return np.where(np.isfinite(more), more, 0.0)
 

@@ -121,7 +121,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
-    """Tell of a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
+    """Name a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
     against = by_thrust(checks)
     if not against or any(len(check.first) < FEWEST_WINDOWS for check in against):
         return None
@@ -222,7 +222,7 @@ def _read_rightly(now: _Compared, channel: str) -> _Read | None:
 
 
 def _surely_less(after: Array, before: Array) -> bool:
-    """Tell whether squares are less by more than their scatter along the flights."""
+    """Check whether squares are less by more than their scatter along the flights."""
     parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
     return bool(parts.mean() > _PARTS_SIGMAS * mean_error(parts))
 
@@ -407,7 +407,7 @@ def _contradicted(
 
 
 def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
-    """Tell whether more than a delay or a small scale is wrong with a channel: in a hover a few ms look like axes."""
+    """Check whether more than a delay or a small scale is wrong with a channel: in a hover a few ms look like axes."""
     return any(problem.contradiction for check in checks if channel in check.pair for problem in check.problems)
 
 

@@ -90,7 +90,7 @@ class Sure(NamedTuple):
     error: float
 
     def beyond(self, size: float) -> bool:
-        """Tell whether it is surely not zero, and larger than a size."""
+        """Check whether it is surely not zero, and larger than a size."""
         return abs(self.value) > max(size, _JACKKNIFE_SIGMAS * self.error)
 
 
@@ -350,7 +350,7 @@ def _correlation(first: Array, second: Array) -> float:
 
 
 def _is_turned(check: PairCheck) -> bool:
-    """Tell whether a turn about the vertical leaves less between two than any delay does."""
+    """Check whether a turn about the vertical leaves less between two than any delay does."""
     plane = np.array([0, 1])
     if not check.visible[plane].all() or not check.turn.beyond(TURNED_RAD):
         return False

@@ -85,7 +85,7 @@ def accelerated(signals: Signals) -> Array | None:
 
 
 def is_derived(signals: Signals) -> bool:
-    """Tell whether the acceleration was made of what the accelerometer senses, and is no channel of its own."""
+    """Check whether the acceleration was made of what the accelerometer senses, and is no channel of its own."""
     made = accelerated(signals)
     if made is None or signals.acceleration is None:
         return False

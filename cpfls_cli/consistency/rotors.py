@@ -102,7 +102,7 @@ class MeantUnit(NamedTuple):
 
 
 def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, declared: str) -> MeantUnit | None:
-    """Tell in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
+    """Find in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
 
     `speed`, shape (time, rotor), rad/s: as read in the unit that is declared.
     `attitude`, shape (time, 3), rad: slow rotors may idle on the ground where it does not lean.
@@ -149,7 +149,7 @@ def thrust_against_weight(parts: Sequence[Signals]) -> Finding | None:
 
 
 def thrust_is_known(parts: Sequence[Signals]) -> bool:
-    """Tell whether the size of the thrust says anything."""
+    """Check whether the size of the thrust says anything."""
     return "thrust_factor" not in parts[0].vehicle.unknown and thrust_against_weight(parts) is None
 
 

@@ -254,7 +254,7 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
 
 
 def _is_filtered(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> bool:
-    """Tell whether gyroscope and attitude differ in size as a filter of one makes them: in fast motion alone."""
+    """Check whether gyroscope and attitude differ in size as a filter of one makes them: in fast motion alone."""
     gain = _gains(scanned)
     off = (np.abs(gain) > _FILTERED_FROM) & (scanned.seen.std(axis=0) > TURNING_RAD_S)
     if not off.any():

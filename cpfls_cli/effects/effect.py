@@ -173,7 +173,7 @@ class Effect:
         return self.actuation.supply is None
 
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
-        """Tell by the numbers that were fitted whether it is this effect or what took its place."""
+        """Check by the fitted parameters whether it is this effect or what took its place."""
         other = self.exact or self
         names = {shape.name for shape in other.shapes}
         return other if (len(other.coefficients), names) == (coefficients, {*shapes}) else self

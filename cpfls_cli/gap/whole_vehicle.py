@@ -131,7 +131,7 @@ def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Rec
 
 
 def has_effects(model: VehicleModel) -> bool:
-    """Tell a vehicle that was found from what a search begins with: a rigid body, or an inertia over attitude."""
+    """Separate a vehicle that was found from what a search begins with: a rigid body, or an inertia over attitude."""
     return not model.is_rigid_body and model.fuzzy is None
 
 

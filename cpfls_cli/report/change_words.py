@@ -145,7 +145,7 @@ def _place(sizes: Sequence[Estimate]) -> str:
 
 
 def is_within(other: str, cause: str) -> bool:
-    """Tell whether a pair of rotors holds the one that changed, or a mass what it does."""
+    """Check whether a pair of rotors holds the one that changed, or a mass what it does."""
     of_pair = cause.startswith("rotor ") and other.startswith("rotors ") and cause.split()[-1] in other.split()
     return of_pair or (cause in ("hover", "centre of mass") and other == "mass")
 

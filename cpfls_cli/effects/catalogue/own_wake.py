@@ -26,7 +26,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 
 def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
-    """Tell whether the lost lift can have the moment: it acts within the arms."""
+    """Check whether the lost lift can have the moment: it acts within the arms."""
     largest = scales.arm(vehicle) * max(float((linear + 2 * error)[0]), 0.0)
     return np.array([True, *(np.abs(linear[1:]) - 2 * error[1:] <= largest)])
 

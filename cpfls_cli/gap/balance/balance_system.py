@@ -148,7 +148,7 @@ class System:
         return np.where(self.gusty, CLEAR**2, NOISE)
 
     def can(self, candidate: Candidate) -> bool:
-        """Tell whether any flight has the signals that a candidate needs."""
+        """Check whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
 
 
@@ -159,7 +159,7 @@ def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> S
 
 
 def has_force(flights: Sequence[WeakFlight]) -> bool:
-    """Tell whether any flight has the force balance."""
+    """Check whether any flight has the force balance."""
     return any(flight.known[3:].any() for flight in flights)
 
 
@@ -176,7 +176,7 @@ def known_size(rows: Array, known: BoolArray) -> Array:
 
 
 def is_free(candidate: Candidate) -> bool:
-    """Tell whether an effect has columns with free coefficients."""
+    """Check whether an effect has columns with free coefficients."""
     return candidate.effect.kind == "wrench" and not candidate.effect.unit_coefficient
 
 

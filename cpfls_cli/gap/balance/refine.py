@@ -70,7 +70,7 @@ class Equations:
 
     @cached_property
     def _apart(self) -> tuple[Array, Array, Array, Array]:
-        """Tell signal from noise: root of the squares of all rows, its inverse, shares of noise, and their axes."""
+        """Separate signal from noise: root of the squares of all rows, its inverse, shares of noise, and their axes."""
         length = np.linalg.norm(self.columns, axis=0)
         scale = np.where(length > 0, length, 1.0)
         triangle = np.asarray(np.linalg.qr(self.columns / scale, mode="r"))

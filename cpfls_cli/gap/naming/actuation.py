@@ -126,22 +126,22 @@ class _Sets:
         return None if any(each.is_lag for each in unidentified(before, after)) else after
 
     def is_predictable(self, names: _Names) -> bool:
-        """Tell whether the past predicts the residual of a set, which makes an answer more careful."""
+        """Check whether the past predicts the residual of a set, which makes an answer more careful."""
         return self._more(self.predictable[names], CHANCE)
 
     def lacks(self, best: _Names, names: _Names) -> bool:
-        """Tell whether a set may lack what one with more numbers has: a number jointly, or what the past predicts."""
+        """Check whether a set may lack what one with more numbers has: a number jointly, or what the past predicts."""
         if set(best) < set(names):
             return self._needed(names, CHANCE) == set(names)
         return self.is_predictable(best) and not self.is_predictable(names)
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
-        """Tell whether one leaves surely more than another; the right one leaves nothing, and less than that chance."""
+        """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance."""
         residual = (self.predictable[names] * (self.predictable[names].sum() > 0) for names in (one, other))
         return self._more(more_residual(*residual), self.found.settings.significance)
 
     def _more(self, residual: Array, rate: float) -> bool:
-        """Tell whether a residual is more than chance, and more than formulas are off by."""
+        """Check whether a residual is more than chance, and more than formulas are off by."""
         return chance_of_ranks(residual) < rate and bool(residual.sum() > OFF**2 * self.predictable[()].sum())
 
     def least(self, tried: Sequence[_Names]) -> _Names:

@@ -289,7 +289,7 @@ def verdict_of(
 
 
 def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> bool:
-    """Tell whether a relevant gap of the held-out flights about or along an axis is not reduced.
+    """Check whether a relevant gap of the held-out flights about or along an axis is not reduced.
 
     Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
 
@@ -304,7 +304,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
 
 
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
-    """Tell whether an unexplained residual is a second cause, by its dependence, or more than a name may leave.
+    """Check whether an unexplained residual is a second cause, by its dependence, or more than a name may leave.
 
     `before`, shape (6,), floors: the gap of each channel without effects.
     `named_share`: of the gap above the floor that has to go.
@@ -317,5 +317,5 @@ def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool
 
 
 def _is_unexplained(after: Array, before: Array, named_share: float) -> BoolArray:
-    """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
+    """Check whether each channel keeps a clear gap, and more of it than a name may leave."""
     return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))

@@ -58,7 +58,7 @@ def forward_selection(
 
 
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:
-    """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
+    """Check whether the best candidate explains more than chance and a relevant part of the residual."""
     best = max((scored.gain for scored in step.ranking), default=-np.inf)
     return best >= step.least_gain() and step.p_value(best) <= settings.significance
 
@@ -103,7 +103,7 @@ def grown_elsewhere(
 
 
 def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
-    """Tell whether a set leaves less than another one; with more numbers it has to beat that one."""
+    """Check whether a set leaves less than another one; with more numbers it has to beat that one."""
     if free_numbers(scored.chosen) > free_numbers(own.chosen):
         return not unbeaten(scored, [own], step.above_floor)
     return bool(less(0.0, scored.gain - own.gain, step.above_floor))
@@ -144,7 +144,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
 
 
 def _lags(chosen: Sequence[Candidate]) -> bool:
-    """Tell whether any effect lies between command and rotors."""
+    """Check whether any effect lies between command and rotors."""
     return any(each.effect.actuation is not None for each in chosen)
 
 
@@ -175,7 +175,7 @@ def _moved(chosen: Sequence[Candidate], step: RankedStep) -> Scored:
 
 def _rescored(hypothesis: System, step: RankedStep) -> Scored:
     """Score a set, with its shapes where they are, by its residual in each block that no fit saw."""
-    # Beside the best set, whose rotor torque is what it is in the look.
+    # With the best set, whose rotor torque is what it is in the look.
     floor = step.floor * torque_loss_ratio(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
     # Shapes that are refined stay.
     error = _unseen(hypothesis, floor, step.block, moving=not _lags(hypothesis.chosen))

@@ -58,7 +58,7 @@ def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tu
 
 
 def _is_open(question: Question) -> bool:
-    """Tell whether there is a question: an effect is also what holds it as a special case."""
+    """Check whether there is a question: an effect is also what holds it as a special case."""
     effect, rival = question.true.candidate.effect, question.rival
     return effect.kind != "parameter" and (rival is None or effect.name not in rival.holds)
 
@@ -110,7 +110,7 @@ def _alike(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> l
 
 
 def _is_answered(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
-    """Tell whether the flights that are there answer a question."""
+    """Check whether the flights that are there answer a question."""
     if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
         return False
     (answer,) = answered([gathered(question, flights, floor, settings)], shared_noise(flights[0].windows))
