@@ -192,7 +192,7 @@ def _cut(group: str) -> float:
 def _deviations(today: list[FlightNumbers], before: list[FlightNumbers]) -> tuple[np.ndarray, float]:
     """Give the mean share of each motor in deviations of the reference, and from where on it counts."""
     own, usual = (
-        np.exp([[value for name, value in each.values.items() if name.startswith("load ")] for each in flights])
+        np.exp([[value for name, value in each.values.items() if name.startswith("thrust ")] for each in flights])
         for flights in (today, before)
     )
     own, usual = (each / each.sum(axis=1, keepdims=True) for each in (own, usual))

@@ -14,7 +14,7 @@ from benchmarks.shared.measure import program, table
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -40,7 +40,7 @@ def main(draws: int = 6) -> None:
     gusty, calm, alone = ([one[name] for one in found] for name in SETS)
     shares, inside, passed = [], [], []
     for there, truth in zip(gusty, calm, strict=True):
-        expected = truth.again / (truth.again + there.total - there.again)
+        expected = truth.repeatable / (truth.repeatable + there.total - there.repeatable)
         inside.append(np.abs(there.share - expected) < there.share_half)
         off = np.abs(there.explained - truth.explained) < half_width(there.explained_error, there.blocks)
         passed.append(off[MODELLED])
@@ -57,10 +57,11 @@ def main(draws: int = 6) -> None:
     print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
     sure = np.array([one.sure for one in alone])
     print(f"gusts alone: {sure.sum()} of {sure.size} are called repeatable")
-    print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
+    rest = np.array([one.non_repeatable for one in alone])
+    print("the rest, rad/s^2 and m/s^2:", *(_span(rest[:, c]) for c in range(6)))
 
 
-def split(flown: Sequence[PlaybackFlight]) -> ComesAgain:
+def split(flown: Sequence[PlaybackFlight]) -> Repeatability:
     """Split what a model without drag and damping leaves of flights."""
     recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
