@@ -2,24 +2,19 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Memory, RotorMotion
+from cpfls_cli.vehicle.values import Value, Vector
 
-
-class RotorMotion(NamedTuple):
-    """Rotors in the middle of a step."""
-
-    speed: Array  # Shape (rotor,), rad/s.
-    acceleration: Array  # Shape (rotor,), rad/s^2.
-
-
-Link = Callable[[RotorMotion], RotorMotion]
-"""A link of the actuator chain; called once in each step, it may keep a state."""
+Link = Callable[[RotorMotion, Mapping[str, float], Memory], RotorMotion]
+"""A link of the actuator chain, of its values; it keeps in the memory what the next step needs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,12 +23,11 @@ class Actuation:
 
     # ``lag(values) -> float``: time constant in s that replaces that of the rotors.
     lag: Callable[[Mapping[str, float]], float] | None = None
-    # ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
-    link: Callable[[Mapping[str, float], float], Link] | None = None
+    link: Link | None = None  # ``link(rotors, values, memory) -> RotorMotion`` after the lag, at each step.
     # ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
     delay: Callable[[Mapping[str, float]], float] | None = None
-    # ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
-    supply: Callable[[Mapping[str, float], float], float] | None = None
+    # ``supply(values, voltage)``: factor on the rotor speed at a share of the full voltage, which is logged.
+    supply: Callable[[Mapping[str, float], Value], Value] | None = None
 
 
 class PhysicalNumbers(NamedTuple):
@@ -53,36 +47,12 @@ class VehicleParts(NamedTuple):
     effects: tuple[tuple[str, Mapping[str, float], Array], ...] = ()
 
 
-class Carrier(NamedTuple):
-    """The vehicle that carries a body."""
-
-    mass: float  # Kg.
-    inertia: Array  # Shape (3, 3), kg m^2, body frame.
-    rotation: Array  # Shape (3, 3): body to world.
-    body_rate: Array  # Shape (3,), rad/s, body frame.
-    acceleration: Array  # Shape (3,), m/s^2, world frame: without the carried body.
-    turning: Array  # Shape (3,), rad/s^2, body frame: the same.
-
-
-class Pull(NamedTuple):
-    """Acceleration of the carrier by a carried body, and the derivative of its state."""
-
-    acceleration: Array  # Shape (3,), m/s^2, world frame.
-    turning: Array  # Shape (3,), rad/s^2, body frame.
-    change: Array  # Shape (state,): derivative of the state of the body.
-
-
-class CarriedBody(Protocol):
+class Body(NamedTuple):
     """A body with a state of its own on the vehicle."""
 
-    @property
-    def start(self) -> Array:
-        """State at the start, shape (state,)."""
-        ...
-
-    def pull(self, carrier: Carrier, state: Array) -> Pull:
-        """Compute the pull on a carrier."""
-        ...
+    # ``pull(see, p, state, carrier) -> Pull``, see `Carried`.
+    pull: Callable[[Instant, Numbers, Vector, Carrier], Pull]
+    start: tuple[float, ...]  # Its state at the start.
 
 
 class TrueMotion(NamedTuple):
