@@ -1,7 +1,8 @@
 """A stage is one typed function: its parameters are the command line, its result the file, its template the answer.
 
 A module of `stages` holds one, made by the decorator `stage`; `templates` holds what a person reads of its result. The
-command line finds both by the name of the module (`cli/stages.py`).
+command line finds both by the name of the module (`cli/stages.py`). A result without a ``FORMAT`` has no file: it is
+only answered with, and what the stage writes are its `Run.texts`, unless the run is dry.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
-    texts : dict of Path to str
+    texts : dict of Path to str or bytes
         Other files that are written with the result.
     said : list of Text
         Of this run alone: its file says none of it again.
@@ -144,7 +145,7 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
-    texts: dict[Path, str] = field(default_factory=dict)
+    texts: dict[Path, str | bytes] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
     until_written: ExitStack = field(default_factory=ExitStack)
     afterwards: list[Callable[[], object]] = field(default_factory=list)
@@ -213,7 +214,7 @@ def _would(run: Run, stage: Stage) -> Outcome:
     cautions = run.cautions_of(*(stage.fills.parts if stage.fills else ()))
     return Outcome(
         {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
-        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *caution_texts(cautions)),
+        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *run.said, *caution_texts(cautions)),
     )
 
 
@@ -241,7 +242,7 @@ class Stage:
     study : bool or callable
         Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
     output : object
-        Option of its output where it is another than usual; may be left out.
+        Option of its output where it is another than usual; may be left out. False of one that only answers.
     several : bool
         Whether options that may be repeated take all values that follow.
     resumes : bool
@@ -338,9 +339,9 @@ class Stage:
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-            if run.writes and not streamed:
+            if run.writes and not streamed and (self.fills or hasattr(self.kind, "FORMAT")):
                 self._write(run, run.output, results)
-            else:
+            elif not run.dry_run:
                 write_files(run.texts)
         for act in run.afterwards:
             act()
