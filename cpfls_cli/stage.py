@@ -29,8 +29,7 @@ from cpfls_cli.artifacts.output import (
     write_files,
     write_text,
 )
-from cpfls_cli.artifacts.spec import Header, InputFile, Record
-from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
@@ -432,14 +431,13 @@ class Stage:
         results = {name: getattr(given, name) if fills.parts else given for name in parts}
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
-            if not isinstance(each, Record):
-                store.require_sound(output / f"{name}.h5", each)
+            store.require_sound(output / f"{name}.h5", each)
         with filled_folder(output, self._names(fills)) as folder:
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)
                 made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
-                _write_any(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
             cautions = run.cautions_of(*parts)
             summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -472,18 +470,19 @@ class Stage:
                 write_text(folder / name, page.html(output.name, self.text(every, f"_{_INDEX}"), {}))
 
 
-def _write_any(path: Path, given: Any, origin: store.Origin) -> None:
-    """Write a result, or a record that is none yet."""
-    if not isinstance(given, Record):
-        store.write(path, given, origin)
-        return
-    header = Header(origin.version, origin.seed or 0, origin.config, origin.inputs, origin.cautions)
-    write_record(path, given.with_header(header))
-
-
 def loaded(module: str) -> Stage:
     """Load the stage of a module of `stages`."""
     return next(each for each in vars(import_module(f"cpfls_cli.stages.{module}")).values() if isinstance(each, Stage))
+
+
+def stage_that_made(path: Path) -> Stage:
+    """Load the stage that made a file."""
+    return stage_named(store.read_origin(path).stage)
+
+
+def kind_of(path: Path) -> Any:
+    """Give the class of the result in a file."""
+    return stage_that_made(path).kind
 
 
 def stage_named(name: str) -> Stage:

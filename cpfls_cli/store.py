@@ -19,9 +19,11 @@ import h5py
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.check import Origin as Origin
-from cpfls_cli.artifacts.check import dataset_of, held_format, opened_file, origin_of, other_version
 from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import Origin as Origin
+from cpfls_cli.artifacts.gate import dataset_of, held_format, identified, opened_file
+from cpfls_cli.artifacts.gate import format_name as format_name
+from cpfls_cli.artifacts.gate import read_origin as read_origin
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION, DatasetSpec
@@ -41,6 +43,7 @@ IN_MEMORY = 500_000
 """Rows of a result that are held in memory, of a flight 52 MB of motion and torque."""
 _ROW = About("row of the table that each line belongs to", ("line",), least=0)
 _NUMPY: Mapping[type, Any] = {bool: np.bool_, int: np.int64, float: np.float64, complex: np.complex128, str: np.str_}
+_SHORT: Mapping[type, Any] = {float: np.float32, int: np.uint16}
 _HELD = {bool: "bui", int: "iub", float: "fiub", complex: "cfiub", str: "US"}
 """Kinds of arrays that hold values of a type."""
 
@@ -240,9 +243,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
         if held != wanted:
             made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
-        if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
-            raise other_version(path, file)
-        origin, missing = origin_of(file), list[str]()
+        origin, missing = identified(path, file).origin, list[str]()
         given = _read(kind, file, missing, rows)
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")
@@ -264,11 +265,6 @@ def flat(path: Path) -> dict[str, tuple[DatasetSpec, Any]]:
     with opened_file(path) as file, patient(path):
         file.visititems(take)
     return found
-
-
-def format_of(given: Any) -> str:
-    """Name the format of a record or a result, or of its class."""
-    return str(getattr(given.FORMAT, "name", given.FORMAT))
 
 
 def count_rows(path: Path, kind: Any, name: str) -> int | None:
@@ -428,9 +424,9 @@ def _values(group: h5py.Group, name: str, own: Described, rows: Any = ()) -> np.
 
 
 def _as(own: Described, value: Any) -> np.ndarray[Any, Any]:
-    """Give values in the type of their field; single precision is kept."""
-    held = getattr(value, "dtype", None)
-    return np.asarray(value, np.float32 if own.scalar is float and held == np.float32 else _NUMPY[own.scalar])
+    """Give values in the type of their field; single precision is kept, and what needs 16 bits alone."""
+    short = _SHORT.get(own.scalar)
+    return np.asarray(value, short if short and getattr(value, "dtype", None) == short else _NUMPY[own.scalar])
 
 
 def _value(own: Described, array: Any, *, single: bool = False) -> Any:

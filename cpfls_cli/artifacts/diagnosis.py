@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup
-from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
@@ -20,6 +20,7 @@ from cpfls_cli.gap.residual.repeated import ComesAgain
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.inertia import six_parameters
+from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
@@ -54,7 +55,7 @@ class Diagnosis(Conclusion):
 
     again_before: ComesAgain | None = part(None, brief=False)
     again_after: ComesAgain | None = part(None, brief=False)
-    air: DisturbanceGroup | None = part(None, brief=False)
+    air: FoundGusts | None = part(None, brief=False)
     playback: PlaybackChange | None = part(None)
     worst: tuple[GapStretch, ...] = part((), brief=False)
     residual: ResidualChange = part(brief=False)
@@ -69,7 +70,8 @@ class Diagnosis(Conclusion):
     )
     base: VehicleModel = part(brief=False)
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
-    learned: LearnedGroup | None = part(None, brief=False)
+    learned: tuple[LearnedFlight, ...] = part((), brief=False)
+    """Flights that its base learned from."""
 
     @classmethod
     def of(
@@ -88,7 +90,7 @@ class Diagnosis(Conclusion):
             **vars(diagnosed.diagnosis),
             again_before=change.again_before,
             again_after=change.again_after,
-            air=None if air is None else DisturbanceGroup.of(air.found, air.told),
+            air=None if air is None else replace(air.found, alone=air.told),
             playback=change.playback,
             worst=change.stretches,
             residual=change.residual,
@@ -156,8 +158,29 @@ class Diagnosis(Conclusion):
 
     @property
     def disturbance(self) -> dict[str, Any] | None:
-        """Gusts, for machines."""
-        return None if self.air is None else self.air.summary(self.inertia, self.base.vehicle.mass_kg)
+        """Gusts by axis, for machines, as torque or force and as accelerations."""
+        air, columns = self.air, ("size", "low", "high", "memory", "memory_low", "memory_high")
+        if air is None:
+            return None
+        return {
+            "told_by": air.told_by,
+            "axes": {
+                axis.name: {
+                    "unit": "N m" if axis.turns else "N",
+                    "alone": None if air.alone is None else bool(air.alone[number]),
+                    "foretold": float(air.foretold[number]),
+                    **{
+                        name if place < 3 else f"{name}_s": float(getattr(air, name)[number])
+                        for place, name in enumerate(columns)
+                    },
+                    "acceleration": {
+                        "unit": "rad/s^2" if axis.turns else "m/s^2",
+                        **{name: getattr(axis, name) for name in columns[:3]},
+                    },
+                }
+                for number, axis in enumerate(self.gust_axes)
+            },
+        }
 
     @property
     def inertia(self) -> Array:

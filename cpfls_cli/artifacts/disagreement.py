@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from cpfls_cli.artifacts.learned import LearnedGroup
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.gap.compare import Comparison
 from cpfls_cli.gap.recorded import GIVEN, RecordedFlight, names_of, recorded
 from cpfls_cli.playback.model import VehicleModel
@@ -24,7 +24,8 @@ class Disagreement(Comparison):
     warnings: tuple[str, ...] = about("what to know about the flights", "flight_note")
     base: VehicleModel = part(brief=False)
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
-    learned: LearnedGroup | None = part(None, brief=False)
+    learned: tuple[LearnedFlight, ...] = part((), brief=False)
+    """Flights that its base learned from."""
 
     @classmethod
     def of(

@@ -1,75 +1,50 @@
-"""The artifact of an extended model: the effects that it missed in it."""
+"""A model with the effects that it missed in it, refitted together, and what the gap becomes with them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.audit import AuditGroup
-from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
-from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
-from cpfls_cli.artifacts.playback import by_horizon
-from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record
+from cpfls_cli.artifacts.learned import LearnedFlight
+from cpfls_cli.artifacts.model import AnyModel
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.before_after import LeftOut, PlaybackChange
+from cpfls_cli.gap.naming.causes import all_numbers
+from cpfls_cli.gap.naming.results import BODY, Estimate, GapChange, GapSize, NamedEffect
 from cpfls_cli.inertia import more_than_others, six_parameters
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.result import about, part, result
 from cpfls_cli.validation.trust import capped, trust_by_playback
 
 if TYPE_CHECKING:
-    from cpfls_cli.gap.before_after import LeftOut
     from cpfls_cli.gap.extended import Refit
-    from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.vehicle.settings import VehicleSettings
 
 
-@record
-class LeftOutGroup:
-    """Effects that no vehicle for other programs holds, and what they do along the held-out flights."""
+@result
+class Extended(AnyModel):
+    """A model with the effects that it missed in it, refitted together."""
 
-    name: tuple[str, ...] = dataset("identifier, see `cpfls effects`", "left_out")
-    wrench: Array = dataset(
-        "root mean square of torque (x y z, N m) and force (x y z, N)", "left_out", "6", units="SI", frame=BODY
-    )
-    ends: Array = dataset(
-        "how far off a free run of gap.horizon_s ends without it: position (m), velocity (m/s), attitude (rad), body "
-        "rate (rad/s); NaN for what a flight does not show",
-        "left_out",
-        "4",
-        units="SI",
-        gaps=True,
-    )
-
-
-@record
-class ExtendedVehicleGroup(VehicleGroup):
-    """A vehicle with what was found of the sensors, which a refit repairs first."""
-
-    repair: AuditGroup = group()
-
-
-@record
-class ExtendedRecord(ModelRecord):
-    """The artifact `cpfls/model` of a model with the effects that it missed in it."""
-
-    FORMAT: ClassVar = Format(
-        "cpfls/model",
-        "a model with the effects that it missed in it, refitted together",
-        "extend, gap",
-        ("flight", "diagnosis", "model"),
-        kind="extended",
-    )
+    FORMAT: ClassVar = "cpfls/extended"
     MADE_BY: ClassVar = "extend"
+    SHOWN: ClassVar = ("trust", "gap_before", "gap_after", "warnings")
 
-    vehicle: ExtendedVehicleGroup = group()
-    inertia: Array = dataset(
-        "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", units="kg m^2", frame=BODY
+    model: VehicleModel = part()
+    learned_from: tuple[LearnedFlight, ...] = part(default=())
+    """Flights that it was found in, those of its base among them."""
+    inertia: Array = about(
+        "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", unit="kg m^2", frame=BODY
     )
-    thrust_scale: float = dataset("thrust over that of the vehicle in /config")
-    effects: NamedEffectsGroup = group("")
-    gap: GapChangeGroup = group()
-    playback: PlaybackChangeGroup | None = group(default=None)
-    left_out: LeftOutGroup | None = group(default=None)
+    thrust_scale: float = about("thrust over that of the vehicle in the config")
+    effects: tuple[NamedEffect, ...] = part()
+    vehicle_numbers: tuple[Estimate, ...] = part(brief=False)
+    gap: GapChange = part(brief=False)
+    playback: PlaybackChange | None = part(default=None)
+    left_out: tuple[LeftOut, ...] = part(default=(), brief=False)
+    """Effects that no vehicle for other programs holds."""
 
     @classmethod
     def of(
@@ -77,45 +52,56 @@ class ExtendedRecord(ModelRecord):
         refit: Refit,
         stated: VehicleSettings,
         model: VehicleModel,
-        playback: PlaybackChangeGroup,
+        playback: PlaybackChange,
         left_out: Sequence[LeftOut],
-    ) -> Self:
-        """Arrange a refit; `stated` is the vehicle that the effects were fitted with."""
+    ) -> Extended:
+        """Put a refit together; `stated` is the vehicle that the effects were fitted with."""
         fitted, unseen, moments = refit.model, refit.unseen, stated.inertia_kg_m2
         rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
         correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
-        numbers = {number.name: number for number in refit.estimates.parameters}
+        scale = next((each.value for each in refit.estimates.parameters if each.name == "thrust_scale"), 0.0)
         return cls(
-            vehicle=ExtendedVehicleGroup.of(model),
+            model=model,
             inertia=rigid_body + correction,
-            thrust_scale=1.0 + numbers["thrust_scale"].value if "thrust_scale" in numbers else 1.0,
-            effects=NamedEffectsGroup.of(refit.effects, True, numbers, fitted.parameters),
-            gap=GapChangeGroup.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
+            thrust_scale=1.0 + scale,
+            effects=refit.effects,
+            vehicle_numbers=all_numbers(refit.estimates),
+            gap=GapChange.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
             playback=playback,
-            left_out=columns_of(LeftOutGroup, left_out) if left_out else None,
+            left_out=tuple(left_out),
         )
 
     @property
-    def audit(self) -> AuditGroup:
-        """Faults of the sensors that it repairs."""
-        return self.vehicle.repair
+    def contradictions(self) -> tuple[str, ...]:
+        """Contradictions within the flights that it was found in."""
+        return () if self.model.repairs is None else self.model.repairs.contradictions
 
     @property
     def trust(self) -> str:
         """What playback on flights held out says of it, as far as they do not contradict themselves."""
-        return capped(trust_by_playback(by_horizon(self.playback)), self.audit.contradiction or ())
+        return capped(trust_by_playback(self.playback), self.contradictions)
 
     @property
     def impossible(self) -> tuple[str, ...]:
         """Moments of inertia that are more than the other two together; others are as stated, or as they were found."""
-        return tuple(f"inertia.{name}" for name in more_than_others(self.vehicle.inertia.tolist()))
+        return tuple(f"inertia.{name}" for name in more_than_others(self.inertia.tolist()))
 
     @property
-    def summary(self) -> dict[str, Any]:
-        """The refit for machines."""
-        return {
-            "effects": [effect_summary(effect) for effect in self.effects.named],
-            "gap_before": self.gap.summary_before,
-            "gap_after": self.gap.summary_after,
-            **self.provenance,
-        }
+    def gap_before(self) -> dict[str, Any]:
+        """The gap of the model as given, for machines: lists over x, y, z."""
+        return GapSize(self.gap.before, self.gap.before_floors).as_summary
+
+    @property
+    def gap_after(self) -> dict[str, Any]:
+        """The gap with the effects, for machines: lists over x, y, z."""
+        return GapSize(self.gap.after, self.gap.after_floors).as_summary
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Axes that the extension serves ill, although it serves the whole well."""
+        gap = self.gap
+        return tuple(
+            f"held out, {CHANNELS[index]}: the gap grows, {gap.before_floors[index]:.3g} -> "
+            f"{gap.after_floors[index]:.3g} floors, although the sum over all channels shrinks"
+            for index in gap.worse_axes
+        )

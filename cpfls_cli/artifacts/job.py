@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, Protocol
 
+from cpfls_cli.artifacts.gate import Origin, format_name, read_origin
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.spec import Header, InputFile, Record
-from cpfls_cli.artifacts.store import file_sha256, format_name, read_header, write_parts, write_record
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.config.unknown import needs_numbers, require_known
-from cpfls_cli.errors import InputError, visible
-from cpfls_cli.version import __version__
-
-R = TypeVar("R", bound=Record)
+from cpfls_cli.errors import InputError
+from cpfls_cli.files import read_content
 
 
 class Progress(Protocol):
@@ -100,13 +98,6 @@ def go_on(job: Job, command: str, *words: str | Path, output: Path) -> tuple[str
     return "cpfls", command, job.config, *words, *taken, "-o", output
 
 
-def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
-    """Check inputs and output of a job before anything is computed, and take note of the inputs by role."""
-    files = take_inputs(job, inputs)
-    check_outputs(job, job.output)
-    return files
-
-
 def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
     """Refuse outputs that cannot or must not be written, such as an input; replaceable ones need no --force."""
     for path in paths:
@@ -140,7 +131,7 @@ def take_inputs(job: Taking, inputs: Mapping[str, Path]) -> dict[str, InputFile]
         job.inputs.append(path)
     for path in inputs.values():
         # What an input rests on, the output rests on.
-        job.cautions.update(dict.fromkeys(read_header(path).cautions if format_name(path) else ()))
+        job.cautions.update(dict.fromkeys(read_origin(path).cautions if format_name(path) else ()))
     return {role: input_file(path) for role, path in inputs.items()}
 
 
@@ -153,26 +144,13 @@ def _check_input(path: Path) -> None:
         raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file{remedy}")
 
 
-def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
-    """Write the record of a job, and give it back with the header that says where it comes from."""
-    whole = record.with_header(header_of(job.study, inputs, job.cautions))
-    write_record(job.output, whole)
-    return whole
-
-
-def finish_parts(job: Job, parts: Iterable[Record], samples: int, inputs: Mapping[str, InputFile]) -> None:
-    """Write the record of a job of which no more than a part is in memory, as `write_parts`."""
-    header = header_of(job.study, inputs, job.cautions)
-    write_parts(job.output, (part.with_header(header) for part in parts), samples)
-
-
-def header_of(study: Study, inputs: Mapping[str, InputFile], cautions: Iterable[str] = ()) -> Header:
-    """Tell where an artifact comes from."""
-    return Header(__version__, study.seed, resolved_yaml(study), inputs, tuple(map(visible, cautions)))
+def origin_before(study: Study, inputs: Mapping[str, InputFile], stage: str = "checkpoint") -> Origin:
+    """Tell where what a stopped command leaves comes from, before anything is known that speaks against it."""
+    return Origin(stage=stage, inputs=inputs, seed=study.seed, config=resolved_yaml(study))
 
 
 def input_file(path: Path) -> InputFile:
     """Describe an input file by name, hash and format."""
     # A name of bytes that are no text is stored with a mark in their place.
     name = os.fsencode(path.name).decode("utf-8", "replace")
-    return InputFile(name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))
+    return InputFile(name, read_content(path).sha256, format_name(path) or path.suffix.lstrip("."))

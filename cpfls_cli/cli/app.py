@@ -12,13 +12,11 @@ import typer
 
 from cpfls_cli.arguments import (
     ArtifactsArgument,
-    DiagnosisArgument,
     ExportAnywayOption,
     ExportedArgument,
     ExportFormat,
     FileArgument,
     LogsArgument,
-    ModelOption,
     moments,
 )
 from cpfls_cli.cli.interrupts import deferred_interrupts
@@ -141,19 +139,6 @@ def report(
 ) -> None:
     """Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
     _run("report", config, output, common, lambda command, job: command.run(job, artifacts, form))
-
-
-@_command()
-def extend(
-    config: ConfigArgument,
-    diagnosis: DiagnosisArgument,
-    output: OutputOption,
-    model: ModelOption = None,
-    *,
-    common: Common,
-) -> None:
-    """Put the named effects into the model, and show that the gap shrinks."""
-    _run("extend", config, output, common, lambda command, job: command.run(job, diagnosis, model))
 
 
 @_command()

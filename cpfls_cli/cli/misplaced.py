@@ -31,7 +31,7 @@ def _format(path: Path) -> str | None:
     """Tell the format of an artifact; None for any other file, which is not opened as one."""
     if not is_hdf5(path):
         return None
-    from cpfls_cli.artifacts.store import format_name
+    from cpfls_cli.artifacts.gate import format_name
 
     return format_name(path)
 

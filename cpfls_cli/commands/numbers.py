@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
+from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.job import Job, require_numbers
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import log_formats
@@ -25,7 +25,7 @@ _ARDUPILOT = "bin"
 
 def cautions_in(path: Path) -> tuple[str, ...]:
     """Say what speaks against the use of the model in a file."""
-    return cautions_of(any_model(path), path.name, read_header(path).cautions)
+    return cautions_of(any_model(path), path.name, read_origin(path).cautions)
 
 
 def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = False) -> J:

@@ -6,21 +6,16 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpfls_cli.artifacts.job import Job, begin
+from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.store import read_any
-from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import resolved
 from cpfls_cli.pages.comparison import model_verdicts
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
-from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.report.source import source_of_result
-from cpfls_cli.stage import Stage, loaded
+from cpfls_cli.stage import Stage, kind_of, loaded
 from cpfls_cli.store import read, stage_of
 from cpfls_cli.version import __version__
 
@@ -29,7 +24,8 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     """Write a report about artifacts."""
     if len(artifacts) == 1 and (name := stage_of(artifacts[0])) and not (own := loaded(name)).study:
         return _of_result(job, own, artifacts[0], form or form_of(job.output))
-    inputs = begin(job, {str(path): path for path in artifacts})
+    inputs = take_inputs(job, {str(path): path for path in artifacts})
+    check_outputs(job, job.output)
     files = {path: inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
     kept = [path for path, sha256 in files.items() if distinct[sha256] == path]
@@ -46,7 +42,8 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
 
 def _of_result(job: Job, own: Stage, path: Path, form: Form) -> Outcome:
     """Write the page that a result has by itself."""
-    begin(job, {str(path): path})
+    take_inputs(job, {str(path): path})
+    check_outputs(job, job.output)
     text = own.report(path, form)
     if job.dry_run:
         return nothing_written(job)
@@ -58,21 +55,10 @@ def _of_result(job: Job, own: Stage, path: Path, form: Form) -> Outcome:
 def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
     """Read artifacts of any format for a report, each under a name of its own."""
     labels = map(_printable, unique_labels(paths))
-    given = zip(paths, labels, hashes, strict=True)
-    return [_source(path, label, sha256) for path, label, sha256 in given]
-
-
-def _source(path: Path, label: str, sha256: str) -> Source:
-    if not (name := stage_of(path)):
-        return source_of_record(read_any(path), path, label, sha256)
-    return source_of_result(*read(path, loaded(name).kind), path, label, sha256)
-
-
-def source_of_record(record: Record, path: object, label: str, sha256: str) -> Source:
-    """Name an artifact for a report."""
-    study = stored_study(record.origin.config, path)
-    parameters = model_structure(study.identification).parameters
-    return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
+    return [
+        source_of_result(*read(path, kind_of(path)), path, label, sha256)
+        for path, label, sha256 in zip(paths, labels, hashes, strict=True)
+    ]
 
 
 def _printable(name: str) -> str:

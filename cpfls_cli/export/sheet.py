@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.check import Origin
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.polynomial import STATE_TERMS
@@ -113,7 +112,7 @@ class Sheet:
     name: str
     model: VehicleModel
     worth: tuple[str, ...]
-    origin: Header | Origin
+    origin: Origin
     file: str
     sha256: str
     verdict: str | None = None

@@ -37,7 +37,6 @@ from cpfls_cli.response.flown import Responses
 from cpfls_cli.result import described_fields
 from cpfls_cli.simulation.twin import Twin
 from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
-from cpfls_cli.store import format_of
 from cpfls_cli.units import known_unit
 from cpfls_cli.validation.prediction import AlongFlight
 
@@ -59,9 +58,9 @@ def view_of(path: Path, given: Any, config: str) -> View:
     for kind, made in _KINDS.items():
         if isinstance(given, kind):
             return made(path.name, given, study)
-    *others, last = map(format_of, _KINDS)
+    *others, last = (kind.FORMAT for kind in _KINDS)
     raise InputError(
-        f"{path}: is a {format_of(given)}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
+        f"{path}: is a {given.FORMAT}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
         f"and {last}"
     )
 
@@ -361,7 +360,7 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
     return names
 
 
-_KINDS: dict[type, Callable[[str, Any, Study], View]] = {
+_KINDS: dict[Any, Callable[[str, Any, Study], View]] = {
     Flight: _of_flight,
     AlongFlight: _of_prediction,
     Playback: _of_replay,

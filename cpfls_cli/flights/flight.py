@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.check import Origin
+from cpfls_cli.artifacts.gate import Origin, read_origin
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport
 from cpfls_cli.flightlog.settings import SETPOINTS
@@ -251,7 +250,7 @@ class Simulated(Flight):
 
 def read_whole(path: Path) -> tuple[Imported | Simulated, Origin]:
     """Read a flight with all that is known of it, and where it comes from."""
-    return read(path, Imported) if "log" in read_header(path).inputs else read(path, Simulated)
+    return read(path, Imported) if "log" in read_origin(path).inputs else read(path, Simulated)
 
 
 def require_signals(path: Path, held: Container[str], *needed: str) -> None:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import ENOUGH
@@ -200,7 +200,7 @@ def flight_stretches(path: Path, study: Study) -> FlightStretches:
         flight = read_flight(path, study)
         rows, samples = partial(_rows_of, flight.signals), len(flight.signals["time"])
     else:
-        units = units_of(path, read_header(path), study)
+        units = units_of(path, read_origin(path), study)
         flight = ReadFlight(path.name, {}, units, (), begins=read_first(path, Flight)[0].begins)
         names = held_rows(path, Flight)
         check_rows(path, Flight, names)
@@ -238,7 +238,7 @@ def torque_source_of(path: Path, study: Study) -> str:
     """Say what gives the torque of a log, or of a flight that was imported; empty for one that was simulated."""
     if is_log(path):
         return study.import_.torque_source or ""
-    made = read_header(path)
+    made = read_origin(path)
     config = parse_config(made.config, f"{path}: /config")
     return str(config["import"]["torque_source"] or "") if "log" in made.inputs else ""
 
@@ -248,7 +248,7 @@ def _enough_of(path: Path, study: Study) -> ReadFlight:
     if samples is None or samples <= IN_MEMORY:
         return read_flight(path, study)
     names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
-    units = units_of(path, read_header(path), study)
+    units = units_of(path, read_origin(path), study)
     return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
 
 

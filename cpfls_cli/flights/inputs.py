@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
 
+from cpfls_cli.artifacts.gate import format_name, read_origin
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import format_name, read_header
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.flight import Flight
@@ -33,7 +33,7 @@ def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
 
 def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
     """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
-    log = None if is_log(path) else read_header(path).inputs.get("log")
+    log = None if is_log(path) else read_origin(path).inputs.get("log")
     return (file.sha256,) if log is None else (file.sha256, log.sha256)
 
 
@@ -61,7 +61,7 @@ def log_formats(paths: Sequence[Path]) -> set[str]:
     """Gather the endings, in small letters, of the logs among some files, and of those that flights were made from."""
     known = {path.suffix.lstrip(".").lower() for path in paths if is_log(path)}
     flights = (path for path in paths if format_name(path) == Flight.FORMAT)
-    made = (read_header(path).inputs.get("log") for path in flights)
+    made = (read_origin(path).inputs.get("log") for path in flights)
     return known | {"" if log is None else log.format.lower() for log in made}
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.identified import IdentifiedModel, require_whole
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.model import AnyModel, ModelRecord
-from cpfls_cli.artifacts.store import format_name, read_record
+from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
@@ -33,7 +33,7 @@ def identified_in(path: Path) -> IdentifiedModel:
 
 
 _READ: Mapping[str, Callable[[Path], AnyModel]] = {
-    ModelRecord.FORMAT.name: lambda path: read_record(path, ModelRecord),
+    Extended.FORMAT: lambda path: store.read(path, Extended)[0],
     Vehicle.FORMAT: lambda path: store.read(path, Vehicle)[0],
     IdentifiedModel.FORMAT: identified_in,
 }
@@ -61,7 +61,7 @@ def any_model(path: Path) -> AnyModel:
     held = format_name(path)
     if held is None or held in _READ:
         # Of what is no artifact the usual words say why.
-        return _READ.get(held or "", _READ[ModelRecord.FORMAT.name])(path)
+        return _READ.get(held or "", _READ[Extended.FORMAT])(path)
     raise InputError(f"{path}: is a {held}; this command needs a model (made by {MAKERS})")
 
 
@@ -113,7 +113,7 @@ def read_observer(path: Path, past_s: float) -> Observer:
 def read_fading(path: Path) -> float | None:
     """Read how fast body rates fade in the flights that a model was found in, s; None where its file does not know."""
     record = None if is_vehicle(path) else any_model(path)
-    if isinstance(record, ExtendedRecord):
+    if isinstance(record, Extended):
         return None if record.playback is None else record.playback.fading_s
     return record.fading_s if isinstance(record, Vehicle) else None
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, stretches
-from cpfls_cli.artifacts.check import Origin
-from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.gate import Origin
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
@@ -173,7 +173,7 @@ def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
             )
 
 
-def units_of(path: Path, made: Header | Origin, study: Study) -> Mapping[str, str]:
+def units_of(path: Path, made: Origin, study: Study) -> Mapping[str, str]:
     """Give the units that the import of a flight read, empty for one that was simulated."""
     made_by = stored_study(made.config, path)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)

@@ -7,9 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
-from cpfls_cli.artifacts.check import Origin
-from cpfls_cli.artifacts.spec import Header, Record
-from cpfls_cli.artifacts.store import read_header, read_record
+from cpfls_cli.artifacts.gate import Origin, read_origin
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import KEYS
@@ -17,7 +15,6 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.store import read
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-R = TypeVar("R", bound=Record)
 T = TypeVar("T")
 
 
@@ -32,13 +29,6 @@ def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSett
         )
 
 
-def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
-    """Read an artifact that must have been made with the vehicle of the config."""
-    record = read_record(path, wanted)
-    require_vehicle_of(path, study)
-    return record
-
-
 def read_result_of_vehicle(path: Path, wanted: type[T], study: Study) -> tuple[T, Origin]:
     """Read a result that must have been made with the vehicle of the config, and where it comes from."""
     given, origin = read(path, wanted)
@@ -48,7 +38,7 @@ def read_result_of_vehicle(path: Path, wanted: type[T], study: Study) -> tuple[T
 
 def require_vehicle_of(path: Path, study: Study) -> None:
     """Refuse a file that was not made with the vehicle of the config."""
-    made_with = _with_what_was_open(_vehicle_of(path, read_header(path)), study.vehicle)
+    made_with = _with_what_was_open(_vehicle_of(path, read_origin(path)), study.vehicle)
     require_same_vehicle(path, made_with, study.vehicle)
 
 
@@ -86,12 +76,12 @@ def model_of_another(path: Path, study: Study) -> tuple[str, ...]:
 
 def _difference_of(path: Path, study: Study) -> str:
     try:
-        return _different(_vehicle_of(path, read_header(path)), study.vehicle)
+        return _different(_vehicle_of(path, read_origin(path)), study.vehicle)
     except ConfigError:
         return ""
 
 
-def _vehicle_of(path: Path, header: Header | Origin) -> VehicleSettings:
+def _vehicle_of(path: Path, header: Origin) -> VehicleSettings:
     return stored_study(header.config, path).vehicle
 
 

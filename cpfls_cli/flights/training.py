@@ -10,9 +10,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
+from cpfls_cli.files import read_content
 from cpfls_cli.flights.flight_source import flight_source, part_of
 from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
 from cpfls_cli.reduction.selection import Selection
@@ -122,7 +122,7 @@ def read_training(
 
 def _hashed(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> dict[Path, str]:
     roles = flight_roles(flights)
-    return {path: inputs[role].sha256 if inputs else file_sha256(path) for role, path in roles.items()}
+    return {path: inputs[role].sha256 if inputs else read_content(path).sha256 for role, path in roles.items()}
 
 
 def _refuse_twice(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> None:

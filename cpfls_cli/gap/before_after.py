@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
 from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
-from cpfls_cli.result import about, result
+from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
@@ -81,11 +81,23 @@ def played_pairs(
 
 
 class LeftOut(NamedTuple):
-    """What one effect of a model does along flights; its fields are described at `LeftOutGroup`."""
+    """What one effect of a model does along flights."""
 
-    name: str
-    wrench: Array
-    ends: Array
+    name: Annotated[str, About("identifier, see `cpfls effects`")]
+    wrench: Annotated[
+        Array,
+        About("root mean square of torque (x y z, N m) and force (x y z, N)", ("6",), "SI", BODY),
+    ]
+    ends: Annotated[
+        Array,
+        About(
+            "how far off a free run of gap.horizon_s ends without it: position (m), velocity (m/s), attitude (rad), "
+            "body rate (rad/s); NaN for what a flight does not show",
+            ("4",),
+            "SI",
+            gaps=True,
+        ),
+    ]
 
 
 def left_out(

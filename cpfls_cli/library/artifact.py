@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from cpfls_cli.artifacts.spec import DatasetSpec, Header
+    from cpfls_cli.artifacts.spec import DatasetSpec
     from cpfls_cli.report.source import Source
     from cpfls_cli.store import Origin
 
@@ -46,19 +46,11 @@ def read(path: str | os.PathLike[str]) -> Artifact:
 def _read(file: Path) -> Artifact:
     """Read an artifact that is in memory alone."""
     from cpfls_cli import store
-    from cpfls_cli.artifacts.store import read_any
 
-    if not (name := store.stage_of(file)):
-        return _of_record(read_any(file))
-    result, origin = store.read(file, import_module("cpfls_cli.stage").loaded(name).kind)
+    result, origin = store.read(file, import_module("cpfls_cli.stage").kind_of(file))
     held = store.flat(file)
     specs = {path: spec for path, (spec, _) in held.items()}
     return Artifact(result, origin, {path: values for path, (_, values) in held.items()}, specs)
-
-
-def _of_record(record: Any) -> Artifact:
-    specs = {spec.path: spec for spec in record.spec().datasets}
-    return Artifact(record, record.origin, record.data, specs)
 
 
 class Artifact(Mapping[str, Any]):
@@ -68,9 +60,7 @@ class Artifact(Mapping[str, Any]):
     does.
     """
 
-    def __init__(
-        self, record: Any, origin: Header | Origin, data: Mapping[str, Any], specs: Mapping[str, DatasetSpec]
-    ) -> None:
+    def __init__(self, record: Any, origin: Origin, data: Mapping[str, Any], specs: Mapping[str, DatasetSpec]) -> None:
         self._record, self._origin, self._data, self._specs = record, origin, data, specs
         self._path: Path | None = None
 
@@ -88,13 +78,9 @@ class Artifact(Mapping[str, Any]):
         return f"<{self.format}: {len(self)} datasets{f' of {self._path}' if self._path else ''}>"
 
     def __str__(self) -> str:
-        from cpfls_cli.artifacts.store import Outline, artifact_of
-        from cpfls_cli.commands.show import description
         from cpfls_cli.report.content import Table
         from cpfls_cli.report.terminal import terminal_lines
 
-        if not self._of_result:
-            return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record))), whole=True))
         rows = [
             (name, "x".join(map(str, own.shape)) or "scalar", self.about(name).units, self.about(name).description)
             for name, own in self._data.items()
@@ -118,20 +104,14 @@ class Artifact(Mapping[str, Any]):
     @property
     def format(self) -> str:
         """Its format, such as ``cpfls/flight``."""
-        from cpfls_cli.store import format_of
-
-        return format_of(self._record)
+        return str(self._record.FORMAT)
 
     @property
     def summary(self) -> dict[str, Any]:
         """What its command prints with ``--json``, as far as the artifact holds it."""
-        from cpfls_cli.report.outcome import as_json
         from cpfls_cli.result import plain
 
-        if self._of_result:
-            return dict(plain(self._record))
-        summary: dict[str, Any] = as_json(getattr(self._record, "summary", {}))
-        return summary
+        return dict(plain(self._record))
 
     @property
     def config(self) -> dict[str, Any]:
@@ -227,29 +207,16 @@ class Artifact(Mapping[str, Any]):
         """
         from cpfls_cli import store
         from cpfls_cli.artifacts.output import check_output
-        from cpfls_cli.artifacts.store import write_record
 
         file = Path(path)
         check_output(file, force)
-        if self._of_result:
-            store.write(file, self._record, self._origin)  # type: ignore[arg-type]  # of a result it is one
-        else:
-            write_record(file, self._record)
+        store.write(file, self._record, self._origin)
         self._path = file
 
-    @property
-    def _of_result(self) -> bool:
-        """Whether it is a result, whose stage knows its page."""
-        return bool(getattr(self._origin, "stage", ""))
-
     def _source(self, number: str) -> Source:
-        from cpfls_cli.commands.report import source_of_record
         from cpfls_cli.report.source import source_of_result
 
-        where, label = self._path or self.format, self._label(number)
-        if self._of_result:
-            return source_of_result(self._record, self._origin, where, label, number)  # type: ignore[arg-type]
-        return source_of_record(self._record, where, label, number)
+        return source_of_result(self._record, self._origin, self._path or self.format, self._label(number), number)
 
     def _label(self, number: str) -> str:
         return self._path.name if self._path else f"{self.format} {number}"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.playback.gusts import GustAxis
-from cpfls_cli.report.content import Table, Text
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import joined
 
@@ -57,22 +54,3 @@ def _unit(axis: GustAxis) -> str:
 
 def _where(axis: GustAxis) -> str:
     return f"about {axis.name}" if axis.turns else f"along {axis.name}"
-
-
-def gust_table(name: str, axes: Sequence[GustAxis], found: DisturbanceGroup) -> Table:
-    """Tabulate gusts by axis, in units of torque and force."""
-    rows = [
-        [
-            _where(axis),
-            "N m" if axis.turns else "N",
-            *(number(float(column[place]), 3) for column in (found.size, found.low, found.high)),
-            *(number(value, 3) for value in (axis.memory, axis.memory_low, axis.memory_high)),
-        ]
-        for place, axis in enumerate(axes)
-    ]
-    caption = (
-        "Gusts by body axis as Gauss-Markov processes, with 95 % intervals: standard deviation, and the time in which "
-        "a gust falls to 37 %."
-    )
-    header = ("Gusts", "Unit", "Size", "From", "To", "Lasting, s", "From", "To")
-    return Table(name, caption, header, rows, frozenset({0, 1}))

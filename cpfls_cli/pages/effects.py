@@ -10,7 +10,6 @@ import numpy as np
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import Drawn
-from cpfls_cli.report.content import Table
 from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
 from cpfls_cli.words import capitalised
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
     # What effects are called is told of models that are read without a gap.
     from cpfls_cli.arrays import Array
-    from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
 _RELATIVE = "_error"
@@ -113,41 +111,6 @@ def _error_words(effect: str, number: Estimate) -> list[str]:
     numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
     signed = (text if text.startswith("-") or text == UNKNOWN or not float(text) else f"+{text}" for text in numbers)
     return [name, *map(printed, signed)]
-
-
-def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
-    """Show the coefficients of the effects with their intervals and ranges."""
-    numbers = effects.coefficient
-    low, high = numbers.plausible_low, numbers.plausible_high
-    rows = [
-        [
-            effect if effect not in numbers.effect[:index] else "",
-            meaning(effect, numbers.name[index]),
-            *measured(*(float(values[index]) for values in (numbers.value, numbers.low, numbers.high))),
-            unit_words(numbers.unit[index]),
-            _range(float(low[index]), float(high[index])),
-        ]
-        for index, effect in enumerate(numbers.effect)
-    ]
-    caption = "Coefficients with their 95 % intervals, and the range that is physically possible on this vehicle."
-    header = ("Effect", "Coefficient", "Value", "95 % interval", "Unit", "Possible")
-    return Table(name, caption, header, rows, frozenset({0, 1, 4}), frozenset({1}))
-
-
-def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
-    """Show the vehicle's own numbers, refitted with the effects."""
-    numbers = effects.parameter
-    columns = (numbers.value.tolist(), numbers.low.tolist(), numbers.high.tolist())
-    rows = []
-    for parameter, unit, *values in zip(numbers.name, numbers.unit, *columns, strict=True):
-        is_relative = unit == "1"
-        value, low, high = (100.0 * each if is_relative else each for each in values)
-        rows.append([vehicle_number(parameter), *measured(value, low, high), "%" if is_relative else unit_words(unit)])
-    caption = (
-        "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
-        "Only ratios to the torque of the rotors can be determined."
-    )
-    return Table(name, caption, ("Number", "Change", "95 % interval", "Unit"), rows, frozenset({0, 3}))
 
 
 def measured(value: float, low: float, high: float) -> list[str]:

@@ -10,14 +10,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, logarithmic, style_of
-from cpfls_cli.report.content import Cell, Table
-from cpfls_cli.report.numbers import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cpfls_cli.artifacts.gap_effects import GapChangeGroup
     from cpfls_cli.gap.naming.results import GapChange
 
 AXES = ("x (roll)", "y (pitch)", "z (yaw)")
@@ -62,19 +59,6 @@ def channel_unit(channel: str) -> str:
     return "N\N{NO-BREAK SPACE}m" if channel.startswith("torque") else "N"
 
 
-def gap_table(name: str, gap: GapChangeGroup, caption: str) -> Table:
-    """Show the gap of each channel before and after, in its unit and in noise floors."""
-    rows: list[list[str | Cell]] = []
-    for index in gap.known:
-        channel = gap.channel[index]
-        sizes = [number(float(values[index]), 3) for values in (gap.before, gap.after, gap.floor)]
-        before, after = (number(float(values[index]), 2) for values in (gap.before_floors, gap.after_floors))
-        shrunk = Cell(after, "warning" if gap.grown[index] else "plain")
-        rows.append([channel_name(channel), channel_unit(channel), *sizes, before, shrunk])
-    header = ("Channel", "Unit", "Gap before", "Gap after", "Noise floor", "Floors before", "Floors after")
-    return Table(name, caption, header, rows, frozenset({0, 1}))
-
-
 def marked(points: int) -> dict[str, Any]:
     """Put circles on the curve after, of so many points, so that it is told from the others without colour."""
     every = max(1, points // _MARKS)
@@ -99,12 +83,12 @@ def _view(shown: Sequence[Array]) -> tuple[float, float]:
     return low - room, high + room
 
 
-def hidden_gaps(gap: GapChange | GapChangeGroup) -> bool:
+def hidden_gaps(gap: GapChange) -> bool:
     """Tell whether gaps are smaller than the figure of them shows."""
     return bool((np.fmin(gap.before_floors[gap.known], gap.after_floors[gap.known]) < _LEAST).any())
 
 
-def sizes_drawn(gap: Callable[[Any], GapChange | GapChangeGroup]) -> Drawn:
+def sizes_drawn(gap: Callable[[Any], GapChange]) -> Drawn:
     """Make the figure of the gap of each channel on a logarithmic scale, with the noise floor."""
     return Drawn(
         "Gap of each channel before and after, in noise floors",
@@ -114,7 +98,7 @@ def sizes_drawn(gap: Callable[[Any], GapChange | GapChangeGroup]) -> Drawn:
     )
 
 
-def _draw_sizes(gap: GapChange | GapChangeGroup, figure: Figure) -> None:
+def _draw_sizes(gap: GapChange, figure: Figure) -> None:
     channels = [channel_words(tuple(CHANNELS)[index]) for index in gap.known]
     before, after = gap.before_floors[gap.known], gap.after_floors[gap.known]
     axes = figure.subplots()

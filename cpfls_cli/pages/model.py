@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
@@ -19,23 +19,6 @@ from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
 from cpfls_cli.report.content import Block, Box, Heading, Text, impossible
 from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.words import joined
-
-
-class _Kind(NamedTuple):
-    """Words on a model that was not found as a whole vehicle: what it is, what its trust rests on.
-
-    Attributes
-    ----------
-    title, grounds : callable
-        Of a record: what the model is, and the sentences behind the word of trust.
-    worth, cautions : callable
-        Of a record: what it is worth that is used elsewhere, and what speaks against that.
-    """
-
-    title: Callable[[Any], str]
-    grounds: Callable[[Any], Iterator[str]]
-    worth: Callable[[Any], Iterator[str]]
-    cautions: Callable[[Any], Iterator[str]]
 
 
 def _effect_name(name: str) -> str:
@@ -57,24 +40,16 @@ WORDS: Mapping[str, Any] = {
 """What templates of models know (`model_parts.md.j2`)."""
 
 
-def _kind_of(record: Any) -> _Kind:
-    own = import_module(f"cpfls_cli.pages.{'identification' if isinstance(record, IdentifiedModel) else 'extended'}")
-    return _Kind(own.title, own.grounds, own.worth, own.cautions)
-
-
-def answer(model: Source[Any]) -> Iterator[Block]:
-    """Say of a model that is no result yet how far to trust it and why, and what was found."""
-    yield trust_box(model)
-    yield from import_module("cpfls_cli.pages.extended").details(model)
-
-
-def trust_box(model: Source[Any]) -> Box:
-    """Say how far to trust a model, and why."""
+def trust_box(model: Source[IdentifiedModel]) -> Box:
+    """Say how far to trust an identified model, and why."""
     record = model.record
-    kind, words = _kind_of(record), model_words(record)
-    stopped = stopped_words(record)
-    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{kind.title(record)}"
-    return Box(words.short.upper(), title, list(kind.grounds(record)), words.tone)
+    own, words, stopped = _of_identified(), model_words(record), stopped_words(record)
+    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{own.title(record)}"
+    return Box(words.short.upper(), title, list(own.grounds(record)), words.tone)
+
+
+def _of_identified() -> Any:
+    return import_module("cpfls_cli.pages.identification")
 
 
 def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -93,21 +68,22 @@ def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) 
     return (*said, *(f"{path}: {each}" for each in against(record)))
 
 
-def vehicle_words(vehicle: object, part: str) -> list[str]:
-    """Say one part of what is said of a vehicle that was found, sentence by sentence (`said_of_vehicle.md.j2`)."""
-    own = import_module("cpfls_cli.stages.vehicle").WORDS
-    blocks = page.blocks(page.words("said_of_vehicle", vehicle, added=own, part=part))
+def said_by(stage: str, given: Any, part: str) -> list[str]:
+    """Say one part of what a stage says of its models, sentence by sentence (`said_of_vehicle.md.j2`, for example)."""
+    own = import_module(f"cpfls_cli.stages.{stage}").WORDS
+    blocks = page.blocks(page.words(f"said_of_{stage}", given, added=own, part=part))
     return [block.text for block in blocks if isinstance(block, Text)]
 
 
 def slow_words(vehicle: Vehicle) -> str:
     """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster, and how."""
-    return " ".join(vehicle_words(vehicle, "slow"))
+    return " ".join(said_by("vehicle", vehicle, "slow"))
 
 
 def against(record: AnyModel) -> list[str]:
     """Say what speaks against a model itself."""
-    return vehicle_words(record, "against") if isinstance(record, Vehicle) else list(_kind_of(record).cautions(record))
+    found = isinstance(record, IdentifiedModel)
+    return list(_of_identified().cautions(record)) if found else said_by(record.MADE_BY, record, "against")
 
 
 def impossible_in_words(record: AnyModel) -> str:
@@ -122,15 +98,14 @@ def impossible_in_words(record: AnyModel) -> str:
 
 def worth_in_words(record: AnyModel) -> list[str]:
     """Say what a model that is used elsewhere is worth."""
-    return vehicle_words(record, "usage") if isinstance(record, Vehicle) else list(_kind_of(record).worth(record))
+    return (
+        list(_of_identified().worth(record))
+        if isinstance(record, IdentifiedModel)
+        else said_by(record.MADE_BY, record, "usage")
+    )
 
 
 def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[Block]:
     """Say what a model is, part by part."""
-    yield from [Heading(model.label)] if len(recorded_models(sources)) > 1 else []
+    yield from [Heading(model.label)] if len(sources.models) > 1 else []
     yield from page.blocks(page.words("model_part", model.record, added=WORDS), prefix=f"model-{index}-")
-
-
-def recorded_models(sources: Sources) -> list[Source[Any]]:
-    """List the models that are no results yet: those say themselves what they are."""
-    return [source for source in sources.of_kind(AnyModel) if not isinstance(source.record, Vehicle)]

@@ -9,10 +9,9 @@ from typing import Any
 
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
-from cpfls_cli.pages.extended import extension_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks, recorded_models
+from cpfls_cli.pages.model import model_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
@@ -67,9 +66,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    _of_each("model", "What the model is", recorded_models, model_blocks, among=True),
+    _of_each("model", "What the model is", _MODELS, model_blocks, among=True),
     _of_stage("diagnose"),
-    _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
+    _of_stage("extend"),
     compared_vehicles_section,
     _of_stage("vehicle"),
     _of_stage("compare"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
@@ -80,7 +80,7 @@ _GAP_LACKS: tuple[_Lack, ...] = (
         "cpfls compare CONFIG FLIGHT... -o disagreement.h5",
     ),
     (Diagnosis, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
-    (ExtendedRecord, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
+    (Extended, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
 )
 _SHOWN = {"extended": "extended model"}
 
@@ -112,9 +112,7 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
 
 
 def _word(wanted: Any) -> str:
-    kind = getattr(wanted.FORMAT, "kind", "")
-    name = str(getattr(wanted.FORMAT, "name", wanted.FORMAT)).removeprefix("cpfls/")
-    return "model" if wanted is IdentifiedModel else str(kind or name)
+    return "model" if wanted is IdentifiedModel else str(wanted.FORMAT).removeprefix("cpfls/")
 
 
 def vehicle_section(sources: Sources) -> Section:

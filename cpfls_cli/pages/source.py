@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from typing_extensions import TypeVar
 
-from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import ReportSettings, resolved
-from cpfls_cli.errors import ConfigError
-from cpfls_cli.report.content import Block, Text
+from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.report.source import Source as Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -25,7 +19,7 @@ if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
     from cpfls_cli.artifacts.diagnosis import Diagnosis
     from cpfls_cli.artifacts.disagreement import Disagreement
-    from cpfls_cli.artifacts.extended import ExtendedRecord
+    from cpfls_cli.artifacts.extended import Extended
     from cpfls_cli.artifacts.identified import IdentifiedModel
     from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.changes.results import Changed, Trend
@@ -45,11 +39,11 @@ R = TypeVar("R", default=Any)
 class _OfFormat(Generic[R]):
     """The artifacts of one format, as an attribute."""
 
-    def __init__(self, name: str, kind: str = "") -> None:
-        self.format = (name, kind)
+    def __init__(self, name: str) -> None:
+        self.format = name
 
     def __get__(self, sources: Sources, _: type[Sources]) -> list[Source[R]]:
-        return [source for source in sources.all if (source.format, source.kind) == self.format]
+        return [source for source in sources.all if source.format == self.format]
 
 
 @dataclass(frozen=True)
@@ -75,7 +69,7 @@ class Sources:
     vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
     trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
-    extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
+    extensions: ClassVar[_OfFormat[Extended]] = _OfFormat("cpfls/extended")
 
     @property
     def gap(self) -> list[Source[Any]]:
@@ -123,26 +117,3 @@ def unique_labels(paths: Sequence[Path]) -> list[str]:
         depth = next(n for n in count(1) if len({other[-n:] for other in alike}) == len(alike))
         labels.append("/".join(parts[-depth:]))
     return labels
-
-
-def source_of(job: Job, record: R) -> Source[R]:
-    """Name the artifact that a job has just written, so that its page can speak of it."""
-    return Source(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)
-
-
-def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:
-    """Give the answer of the command that made an artifact, or say why it cannot be worded.
-
-    Parameters
-    ----------
-    page : str
-        Module of `pages` that words it.
-    """
-    try:
-        study = stored_study(record.origin.config, path)
-    except ConfigError as error:
-        yield Text(f"what its command answered cannot be shown: {error}", "warning")
-        return
-    source: Source[Any] = Source(path.name, "", record, resolved(study), study.vehicle, 0)
-    answer = import_module(f"cpfls_cli.pages.{page}").answer
-    yield from answer(source)

@@ -8,7 +8,7 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged, Winner
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
-from cpfls_cli.pages.model import cautions_of, trust_box
+from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words
@@ -22,13 +22,10 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = list(_cautions(sources))
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
-    blocks += [
-        trust_box(extended)
-        for extended in sources.extensions
-        if sources.by_hash(extended.made_from("diagnosis")) is None
-    ]
-    # A comparison that was diagnosed has its answer there; the verdict on an identified model is a line here.
+    # A comparison that was diagnosed has its answer there, an extended model too; the verdict on an identified model is
+    # a line here.
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
+    answered |= {each.sha256 for each in sources.extensions if sources.by_hash(each.made_from("diagnosis")) is not None}
     told = [each for each in sources.all if each.stage not in ("", "identify") and each.sha256 not in answered]
     blocks += [box for source in told for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 from cpfls_cli import store
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.files import text_sha256
 
 if TYPE_CHECKING:
@@ -271,31 +270,26 @@ class Origin:
 
     Attributes
     ----------
-    record : Record or result
-    found : store.Origin or None
-        Where a result comes from; a record knows it by itself.
+    record : object
+        The result.
+    header : store.Origin
+        Where it comes from.
     """
 
     label: str
     sha256: str
     record: Any
-    found: store.Origin | None = field(default=None, kw_only=True)
+    header: store.Origin = field(kw_only=True)
 
     @property
     def format(self) -> str:
         """Name of its format."""
-        return store.format_of(self.record)
-
-    @property
-    def header(self) -> Header | store.Origin:
-        """Where it comes from."""
-        header: Header | store.Origin = self.found or self.record.origin
-        return header
+        return str(self.record.FORMAT)
 
     @property
     def stage(self) -> str:
-        """Module of the stage that made a result; empty for a record."""
-        return self.found.stage if self.found else ""
+        """Stage that made it."""
+        return self.header.stage
 
     @property
     def short_hash(self) -> str:

@@ -35,11 +35,6 @@ class Source(Origin, Generic[R]):
     vehicle: VehicleSettings
     parameters: int
 
-    @property
-    def kind(self) -> str:
-        """Kind of a format that has several."""
-        return str(getattr(getattr(self.record, "FORMAT", ""), "kind", ""))
-
     def made_from(self, role: str) -> str | None:
         """Hash of an input by its role; None where it had none."""
         file = self.header.inputs.get(role)
@@ -57,4 +52,4 @@ def source_of_result(
     """Name a result; its study is the one that it holds where none is given, of a stage without one the usual."""
     study = study or (stored_study(origin.config, path) if origin.config else validate({}, "default"))
     parameters = model_structure(study.identification).parameters
-    return Source(label, sha256, given, resolved(study), study.vehicle, parameters, found=origin)
+    return Source(label, sha256, given, resolved(study), study.vehicle, parameters, header=origin)

@@ -4,38 +4,130 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
-from cpfls_cli.arrays import IntArray
-from cpfls_cli.artifacts.checkpoint import ArchiveGroup, CheckpointRecord, UnfinishedGroup
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.spec import Header, Record
-from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
 from cpfls_cli.config.load import flat_keys, parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.engine import EvolutionState, History
 from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import Unfinished
-from cpfls_cli.store import Origin, read
+from cpfls_cli.result import about, part, result
+from cpfls_cli.store import Origin, format_name, read, write
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle
     from cpfls_cli.identification.replicates import Sweep
 
-R = TypeVar("R", bound=Record)
 T = TypeVar("T")
+Genes = np.ndarray[Any, np.dtype[np.uint16]]
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
 _LONGEST = 120
 _START_AGAIN = "--force without --resume starts again"
+
+
+_OBJECTIVES = "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number"
+
+
+@result
+class Evaluated:
+    """Chromosomes that were evaluated."""
+
+    submitted: Genes = about("chromosomes as bred, 16-bit weights, in order of evaluation", "evaluation", "gene")
+    genes: Genes = about("what local search made of them", "evaluation", "gene")
+    objectives: Array = about(_OBJECTIVES, "evaluation", "3", unit="SI", gaps=True)
+
+    @classmethod
+    def of(cls, submitted: IntArray, evaluation: Evaluation) -> Evaluated:
+        """Take what an evaluation gave."""
+        genes = evaluation.genes.astype(np.uint16)
+        return cls(submitted=submitted.astype(np.uint16), genes=genes, objectives=evaluation.objectives)
+
+    @property
+    def pair(self) -> tuple[IntArray, Evaluation]:
+        """The chromosomes, and what they were evaluated to."""
+        submitted, genes = (each.astype(np.int64) for each in (self.submitted, self.genes))
+        return submitted, Evaluation(genes, self.objectives)
+
+
+@result
+class Population:
+    """The current population."""
+
+    genes: Genes = about("chromosomes, 16-bit weights", "individual", "gene")
+    objectives: Array = about(_OBJECTIVES, "individual", "3", unit="SI", gaps=True)
+    subpopulation: IntArray = about("label of the subpopulation", "individual")
+
+
+@result
+class SearchState:
+    """An unfinished search: everything that its next generation depends on."""
+
+    FORMAT: ClassVar = "cpfls/checkpoint"
+    MADE_BY: ClassVar = "identify or sweep"
+
+    generation: int = about("generations bred; 0: initial population, -1: not even that")
+    generator: str = about("state of the random generator, one for all subpopulations, as JSON; null at -1")
+    population: Population = part(brief=False)
+    archive: Evaluated = part(brief=False)
+    history: History = part(brief=False)
+    unfinished: Evaluated = part(brief=False)
+    """What was evaluated of the next generation, where the search was stopped within it."""
+
+    @classmethod
+    def of(cls, state: EvolutionState) -> SearchState:
+        """Take the state of a search after a generation."""
+        genes = state.genes.astype(np.uint16)
+        return cls(
+            generation=state.index,
+            generator=json.dumps(state.rng.bit_generator.state),
+            population=Population(genes=genes, objectives=state.objectives, subpopulation=state.subpopulations),
+            archive=Evaluated.of(state.archive.submitted, state.archive.results),
+            history=state.history,
+            unfinished=_nothing(state.genes, state.objectives),
+        )
+
+    @classmethod
+    def before_all(cls, genes: IntArray, objectives: Array) -> SearchState:
+        """Take a search that has not evaluated its whole initial population, of such chromosomes."""
+        none = _nothing(genes, objectives)
+        return cls(
+            generation=_BEFORE_ALL,
+            generator="null",
+            population=Population(genes=none.genes, objectives=none.objectives, subpopulation=np.arange(0)),
+            archive=none,
+            history=History.empty(objectives.shape[1]),
+            unfinished=none,
+        )
+
+    @property
+    def stopped(self) -> StoppedSearch:
+        """What the search goes on from, equal to what was stored down to the last bit."""
+        unfinished = Unfinished(*self.unfinished.pair)
+        if self.generation == _BEFORE_ALL:
+            return StoppedSearch(None, unfinished)
+        rng, own = np.random.default_rng(), self.population
+        rng.bit_generator.state = json.loads(self.generator)
+        genes, archive = own.genes.astype(np.int64), Archive.of(*self.archive.pair)
+        state = EvolutionState(self.generation, genes, own.objectives, own.subpopulation, archive, self.history, rng)
+        return StoppedSearch(state, unfinished)
+
+
+_BEFORE_ALL = -1
+
+
+def _nothing(genes: IntArray, objectives: Array) -> Evaluated:
+    return Evaluated.of(genes[:0], Evaluation(genes[:0], objectives[:0]))
 
 
 @dataclass(frozen=True)
@@ -58,10 +150,10 @@ class Written(NamedTuple):
     """The output of a command that was stopped, or was not: whether it is complete, and where it comes from."""
 
     complete: bool
-    origin: Header | Origin
+    origin: Origin
 
 
-def _same_origin(one: Header | Origin, other: Header | Origin) -> bool:
+def _same_origin(one: Origin, other: Origin) -> bool:
     """Tell whether two outputs come from the same config and inputs."""
     names = ("version", "seed", "config", "inputs", "cautions")
     return all(getattr(one, name) == getattr(other, name) for name in names)
@@ -73,18 +165,18 @@ class KeptFile:
 
     Attributes
     ----------
-    header : Header
+    header : Origin
         Of the command that is run now: its config, seed and inputs.
     """
 
     path: Path
-    header: Header
+    header: Origin
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
     OUTPUT: ClassVar[type[IdentifiedModel | Sweep | Vehicle]]
 
     @classmethod
-    def beside(cls, output: Path, header: Header) -> Self:
+    def beside(cls, output: Path, header: Origin) -> Self:
         """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
         return cls(output.with_name(f"{output.name}{cls.SUFFIX}"), header)
 
@@ -129,22 +221,15 @@ class KeptFile:
                 error.add_note(f"{self.path}: is intact; the same command with --resume goes on")
             raise
 
-    def _read(self, wanted: type[R]) -> R:
-        """Read a record that is left."""
-        return self._left(lambda: read_record(self.path, wanted))
-
-    def _read_result(self, wanted: type[T]) -> tuple[T, Origin]:
-        """Read a result that is left."""
-        return self._left(lambda: read(self.path, wanted))
-
-    def _left(self, reading: Callable[[], T]) -> T:
+    def _read(self, wanted: type[T]) -> tuple[T, Origin]:
+        """Read what is left."""
         if not self.path.exists():
             written = self._written()
             if written is not None and written.complete:
                 raise InputError(f"{self.output}: is complete; nothing to resume")
             raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
         try:
-            return reading()
+            return read(self.path, wanted)
         except InputError as error:
             raise InputError(f"{error}; {_START_AGAIN}") from None
 
@@ -158,13 +243,8 @@ class KeptFile:
 
     def _written(self) -> Written | None:
         """Read the output; None where there is none, or another file."""
-        wanted = getattr(self.OUTPUT.FORMAT, "name", self.OUTPUT.FORMAT)
-        if not self.output.is_file() or format_name(self.output) != wanted:
+        if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT:
             return None
-        if issubclass(self.OUTPUT, Record):
-            written = read_any(self.output)
-            assert isinstance(written, self.OUTPUT)
-            return Written(written.complete, written.origin)
         given, origin = read(self.output, self.OUTPUT)
         return Written(given.complete, origin)
 
@@ -188,25 +268,24 @@ class Checkpoint(KeptFile):
 
     def write(self, state: EvolutionState) -> None:
         """Replace what was there by this state, or leave it as it was."""
-        write_record(self.path, CheckpointRecord.of_state(state).with_header(self.header))
+        write(self.path, SearchState.of(state), self.header)
 
     def add(self, unfinished: Unfinished) -> None:
         """Add what was evaluated of the next generation, so that it need not be done again."""
-        if self.path.exists():
-            record = read_record(self.path, CheckpointRecord).with_unfinished(unfinished)
-        else:
-            record = CheckpointRecord.of_nothing(unfinished)
-        write_record(self.path, record.with_header(self.header))
+        evaluated = Evaluated.of(unfinished.submitted, unfinished.evaluation)
+        before = SearchState.before_all(unfinished.submitted, unfinished.evaluation.objectives)
+        known = read(self.path, SearchState)[0] if self.path.exists() else before
+        write(self.path, replace(known, unfinished=evaluated), self.header)
 
     def read(self) -> StoppedSearch:
         """Take up what was left."""
-        record = self._read(CheckpointRecord)
+        state, origin = self._read(SearchState)
         with self._damaged():
-            stopped = _stopped_search(record)
-        self._require_same_search(record.origin, 0 if stopped.state is None else stopped.state.index)
+            stopped = state.stopped
+        self._require_same_search(origin, 0 if stopped.state is None else stopped.state.index)
         return stopped
 
-    def _require_same_search(self, then: Header, generation: int) -> None:
+    def _require_same_search(self, then: Origin, generation: int) -> None:
         old, new = (
             {key: value for key, value in keys_of(h).items() if key != _GENERATIONS} for h in (then, self.header)
         )
@@ -217,42 +296,14 @@ class Checkpoint(KeptFile):
         self._require_same(differing)
 
 
-def _stopped_search(record: CheckpointRecord) -> StoppedSearch:
-    """Rebuild what a search left, equal to what was stored down to the last bit."""
-    unfinished = Unfinished(*_evaluated(record.unfinished))
-    if not record.begun:
-        return StoppedSearch(None, unfinished)
-    rng = np.random.default_rng()
-    rng.bit_generator.state = json.loads(record.generator)
-    population = record.population
-    state = EvolutionState(
-        record.generation,
-        _genes(population.genes),
-        population.objectives,
-        population.subpopulation,
-        Archive.of(*_evaluated(record.archive)),
-        History(**vars(record.history)),
-        rng,
-    )
-    return StoppedSearch(state, unfinished)
-
-
-def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evaluation]:
-    return _genes(stored.submitted), Evaluation(_genes(stored.genes), stored.objectives)
-
-
-def _genes(stored: Any) -> IntArray:
-    return np.asarray(stored, dtype=np.int64)
-
-
-def keys_of(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
+def keys_of(header: Origin, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
     """List the keys that a search depends on, with dots."""
     config = parse_config(header.config, "/config")
     return {"seed": header.seed, **dict(flat_keys({section: config[section] for section in sections}))}
 
 
 def differences(
-    then: Header | Origin, now: Header, old: Mapping[str, Any], new: Mapping[str, Any], unimportant: str | None = None
+    then: Origin, now: Origin, old: Mapping[str, Any], new: Mapping[str, Any], unimportant: str | None = None
 ) -> Iterator[str]:
     """List the keys and inputs that differ between a command that was stopped and the one that is to go on from it.
 

@@ -9,12 +9,13 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, header_of, take_inputs
-from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, origin_before, take_inputs
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint, StoppedSearch
+from cpfls_cli.store import Origin
 from cpfls_cli.workers.employ import employ, require_address
 from cpfls_cli.workers.workforce import WorkerError, Workforce
 
@@ -147,13 +148,13 @@ def begin_search(
     """Check inputs, checkpoint and output of a search before anything is computed."""
     options.require_workers()
     files = take_inputs(job, inputs)
-    header = header_of(job.study, files)
+    header = origin_before(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)
     check_outputs(job, job.output, replaceable=options.resume and search.checkpoint.output_may_be_replaced())
     return files, search
 
 
-def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Resumable:
+def resumable(output: Path, header: Origin, *, resume: bool, force: bool) -> Resumable:
     """Find the checkpoint beside the output of a search, and read it where the search is to go on.
 
     `force` allows a checkpoint to be given up.

@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cpfls_cli.artifacts.job import Job, header_of
-from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.job import Job, origin_before
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.overrides import Variant, variants
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -251,7 +251,7 @@ class PartialSweep(KeptFile):
         if not resume:
             self.require_permission(force=force)
             return None
-        stopped, origin = self._read_result(Sweep)
+        stopped, origin = self._read(Sweep)
         self._require_same(differences(origin, self.header, _keys(origin), _keys(self.header)))
         return stopped
 
@@ -267,8 +267,7 @@ class PartialSweep(KeptFile):
 
     def write(self, sweep: Sweep) -> None:
         """Replace what was there by these finished runs, or leave it as it was."""
-        own = self.header
-        write(self.path, sweep, Origin(stage="sweep", inputs=own.inputs, seed=own.seed, config=own.config))
+        write(self.path, sweep, self.header)
 
     def _require_same_plan(self, plan: SweepPlan, stopped: Sweep, begun: Sweep) -> None:
         differing = [f"{path} differs" for path in stopped.differing_settings(begun)]
@@ -277,7 +276,7 @@ class PartialSweep(KeptFile):
         self._require_same(differing)
 
 
-def _keys(header: Header | Origin) -> dict[str, Any]:
+def _keys(header: Origin) -> dict[str, Any]:
     """List the keys that a sweep depends on, with dots; more seeds only add to it."""
     config = parse_config(header.config, "/config")
     return {"seed": config["seed"]} | {
@@ -296,7 +295,7 @@ def finish_runs(
         if (reason := watch.should_stop()) is not None:
             return sweep, reason
         inputs = {**partial.header.inputs, "selection": plan.setting(number).selection}
-        checkpoint = Checkpoint.beside(job.output, header_of(plan.study(number), inputs))
+        checkpoint = Checkpoint.beside(job.output, origin_before(plan.study(number), inputs))
         search = Resumable(checkpoint, _left_within_a_run(checkpoint) if options.resume else None)
         with plan.naming(number):
             found = _identified(job, plan, number, search, options, watch)

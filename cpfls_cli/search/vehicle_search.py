@@ -8,16 +8,61 @@ from typing import ClassVar
 
 import numpy as np
 
-from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
-from cpfls_cli.artifacts.job import Job, check_outputs, header_of
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.job import Job, check_outputs, origin_before
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
+from cpfls_cli.result import about, part, result
 from cpfls_cli.search.checkpoint import KeptFile, differences, keys_of
+from cpfls_cli.store import write
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
 """Sections of the config that the search depends on."""
+
+
+@result
+class KeptStructure:
+    """A structure that was judged: its fits to all parts of the flights first, then without each of them."""
+
+    blocks: tuple[str, ...] = about("its blocks", "block")
+    rules: int = about("rules of its remainder")
+    order: int = about("order of the harmonics of its remainder")
+    loss: Array = about("of each fit", "fit")
+    values: Array = about("numbers of all fits, one fit after another", "value", unit="SI", ragged=True)
+    hessian: Array = about("curvatures of the fit to all parts by rows", "curvature", ragged=True)
+
+    @classmethod
+    def of(cls, judged: Judged) -> KeptStructure:
+        """Take the fits of a structure."""
+        fits, rules = (judged.fit, *judged.without), judged.structure.rules
+        return cls(
+            blocks=judged.structure.blocks,
+            rules=rules[0],
+            order=rules[1],
+            loss=np.array([each.loss for each in fits]),
+            values=np.concatenate([each.values for each in fits]),
+            hessian=judged.fit.hessian.ravel(),
+        )
+
+    @property
+    def pair(self) -> tuple[Structure, Solution]:
+        """The structure and its fits, equal to what was stored down to the last bit."""
+        values = self.values.reshape(len(self.loss), -1)
+        hessian = self.hessian.reshape(2 * values.shape[1:])
+        return Structure(self.blocks, Rules(self.rules, self.order)), Solution(
+            tuple(values), tuple(self.loss.tolist()), hessian
+        )
+
+
+@result
+class KeptStructures:
+    """An unfinished search for the structure of a vehicle: what was fitted so far, in the order of the search."""
+
+    FORMAT: ClassVar = "cpfls/vehicle-checkpoint"
+    MADE_BY: ClassVar = "vehicle"
+
+    structures: tuple[KeptStructure, ...] = part(brief=False)
 
 
 @dataclass(frozen=True)
@@ -30,31 +75,16 @@ class VehicleCheckpoint(KeptFile):
 
     def write(self, judged: Sequence[Judged]) -> None:
         """Replace what was there by these structures, or leave it as it was."""
-        write_record(self.path, VehicleCheckpointRecord.of(judged).with_header(self.header))
+        write(self.path, KeptStructures(structures=tuple(map(KeptStructure.of, judged))), self.header)
 
     def read(self) -> Kept:
         """Take up what was left."""
-        record = self._read(VehicleCheckpointRecord)
+        left, origin = self._read(KeptStructures)
         with self._damaged():
-            kept = kept_of(record)
-        old, new = (keys_of(header, _OF_VEHICLE) for header in (record.origin, self.header))
-        self._require_same(differences(record.origin, self.header, old, new, unimportant="held-out"))
+            kept = dict(each.pair for each in left.structures)
+        old, new = (keys_of(header, _OF_VEHICLE) for header in (origin, self.header))
+        self._require_same(differences(origin, self.header, old, new, unimportant="held-out"))
         return kept
-
-
-def kept_of(record: VehicleCheckpointRecord) -> Kept:
-    """Rebuild what the search left, equal to what was stored down to the last bit."""
-    structure = record.structure
-    numbers = np.cumsum(structure.numbers)[:-1]
-    hessians = np.split(record.hessian, np.cumsum(structure.numbers**2)[:-1])
-    values = np.split(record.values, numbers * record.loss.shape[1])
-    rows = zip(structure.blocks, structure.rules.tolist(), record.loss.tolist(), values, hessians, strict=True)
-    return {
-        Structure(tuple(blocks.split()), Rules(*rules)): Solution(
-            tuple(own.reshape(len(losses), -1)), tuple(losses), hessian.reshape(2 * (len(own) // len(losses),))
-        )
-        for blocks, rules, losses, own, hessian in rows
-    }
 
 
 def begin_vehicle_search(
@@ -64,7 +94,7 @@ def begin_vehicle_search(
 
     The solutions that are kept tell where to go on; None to start.
     """
-    checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
+    checkpoint = VehicleCheckpoint.beside(job.output, origin_before(job.study, files, "vehicle-checkpoint"))
     kept = checkpoint.read() if resume else None
     if kept is None:
         checkpoint.require_permission(force=job.force)

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.check import Origin
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.gate import Origin, read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
-from cpfls_cli.artifacts.spec import Header, InputFile, rows_of
-from cpfls_cli.artifacts.store import read_header
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
@@ -34,7 +33,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
     Numbers that no vehicle has need `anyway`, which does for the others too.
     """
     record = any_model(path)
-    sheet = _bare_sheet(path, record, read_header(path))
+    sheet = _bare_sheet(path, record, read_origin(path))
     if isinstance(sheet.model.fuzzy, InertiaFunctions):
         _require_usable(sheet.model.fuzzy, path)
     if sheet.impossible and not anyway:
@@ -54,7 +53,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
     return replace(sheet, name=name, file=path.name, sha256=file.sha256)
 
 
-def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin | Header) -> Sheet:
+def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet."""
     return Sheet(
         "",
@@ -81,7 +80,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
             raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
 
 
-def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:
+def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
     model = modelled(path, record)
     beside = model.beside_table
@@ -91,18 +90,17 @@ def _bare_sheet(path: Path, record: AnyModel, origin: Origin | Header) -> Sheet:
     if isinstance(record, IdentifiedModel):
         return replace(sheet, warnings=tuple(_warnings(record, origin.config, path)))
     outside = tuple(_missing(record, (*model.filters, *model.along)))
-    floor = tuple(record.gap.floor.tolist()) if isinstance(record, ExtendedRecord) else sheet.floor
+    floor = tuple(record.gap.floor.tolist()) if isinstance(record, Extended) else sheet.floor
     return replace(sheet, outside=outside, wind=model.wind, floor=floor)
 
 
 def _missing(record: AnyModel, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
     """List effects that no table of weights holds, with their sizes along held-out flights where these are known."""
-    left_out = record.left_out if isinstance(record, ExtendedRecord) else None
-    known = {} if left_out is None else {row["name"]: row for row in rows_of(left_out)}
+    known = {each.name: each for each in record.left_out} if isinstance(record, Extended) else {}
     for effect in effects:
-        if isinstance(record, ExtendedRecord) and effect.name in known:
-            size, ends = (np.array(known[effect.name][key]) for key in ("wrench", "ends"))
-            yield sized(_in_numbers(effect), size, record.gap.floor, Off.of(ends), "along its held-out flights")
+        if isinstance(record, Extended) and effect.name in known:
+            own, floor = known[effect.name], record.gap.floor
+            yield sized(_in_numbers(effect), own.wrench, floor, Off.of(own.ends), "along its held-out flights")
         else:
             yield Missing(_in_numbers(effect), np.nan, np.nan, np.nan, None)
 

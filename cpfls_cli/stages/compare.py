@@ -243,9 +243,8 @@ def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFl
 
 def learned_from(run: Run, found: Disagreement, learned: Sequence[LearnedFlight], of: str = "") -> Disagreement:
     """Take the flights that the model learned from as inputs of a comparison."""
-    of_model, parts = as_inputs(MODEL_FLIGHT, learned)
-    run.take_also(of_model, of)
-    return replace(found, learned=parts)
+    run.take_also(as_inputs(MODEL_FLIGHT, learned), of)
+    return replace(found, learned=tuple(learned))
 
 
 def compared(

@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, go_on
-from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs, learned_in
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.config.study import Study, generator
@@ -233,7 +233,7 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
             "misses, so compare without --model, or with an identified model"
         )
     flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
-    learned = learned_in(origin.inputs, compared.learned, MODEL_FLIGHT)
+    learned = compared.learned
     unseen = [inputs[role] for role in numbered_roles("held-out", held_out)]
     refuse_seen(flights.values(), unseen)
     held, study = read_flights(held_out, run.study), run.study
@@ -292,11 +292,10 @@ def learned_from(
     of : str
         Name of the diagnosis among the results of the run.
     """
-    of_model, parts = as_inputs(MODEL_FLIGHT, learned)
-    run.take_also({**flights, **of_model}, of)
+    run.take_also({**flights, **as_inputs(MODEL_FLIGHT, learned)}, of)
     hashes = [(file.name, (file.sha256,)) for file in held_out]
     seen = (*seen_twice(flights.values()), *seen_warnings(f"the model of {model}", learned, hashes))
-    return replace(found, learned=parts, seen=seen)
+    return replace(found, learned=tuple(learned), seen=seen)
 
 
 def diagnosed(

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.job import go_on
+from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.extend import extended, with_learned
 from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
-from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Command
@@ -27,6 +27,7 @@ from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
+from cpfls_cli.stages.extend import WORDS, extended
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -49,7 +50,7 @@ class Gap:
 
     disagreement: Disagreement = part(brief=False)
     diagnosis: Diagnosis = part(brief=False)
-    extended: ExtendedRecord | None = part(brief=False)
+    extended: Extended | None = part(brief=False)
     refused: str
     """Why the model is not extended."""
 
@@ -65,7 +66,7 @@ class Gap:
 
 @stage(
     Gap,
-    words={**of_diagnosis.WORDS, "extension_warnings": warnings, "model_with": model_with},
+    words={**WORDS, **of_diagnosis.WORDS},
     fills=Filled(PARTS),
     study=True,
 )
@@ -109,8 +110,9 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     except ComputationError as error:
         refused = str(error)
     if extension is not None:
-        extension, of_effects = with_learned(extension, found.learned_from({**trained_on, **unseen}), learned)
-        run.take_also(of_effects, "extended")
+        all_learned = joined_flights(found.learned_from({**trained_on, **unseen}), learned)
+        extension = replace(extension, learned_from=all_learned)
+        run.take_also(as_inputs("flight", all_learned), "extended")
     run.progress(0.97, 1, "report")
     answer = Gap(disagreement=disagreement, diagnosis=found, extended=extension, refused=refused)
     run.next.append(_next(run, answer, [*flights, *held_out], model))

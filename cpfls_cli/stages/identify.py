@@ -21,9 +21,9 @@ from cpfls_cli.arguments import (
     ValidateOption,
     WorkersOption,
 )
+from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
@@ -116,7 +116,7 @@ def _next(run: Run, made: IdentifiedModel, flights: Sequence[Path]) -> Command:
 
 def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
     """Say what of recorded flights contradicts itself; a simulated one cannot."""
-    recorded = (path for path in flights if "log" in read_header(path).inputs)
+    recorded = (path for path in flights if "log" in read_origin(path).inputs)
     return contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, study))
 
 
@@ -151,7 +151,7 @@ def _identified(
 
 def _with_length(result: Identification, flights: Sequence[Path], data: TrainingData) -> Identification:
     """Add a warning of short flights, where all were recorded: a planned one may be exact."""
-    if not all("log" in read_header(path).inputs for path in flights):
+    if not all("log" in read_origin(path).inputs for path in flights):
         return result
     short = short_flight(swings(data.training), result.system.parameters)
     return result if short is None else replace(result, findings=(*result.findings, short))

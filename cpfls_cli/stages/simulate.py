@@ -13,8 +13,8 @@ import typer
 
 from cpfls_cli.arguments import FlownArgument
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import require_numbers
-from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError

@@ -19,7 +19,7 @@ from cpfls_cli.arguments import (
     WorkersOption,
 )
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import check_outputs, header_of
+from cpfls_cli.artifacts.job import check_outputs, origin_before
 from cpfls_cli.commands.stopped import stop_note
 from cpfls_cli.flights.inputs import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
@@ -93,13 +93,13 @@ def joined_sweeps(sweeps: Sequence[Source[Sweep]]) -> list[Source[Sweep]]:
 def _joined(first: Source[Sweep], second: Source[Sweep]) -> Source[Sweep] | None:
     one, two = (sorted((role, file.sha256) for role, file in own.header.inputs.items()) for own in (first, second))
     sweep = first.record.joined(second.record) if one == two else None
-    if sweep is None or first.found is None:
+    if sweep is None:
         return None
     seeds = sum(int(own.config["sweep"]["seeds"]) for own in (first, second))
     config = {**first.config, "sweep": {**first.config["sweep"], "seeds": seeds}}
     began = min(int(own.header.seed or 0) for own in (first, second))
     label = f"{first.label} and {second.label}"
-    return replace(first, label=label, record=sweep, config=config, found=replace(first.found, seed=began))
+    return replace(first, label=label, record=sweep, config=config, header=replace(first.header, seed=began))
 
 
 def _mean(values: Spread, digits: int = 3) -> str:
@@ -150,7 +150,7 @@ def sweep(
     options.require_workers()
     judged, kept = validate or [], choose_on or []
     inputs = run.take(input_roles(flights, None, judged, kept))
-    partial = PartialSweep.beside(run.output, header_of(run.study, inputs))
+    partial = PartialSweep.beside(run.output, origin_before(run.study, inputs, "sweep"))
     before = partial.take_up(resume=resume, force=run.force)
     check_outputs(run, run.output, replaceable=resume and partial.output_may_be_replaced())
     plan = sweep_plan(run, flights, judged, inputs, kept)

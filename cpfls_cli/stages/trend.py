@@ -17,8 +17,8 @@ import typer
 
 from cpfls_cli.arguments import OtherVehicleOption, SchedulerOption, TimeOrder
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.results import NumberInTime, Trend
 from cpfls_cli.changes.trend import load_ruptures

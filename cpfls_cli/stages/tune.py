@@ -13,8 +13,8 @@ import typer
 
 from cpfls_cli.arguments import AutopilotChoice
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST
-from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot

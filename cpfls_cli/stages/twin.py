@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.job import go_on
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
@@ -295,8 +295,8 @@ def _vehicles(study: Study, model: Path | None) -> dict[str, VehicleModel | None
 def with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, TwinGains]:
     """Find whose law flies, and its gains: as stated, of the log, of the simulation that made the flight, or usual."""
     settings = study.simulation.closed_loop
-    made = None if is_log(path) else stored_study(read_header(path).config, path).simulation.closed_loop
-    by_simulation = made is not None and "log" not in read_header(path).inputs and made.autopilot != _CPFLS
+    made = None if is_log(path) else stored_study(read_origin(path).config, path).simulation.closed_loop
+    by_simulation = made is not None and "log" not in read_origin(path).inputs and made.autopilot != _CPFLS
     name = settings.autopilot
     if name == _CPFLS and by_simulation and made is not None:
         name = made.autopilot
@@ -331,7 +331,7 @@ def _parameters(path: Path) -> Mapping[str, float | str]:
 def _thrust_is_share(path: Path, study: Study) -> bool:
     """Tell whether a thrust setpoint is a share of the full thrust: a log's as its map says, a simulation logs N."""
     if not is_log(path):
-        header = read_header(path)
+        header = read_origin(path)
         if "log" not in header.inputs:
             return False
         study = stored_study(header.config, path)

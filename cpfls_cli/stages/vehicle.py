@@ -47,7 +47,7 @@ from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.pages.disturbance import gust_words
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
-from cpfls_cli.pages.model import vehicle_words
+from cpfls_cli.pages.model import said_by
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
@@ -365,7 +365,7 @@ def _what_can_come(
     along = [flight.playback for flight in own]
     if settings.anyway or not shows_loop_anyhow(run.study.vehicle, along, logged_hz):
         return settings, ()
-    said = vehicle_words(logged_hz, "too-slow")[0]
+    said = said_by("vehicle", logged_hz, "too-slow")[0]
     logging.getLogger("cpfls_cli").warning(said)
     return replace(settings, leave_out=blocks_of(run.study.vehicle), history_s=0.0), (said,)
 

@@ -1,0 +1,229 @@
+"""The one gate through which files of results are opened, and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.patience import patient
+from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, InputFile
+from cpfls_cli.errors import InputError, NotAnArtifactError
+from cpfls_cli.files import FileState, is_hdf5, is_sealed, read_content, state_of
+from cpfls_cli.version import __version__
+
+
+@contextmanager
+def opened_file(path: Path) -> Iterator[h5py.File]:
+    """Open a file that ends in its seal: the one gate through which anything of it is read.
+
+    HDF5 trusts what it parses, and damage there may keep it busy for ever; so it opens nothing whose seal does not fit.
+    """
+    _require_sealed(path)
+    try:
+        with patient(path):
+            file = h5py.File(path, "r")
+        with file:
+            with patient(path):
+                _refuse_links(file)
+            yield file
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
+        raise InputError(f"{path}: damaged: {one_line(error)}") from None
+
+
+def _require_sealed(path: Path) -> None:
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, not an artifact")
+    if not path.is_file():
+        raise InputError(f"{path}: is a device or a pipe, not a file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: is empty")
+    if not is_hdf5(path):
+        raise NotAnArtifactError(path, f"{path}: cannot be read as an artifact: not an HDF5 file, or damaged")
+    if not is_sealed(path):
+        raise NotAnArtifactError(
+            path,
+            f"{path}: cannot be read as an artifact: it does not end in the checksum that cpfls writes: cut off, "
+            "changed by another program, or not made by cpfls; docs/format.md says how to add one",
+        )
+    if not read_content(path).intact:
+        raise InputError(f"{path}: damaged: its content does not match the checksum at its end; copy or make it again")
+
+
+def _refuse_links(file: h5py.File) -> None:
+    """Refuse what leads to other places, in the file or out of it."""
+
+    def elsewhere(name: bytes, link: h5py.h5l.LinkInfo) -> tuple[str, int] | None:
+        return None if link.type == h5py.h5l.TYPE_HARD else (name.decode(errors="surrogateescape"), link.type)
+
+    # Of the library below: opening each link as an object took a quarter of the time to open a file.
+    found = file.id.links.visit(elsewhere, info=True)
+    if found is not None:
+        kind = {h5py.h5l.TYPE_SOFT: "SoftLink", h5py.h5l.TYPE_EXTERNAL: "ExternalLink"}.get(found[1], "link")
+        raise ValueError(f"{found[0]} is a {kind}; an artifact must hold all that it refers to")
+
+
+_MOST_PACKED = 1100
+"""Bytes that gzip makes of one, at most: 1032 where all are equal."""
+
+
+def dataset_of(file: h5py.File, path: str) -> h5py.Dataset | None:
+    """Look up a dataset that lies in the file, as large as it says; None where there is something else."""
+    # By the library below: a dataset looked up and asked by its object takes three times as long.
+    found = h5py.h5o.open(file.id, path.encode())
+    if not isinstance(found, h5py.h5d.DatasetID):
+        return None
+    made = found.get_create_plist()
+    if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
+        raise ValueError(f"{path} lies in another file; an artifact must hold all that it refers to")
+    if found.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+        raise ValueError(f"{path} holds nothing, not even a shape")
+    declared = found.get_space().get_simple_extent_npoints() * found.get_type().get_size()
+    held = found.get_storage_size() * (_MOST_PACKED if made.get_nfilters() else 1)
+    if declared > held:
+        # What no program has written reads as one number over and over, for as long as the shape says.
+        raise ValueError(f"{path} declares {declared:.3g} bytes, and the file holds {held:.3g} of them at most")
+    return h5py.Dataset(found, readonly=True)
+
+
+def held_format(path: Path, file: h5py.File) -> str:
+    """Name the format of an open file; one that cpfls did not make is refused."""
+    name = _text_attribute(file, "format")
+    if name is None or not name.startswith("cpfls/"):
+        raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
+    return name
+
+
+_MAKERS = {
+    "flight": "simulate` or `cpfls import",
+    "twin": "simulate",
+    "selection": "reduce",
+    "prediction": "predict",
+    "gains": "tune",
+    "disagreement": "compare",
+    "diagnosis": "diagnose",
+    "extended": "extend",
+    "identified": "identify",
+    "model": "identify",
+    "flight-numbers": "changed",
+}
+"""Commands that made files of earlier versions, by kind or format, where they are not called alike."""
+
+
+def other_version(path: Path, file: h5py.File) -> InputError:
+    """Say of a file of a newer version that it is one, and of an earlier one which command makes it again."""
+    schema = file.attrs.get("schema_version")
+    if isinstance(schema, int | np.integer) and schema > SCHEMA_VERSION:
+        return InputError(
+            f"{path}: schema_version = {schema}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
+        )
+    version = file.attrs.get("cpfls_version", "1")
+    name = str(file.attrs.get("kind", "") or file.attrs.get("format", "")).removeprefix("cpfls/")
+    return InputError(
+        f"{path}: was written by cpfls {version}, whose files this version does not read; make it again with "
+        f"`cpfls {_MAKERS.get(name, name)}`"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Where the result of a stage comes from.
+
+    Attributes
+    ----------
+    stage : str
+        That made it, as its command is typed.
+    inputs : mapping of str to InputFile
+        By role.
+    seed : int or None
+        None where nothing is drawn.
+    config : str
+        The resolved study; empty where there is none.
+    cautions : tuple of str
+        What speaks against what it rests on.
+    """
+
+    stage: str
+    inputs: Mapping[str, InputFile] = field(default_factory=dict)
+    seed: int | None = None
+    config: str = ""
+    cautions: tuple[str, ...] = ()
+    version: str = __version__
+
+
+def origin_of(file: h5py.File) -> Origin:
+    """Read where a result comes from."""
+    inputs = {
+        role: InputFile(*(str(own.attrs[key]) for key in ("name", "sha256", "format")))
+        for role, own in file.get(INPUTS, {}).items()
+    }
+    return Origin(
+        stage=str(file.attrs["stage"]),
+        inputs=inputs,
+        seed=int(file.attrs["seed"]) if "seed" in file.attrs else None,
+        config=bytes(file[CONFIG][()]).decode() if CONFIG in file else "",
+        cautions=tuple(str(file.attrs["cautions"]).splitlines()),
+        version=str(file.attrs["cpfls_version"]),
+    )
+
+
+class Known(NamedTuple):
+    """What a file holds, and where it comes from."""
+
+    format: str
+    origin: Origin
+
+
+def identified(path: Path, file: h5py.File) -> Known:
+    """Tell what an open file holds; one that no stage of this version made is refused."""
+    name = held_format(path, file)
+    if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
+        raise other_version(path, file)
+    return Known(name, origin_of(file))
+
+
+@lru_cache(maxsize=64)
+def _known_of(state: FileState) -> Known:
+    with opened_file(state.path) as file, patient(state.path):
+        return identified(state.path, file)
+
+
+def _known(path: Path) -> Known | None:
+    """Look into a file that stays as it is once only; None where it is no good: who reads it then says why."""
+    try:
+        return _known_of(state_of(path))
+    except (OSError, ValueError, InputError):
+        return None
+
+
+def format_name(path: Path) -> str | None:
+    """Tell the format of a file without reading it whole; None where no stage made it."""
+    known = _known(path)
+    return None if known is None else known.format
+
+
+def read_origin(path: Path) -> Origin:
+    """Read where a result comes from, and none of its data."""
+    if (known := _known(path)) is not None:
+        return known.origin
+    with opened_file(path) as file, patient(path):
+        return identified(path, file).origin
+
+
+def one_line(error: Exception) -> str:
+    """Word an error of a library in one line."""
+    return " ".join(str(error.args[0] if error.args else error).split())
+
+
+def _text_attribute(file: h5py.File, name: str) -> str | None:
+    value = file.attrs.get(name)
+    return value if isinstance(value, str) else None

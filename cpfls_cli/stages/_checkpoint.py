@@ -1,0 +1,12 @@
+"""What a search that was stopped leaves beside its output, as `identify` and `sweep` keep it."""
+
+from __future__ import annotations
+
+from cpfls_cli.search.checkpoint import SearchState
+from cpfls_cli.stage import Run, stage
+
+
+@stage(SearchState, title="Unfinished search", study=True)
+def checkpoint(run: Run) -> SearchState:
+    """Leave it: those commands do."""
+    raise NotImplementedError(run.output)

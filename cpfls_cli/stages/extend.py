@@ -1,0 +1,98 @@
+"""Put the named effects into the model, and show that the gap shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from cpfls_cli.arguments import DiagnosisArgument, ModelOption
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.learned import as_inputs, joined_flights
+from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import effect
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
+from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, left_out, played_pairs, rates_fade
+from cpfls_cli.gap.extended import extend as refitted
+from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
+from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
+from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
+from cpfls_cli.pages.effects import intervals_drawn
+from cpfls_cli.pages.gap import sizes_drawn
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
+from cpfls_cli.pages.model import WORDS as MODEL_WORDS
+from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.stage import Run, stage
+from cpfls_cli.weak_form.windows import Recording
+
+_EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+WORDS: Mapping[str, Any] = {**GAP_WORDS, **MODEL_WORDS, **PLAYBACK_WORDS}
+FIGURES = {
+    "gap-sizes": sizes_drawn(lambda r: r.gap),
+    "playback": playback_drawn(),
+    "intervals": intervals_drawn(lambda r: r.effects),
+}
+
+
+@stage(Extended, title="The extended model", figures=FIGURES, words=WORDS, study=True)
+def extend(run: Run, diagnosis: DiagnosisArgument, model: ModelOption = None) -> Extended | None:
+    """Put the effects that a diagnosis names into a model."""
+    run.take({"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
+    with_numbers(run, "extend", model)
+    study = run.study
+    diagnosed, origin = read_result_of_vehicle(diagnosis, Diagnosis, study)
+    base = diagnosed.base if model is None else read_base(model, study)
+    named_effects(diagnosed)
+    if run.dry_run:
+        return None
+    flights = (in_roles(diagnosed.recorded, role) for role in (TRAINING, HELD_OUT))
+    training, held = (
+        beside_rotors([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
+        for own in flights
+    )
+    known = diagnosed.learned if model is None else learned_by(model)
+    learned = joined_flights(diagnosed.learned_from(origin.inputs), known)
+    run.take_also(as_inputs("flight", learned))
+    run.next.append(("cpfls", "export", run.output, "-o", run.output.with_suffix(".c")))
+    return replace(extended(study, training, held, diagnosed, base), learned_from=learned)
+
+
+def named_effects(diagnosis: Diagnosis) -> Sequence[NamedEffect]:
+    """Take the effects that a diagnosis names; one that names none, or what is not known here, is refused."""
+    for each in diagnosis.effects or diagnosis.closest:
+        effect(each.name)
+    if diagnosis.verdict not in _EXTENDS or not diagnosis.effects:
+        unexplained = diagnosis.verdict == GapVerdict.UNEXPLAINED
+        closest = " (those that it calls closest are not it)" if unexplained else ""
+        raise ComputationError(
+            f"not extended: the diagnosis is {diagnosis.verdict} and names no effect that could be added{closest}"
+        )
+    return diagnosis.effects
+
+
+def extended(
+    study: Study,
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    diagnosis: Diagnosis,
+    base: VehicleModel,
+) -> Extended:
+    """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
+    gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
+    named = named_effects(diagnosis), diagnosis.audit
+    extension = refitted(training, held, *named, study.gap, base.fuzzy, gusty_floor)
+    stated = base.vehicle if has_effects(base) else study.vehicle
+    whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
+    if diagnosis.air is not None and diagnosis.gusts:
+        whole = replace(whole, gusts=diagnosis.air.gusts)
+    require_body(extension.model, stated)
+    played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
+    playback = PlaybackChange.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
+    missing = left_out(whole, whole.beside_table, held, study.gap.horizon_s)
+    return Extended.of(extension, stated, whole, playback, missing)
