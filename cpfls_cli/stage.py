@@ -33,12 +33,12 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
-from cpfls_cli.report.content import Box, Facts, Folded, Heading, Section, Table, Text
+from cpfls_cli.report.content import Box, Heading, Section, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
-from cpfls_cli.result import datasets, plain
+from cpfls_cli.result import plain
 
 PAGE = "report.html"
 """File of the page of a folder with one answer."""
@@ -359,33 +359,6 @@ class Stage:
             written=run.output if run.writes else next(iter(run.texts), None),
         )
 
-    def info(self, path: Path) -> Outcome:
-        """Say again what a file answers, where it comes from and what it holds; of a long one no values."""
-        long = store.is_long(path, self.kind)
-        if long:
-            store.check_rows(path, self.kind, store.held_rows(path, self.kind))
-        given, origin = store.read_first(path, self.kind) if long else store.read(path, self.kind)
-        about = source_of_result(given, origin, path, path.name, "")
-        answer = "too long to be shown: its values are in the file" if long else self.text(given, about=about)
-        seed = "" if origin.seed is None else f", seed {origin.seed}"
-        made = [("made by", f"cpfls {origin.version}{seed}")]
-        made += [(role, f"{own.name} (sha256 {own.sha256[:12]})") for role, own in origin.inputs.items()]
-        rows = [(path, own.about.unit, own.about.text) for path, own in datasets(self.kind) if own.about]
-        table = Table("datasets", "", ("Dataset", "Unit", "What it holds"), rows, frozenset({0, 1, 2}), frozenset({2}))
-        inputs = {role: vars(own) for role, own in origin.inputs.items()}
-        summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "seed": origin.seed}
-        summary |= {"inputs": inputs, "cautions": list(origin.cautions)}
-        return Outcome(
-            summary if long else summary | {"result": plain(given)},
-            (
-                *page.blocks(answer),
-                *caution_texts(origin.cautions),
-                Folded("where it comes from", [Facts(made)]),
-                Folded(f"what its {len(rows)} datasets hold", [table]),
-            ),
-            next=(("cpfls", "check", path),),
-        )
-
     def report(self, path: Path, form: Form) -> str:
         """Write the page of a file in any form."""
         given, origin = store.read(path, self.kind)
@@ -443,10 +416,9 @@ class Stage:
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
             for name, text in fills.texts.items():
                 write_text(folder / name, text(given))
-            # Above this module: a report shows results of all stages. Without a bar of its own: that is of the whole.
-            report = import_module("cpfls_cli.commands.report")
-            quiet = replace(run, output=folder / PAGE, progress=lambda *_: None, reads=lambda _: None)
-            report.run(quiet, [folder / f"{name}.h5" for name in held])
+            # Above this module: a report shows results of all stages.
+            report = import_module("cpfls_cli.stages.report")
+            write_text(folder / PAGE, report.page_about(run.study, [folder / f"{name}.h5" for name in held]))
 
     def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
         if self.fills:

@@ -19,7 +19,6 @@ from cpfls_cli.arguments import FolderOption
 from cpfls_cli.cli.command_lines import CommandLine, command_line
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import (
-    Commands,
     Common,
     ConfigArgument,
     OutputOption,
@@ -38,6 +37,7 @@ STAGES = Path(__file__).parents[1] / "stages"
 ORDER = (
     *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle", "predict"),
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
+    *("spread", "info", "check", "config", "effects"),
 )
 """Of the list of commands; what it does not name stands behind."""
 PARTS = ("twin",)
@@ -98,24 +98,18 @@ class StageCommand(TyperCommand):
         """Take note of nothing."""
 
 
-class AllCommands(Commands):
-    """The commands of stages and all others, in the order of the way through them."""
-
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
-        every = {**stage_commands(), **self.commands}
-        self.commands = {name: every[name] for name in (*(own for own in ORDER if own in every), *every)}
-
-
 def _named(file: Path) -> str:
     return file.stem.strip("_").replace("_", "-")
 
 
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
-    """List the commands of the stages in a folder; some are a part of another command, which calls them."""
+    """List the commands of the stages in a folder, in the order of the way through them.
+
+    Some stages are a part of another command, which calls them.
+    """
     every = (file for file in sorted(folder.glob("[a-z]*.py")) if file.stem not in PARTS)
     files = {_named(file): file for file in every}
-    return {name: StageCommand(file) for name, file in files.items()}
+    return {name: StageCommand(files[name]) for name in (*(own for own in ORDER if own in files), *files)}
 
 
 def run_of(
@@ -131,7 +125,7 @@ def run_of(
     from cpfls_cli.config.load import validate
     from cpfls_cli.stage import Run
 
-    study = common.study(config, sweep=own.name == "sweep") if config else validate({}, "default")
+    study = common.study(config, sweep=own.name in ("sweep", "config")) if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
     if config:
@@ -140,9 +134,13 @@ def run_of(
         run.data = partial(common.data, config)
         run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
         if common.numbers is not None:
-            run = import_module("cpfls_cli.commands.numbers").with_numbers_of(run, common.numbers)
+            run = import_module("cpfls_cli.stages._numbers").with_numbers_of(run, common.numbers)
         require_numbers(run, own.name)
     return run
+
+
+def _unshown(done: float, total: int, note: str = "") -> None:
+    """Show no progress of what only answers."""
 
 
 @contextmanager
@@ -173,12 +171,12 @@ def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Calla
             own = load()
             narration = Narration(own.name, common.verbose and not common.quiet)
             given |= {"config": config} if declared else {}
-            if callable(own.study) and not own.study(given):
+            if (callable(own.study) and not own.study(given)) or (declared and config is None):
                 refuse_overrides(common)
                 config = None
             if own.overrides:
                 common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
-            with progress_bar(own.name, common) as progress:
+            with nullcontext(_unshown) if own.output is False else progress_bar(own.name, common) as progress:
                 run = run_of(own, common, output, config, narration.reads, progress)
                 with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
                     outcome = own.run(run, **given)
@@ -190,10 +188,11 @@ def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Calla
     added = {"config": ConfigArgument} if line.study and not declared else {}
     option = line.output or (FilledOption if line.folder else FolderOption if line.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
+    outputs = [] if line.output is False else [output.replace(default=None) if line.folder or line.output else output]
     whole = [
         *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
         *(each.replace(kind=keyword) for each in line.parameters),
-        output.replace(default=None) if line.folder or line.output else output,
+        *outputs,
         inspect.Parameter("common", keyword, annotation=Common),
     ]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from cpfls_cli.report.outcome import Outcome
 
 _BAR_WIDTH = 20
+_TELLING = ("diagnosis", "changed", "trend")
+"""Results in a folder whose `info` shows the answer of its command again."""
 # Unasked notes leave the answer on a small screen.
 _NOTE_LINES, _NOTE_WIDTH = 5, 80
 # A number that is no part of a name.
@@ -113,12 +115,13 @@ def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     if more:
         yield from terminal_lines([Text(f"more with -v: {'; '.join(more)}")], width)
     if more and outcome.written is not None:
-        from cpfls_cli.commands.show import artifact_that_tells
+        from cpfls_cli.store import stage_of
 
         # Nothing has to be computed again to read it.
-        artifact = artifact_that_tells(outcome.written)
-        if artifact is not None:
-            yield f"or with {visible(shlex.join(('cpfls', 'info', str(artifact), '-v')))}"
+        written = outcome.written
+        results = [written / f"{name}.h5" for name in _TELLING] if written.is_dir() else [written]
+        for path in [path for path in results if stage_of(path)][:1]:
+            yield f"or with {visible(shlex.join(('cpfls', 'info', str(path), '-v')))}"
 
 
 def _columns(stream: TextIO | None = None) -> int | None:

@@ -14,6 +14,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from cpfls_cli import store
 from cpfls_cli.arguments import ExportAnywayOption
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.errors import InputError
@@ -22,9 +23,8 @@ from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.tracks import TIME, View, csv_text
 from cpfls_cli.export.viewed import view_of
-from cpfls_cli.pages.source import source_of_file
 from cpfls_cli.result import about, part, plain, result
-from cpfls_cli.stage import Run, stage
+from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.stages._sheets import sheet_of
 
 Formats = StrEnum("Formats", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv")
@@ -113,7 +113,7 @@ class Written:
     output: tuple[str, ...] = about("their names", "file")
     bytes: int = about("in all of them")
     sizes: Mapping[str, int] = about("bytes of each", brief=False)
-    model: Model | None = part(None, brief=False)
+    model: Model | None = part(default=None, brief=False)
     view: View | None = None
 
 
@@ -121,7 +121,7 @@ class Written:
 def export(
     run: Run,
     model: ModelArgument,
-    format: FormatOption = None,  # noqa: A002  # the name of the option
+    format: FormatOption = None,  # the name of the option
     name: NameOption = None,
     anyway: ExportAnywayOption = False,
 ) -> Written:
@@ -152,10 +152,10 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
         weights=len(sheet.weights),
         effects=tuple(effect.name for effect in sheet.model.effects),
         learned=sheet.model.remainder is not None,
-        parameters=identified and identified.structure.parameters,
+        parameters=None if identified is None else identified.structure.parameters,
         fuzzy=sheet.rules is not None,
         rigid_body=bool(sheet.rigid_body.any()),
-        region_share=identified and float(np.mean(identified.visited)),
+        region_share=None if identified is None else float(np.mean(identified.visited)),
         said=(*sheet.told, *made.told),
         warnings=sheet.warnings,
     )
@@ -166,8 +166,8 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
 def _drawn(run: Run, artifact: Path, form: str) -> Written:
     """Write the quantities of an artifact over the clock of its log."""
     run.take({"artifact": artifact})
-    source = source_of_file(artifact)
-    view = view_of(artifact, source.record, source.header.config)
+    given, origin = store.read(artifact, kind_of(artifact))
+    view = view_of(artifact, given, origin.config)
     run.texts[run.output] = mcap_bytes(view) if form == "mcap" else csv_text(view)
     tracks = (
         Track(
@@ -187,9 +187,7 @@ def _drawn(run: Run, artifact: Path, form: str) -> Written:
 
 
 def _written(run: Run, form: str, model: Model | None = None, view: View | None = None) -> Written:
-    sizes = {
-        str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()
-    }
+    sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
     return Written(
         dry_run=run.dry_run,
         format=form,

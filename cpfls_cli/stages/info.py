@@ -6,7 +6,6 @@ Without FILE, list all formats, or describe one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,10 +13,9 @@ import typer
 
 from cpfls_cli import store
 from cpfls_cli.errors import InputError
-from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.report.source import source_of_result
 from cpfls_cli.result import about, datasets, part, plain, result
-from cpfls_cli.stage import Run, Stage, loaded, stage
+from cpfls_cli.stage import Run, Stage, loaded, stage, stage_that_made
 from cpfls_cli.words import did_you_mean
 
 _LONG = "too long to be shown: its values are in the file"
@@ -75,11 +73,11 @@ class Held:
 
 @result
 class Shown:
-    """A file, all formats, or those of a name."""
+    """A file, all formats, or one of them."""
 
-    file: Held | None = part(None, brief=False)
-    listed: tuple[Format, ...] = part((), brief=False)
-    described: tuple[Format, ...] = part((), brief=False)
+    file: Held | None = part(default=None, brief=False)
+    listed: tuple[Format, ...] = part(default=(), brief=False)
+    described: Format | None = part(default=None, brief=False)
 
 
 def short(described: Format) -> str:
@@ -88,16 +86,13 @@ def short(described: Format) -> str:
 
 
 @stage(Shown, output=False, words={"short": short})
-def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown | Outcome:
+def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
     """Show a file, or formats."""
     if file and name is not None:
         raise InputError("--format describes files of a format in general: leave out FILE or --format")
     if file is None:
         return _formats(run, name)
-    if not (module := store.stage_of(file)):
-        made: Outcome = import_module("cpfls_cli.commands.show").info(file)
-        return made
-    own = loaded(module)
+    own = stage_that_made(file)
     long = store.is_long(file, own.kind)
     if long:
         store.check_rows(file, own.kind, store.held_rows(file, own.kind))
@@ -119,32 +114,38 @@ def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown 
 
 
 def _formats(run: Run, name: str | None) -> Shown:
-    """Describe the formats of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
+    """Describe the format of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
     every = formats()
     if name is None:
         run.also = {"formats": plain(every)}
         run.next.append(("cpfls", "info", "--format", short(every[0])))
         return Shown(listed=every)
-    chosen = tuple(each for each in every if name.removeprefix("cpfls/") == short(each))
-    if not chosen:
-        known = list(dict.fromkeys(map(short, every)))
-        hint = did_you_mean(name.removeprefix("cpfls/"), known, "", most=3)
+    known = {short(each): each for each in every}
+    chosen = known.get(asked := name.removeprefix("cpfls/"))
+    if chosen is None:
+        hint = did_you_mean(asked, list(known), "", most=3)
         raise InputError(f"--format {name}: no such format{f' ({hint})' if hint else ''}; there are {', '.join(known)}")
-    run.also = {"formats": [plain(each) | {"datasets": plain(each.datasets)} for each in chosen]}
+    run.also = {"formats": [plain(chosen) | {"datasets": plain(chosen.datasets)}]}
     return Shown(described=chosen)
 
 
 def formats() -> tuple[Format, ...]:
     """Describe every format of a file."""
-    stages = (loaded(file.stem) for file in sorted(Path(__file__).parent.glob("[a-z]*.py")))
+    files = (file for file in Path(__file__).parent.glob("*.py") if "\n@stage(" in file.read_text(encoding="utf-8"))
     # What only answers has none, nor what fills a folder with results of other stages.
-    return tuple(_format(own) for own in stages if hasattr(own.kind, "FORMAT"))
+    described = (_format(own) for file in files if hasattr((own := loaded(file.stem)).kind, "FORMAT"))
+    return tuple(sorted(described, key=short))
 
 
 def _format(own: Stage) -> Format:
     first = str(own.kind.__doc__).split("\n", 1)[0].rstrip(".")
     words = first[0].lower() + first[1:]
-    return Format(format=own.kind.FORMAT, description=words, commands=(own.name,), datasets=_datasets(own))
+    return Format(
+        format=own.kind.FORMAT,
+        description=words,
+        commands=(getattr(own.kind, "MADE_BY", own.name),),
+        datasets=_datasets(own),
+    )
 
 
 def _datasets(own: Stage) -> dict[str, Any]:

@@ -43,18 +43,15 @@ from cpfls_cli.words import capitalised, joined
 _IMPORTED = 4
 """Logs that are imported one by one; more are taken as they are."""
 _WIDTH = 110
+_SPINS = {1: "ccw", -1: "cw", 0: "turning an unknown way"}
 _PLAIN = re.compile(r"[A-Za-z_][\w./^ -]*")
 _SURFACE = re.compile(r"aileron|elevator|rudder|elevon")
 
 MassOption = Annotated[
     float | None, typer.Option("--mass", metavar="KG", min=1e-6, help="Mass as it flew, with battery, kg.")
 ]
-ArmOption = Annotated[
-    float | None, typer.Option("--arm", metavar="M", min=1e-6, help="Middle to a rotor's axis, m.")
-]
-ScaleOption = Annotated[
-    bool, typer.Option("--scale-to-arm", help="Scale places of rotors that a log states to --arm.")
-]
+ArmOption = Annotated[float | None, typer.Option("--arm", metavar="M", min=1e-6, help="Middle to a rotor's axis, m.")]
+ScaleOption = Annotated[bool, typer.Option("--scale-to-arm", help="Scale places of rotors that a log states to --arm.")]
 InertiaOption = Annotated[
     Any,  # Of a tuple typer takes three words.
     typer.Option(
@@ -211,7 +208,7 @@ def _rotors_in_words(proposal: Proposal) -> str:
         )
         return f"{proposal.rotors} rotors{more}; {unknown}"
     places = ", ".join(
-        f"M{index} {rotor.name or 'at its place'} {{1: "ccw", -1: "cw", 0: "turning an unknown way"}[rotor.spin]}"
+        f"M{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}"
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
     return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}{more}"
@@ -233,7 +230,13 @@ def _asked_words(keys: Sequence[str]) -> str:
     return ", ".join([*others, *(f"{joined(list(own))} of {joined(rotors)}" for own, rotors in by_keys.items())])
 
 
-_WORDS = {"by_topic": _by_topic, "contradicted": contradicted, "in_braces": _in_braces, "unit": _unit, "rotors_in_words": _rotors_in_words}
+_WORDS = {
+    "by_topic": _by_topic,
+    "contradicted": contradicted,
+    "in_braces": _in_braces,
+    "unit": _unit,
+    "rotors_in_words": _rotors_in_words,
+}
 
 
 @stage(Proposed, words=_WORDS)

@@ -48,7 +48,11 @@ class Written:
 
 @stage(Written, words={"name_of": name_of, "trust_words": trust_words})
 def spread(
-    run: Run, model: VehicleArgument, count: CountOption = 1000, seed: SeedOption = 1, anyway: ExportAnywayOption = False
+    run: Run,
+    model: VehicleArgument,
+    count: CountOption = 1000,
+    seed: SeedOption = 1,
+    anyway: ExportAnywayOption = False,
 ) -> Written | None:
     """Draw vehicles, and write them."""
     ending = require_ending(str(run.output), run.output.suffix)
