@@ -302,14 +302,14 @@ class Stage:
         """Give the verdict on a result, where its template begins with one, for the summary of a report."""
         return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
 
-    def section(self, about: Source, number: int) -> Section:
+    def section(self, about: Source, number: int, *, drawn: bool = True) -> Section:
         """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
 
-        That stands in the summary.
+        That is in the summary. Figures are left out where another section has them.
         """
         pictures = {
             name: picture
-            for name, draw in self.figures.items()
+            for name, draw in (self.figures.items() if drawn else ())
             if (picture := picture_of(draw, f"{self.name}-{number}-{name}", about.record)) is not None
         }
         anchor = self.name if number == 1 else f"{self.name}-{number}"

@@ -241,7 +241,8 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, held_format(path, file)  # type: ignore[attr-defined]
         if held != wanted:
-            made_by = f" (made by {made})" if (made := getattr(kind, "MADE_BY", "")) else ""
+            makers = " or ".join(f"`cpfls {each}`" for each in getattr(kind, "MADE_BY", "").split(" or ") if each)
+            made_by = f" (made by {makers})" if makers else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
         origin, missing = identified(path, file).origin, list[str]()
         given = _read(kind, file, missing, rows)

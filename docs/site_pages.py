@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 
 from cpfls_cli.cli.app import app
 from cpfls_cli.config.keys import commented_default
-from cpfls_cli.stages.info import formats
+from cpfls_cli.stages.info import described, formats
 
 ROOT = Path(__file__).parents[1]
 ELSEWHERE = {
@@ -99,8 +99,9 @@ def _configuration() -> str:
 
 def _formats() -> str:
     lines = []
-    for each in formats():
-        lines += ["", f"### `{each.format}`", "", f"Made by `cpfls {each.commands[0]}`: {each.description}.", ""]
+    for each in map(described, formats()):
+        makers = " or ".join(f"`cpfls {command}`" for command in each.commands)
+        lines += ["", f"### `{each.format}`", "", f"Made by {makers}: {each.description}.", ""]
         lines += ["| dataset | dimensions | units | frame | required | description |", "|---|---|---|---|---|---|"]
         for path, own in each.datasets.items():
             required, gaps = "yes" if own.required else "no", "; may be not finite" if own.gaps else ""

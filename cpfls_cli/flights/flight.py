@@ -38,7 +38,7 @@ class Flight:
 
     FORMAT: ClassVar = "cpfls/flight"
     STREAMED: ClassVar = "time"
-    MADE_BY: ClassVar = "`cpfls simulate` or `cpfls import`"
+    MADE_BY: ClassVar = "simulate or import"
 
     time: Array = about("time from the first sample", "time", unit="s", ascends=True, brief=False)
     attitude: Array | None = _signal("roll, pitch, yaw q", "axis", unit="rad", frame=EULER)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.artifacts.gate import format_name
+from cpfls_cli.artifacts.gate import format_name, read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, require_whole
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import AnyModel
@@ -59,9 +59,11 @@ def is_identified(path: Path) -> bool:
 def any_model(path: Path) -> AnyModel:
     """Read which model a file is: identified, extended, or a vehicle that was found."""
     held = format_name(path)
-    if held is None or held in _READ:
-        # Of what is no artifact the usual words say why.
-        return _READ.get(held or "", _READ[Extended.FORMAT])(path)
+    if held in _READ:
+        return _READ[held](path)
+    if held is None:
+        # Says why it is no file of a stage.
+        read_origin(path)
     raise InputError(f"{path}: is a {held}; this command needs a model (made by {MAKERS})")
 
 

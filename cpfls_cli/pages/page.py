@@ -56,7 +56,10 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
         shown = stage_named(name).together(own) if own else ()
-        return [stage_named(name).section(source, number) for number, source in enumerate(shown, start=1)]
+        return [
+            stage_named(name).section(source, number, drawn=name != "extend" or source.sha256 not in sources.answered)
+            for number, source in enumerate(shown, start=1)
+        ]
 
     return sections
 

@@ -99,6 +99,13 @@ class Sources:
             return "Does the simulator fly like the vehicle"
         return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
 
+    @property
+    def answered(self) -> frozenset[str]:
+        """Hashes of results whose answer another one gives: diagnosed comparisons, and models of a diagnosis."""
+        diagnosed = {each.made_from("disagreement") for each in self.diagnoses}
+        extended = {each.sha256 for each in self.extensions if self.by_hash(each.made_from("diagnosis")) is not None}
+        return frozenset(each for each in (*diagnosed, *extended) if each is not None)
+
     def of_kind(self, kind: type[R]) -> list[Source[R]]:
         """List the artifacts of one kind, in the order given."""
         return [source for source in self.all if isinstance(source.record, kind)]

@@ -22,11 +22,8 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = list(_cautions(sources))
     blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
-    # A comparison that was diagnosed has its answer there, an extended model too; the verdict on an identified model is
-    # a line here.
-    answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
-    answered |= {each.sha256 for each in sources.extensions if sources.by_hash(each.made_from("diagnosis")) is not None}
-    told = [each for each in sources.all if each.stage not in ("", "identify") and each.sha256 not in answered]
+    # The verdict on an identified model is a line here.
+    told = [each for each in sources.all if each.stage != "identify" and each.sha256 not in sources.answered]
     blocks += [box for source in told for box in stage_named(source.stage).verdict(source)]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)

@@ -72,13 +72,14 @@ NameArgument = Annotated[
 def effects(run: Run, name: NameArgument = None) -> Catalogue:
     """List the effects, or describe one in full; ranges are those of the default vehicle."""
     vehicle = VehicleSettings()
-    shown = tuple(_shown(each, vehicle) for each in ([effect(name)] if name else CATALOGUE.values()))
+    shown = tuple(described(each, vehicle) for each in ([effect(name)] if name else CATALOGUE.values()))
     run.also = plain(shown[0]) if name else {"effects": plain(shown)}
     run.next.append(("cpfls", "effects") if name else ("cpfls", "effects", shown[0].name))
     return Catalogue(vehicle=f"default, {vehicle.mass_kg:g} kg with {len(vehicle.rotors)} rotors", effects=shown)
 
 
-def _shown(entry: Effect, vehicle: VehicleSettings) -> Shown:
+def described(entry: Effect, vehicle: VehicleSettings) -> Shown:
+    """Describe an effect, with the ranges of its numbers for a vehicle."""
     # With all numbers that the last fit of a diagnosis finds.
     whole = entry.exact or entry
     ranges = ((each, *each.bounds(vehicle)) for each in whole.coefficients)

@@ -115,7 +115,7 @@ def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
 
 def _formats(run: Run, name: str | None) -> Shown:
     """Describe the format of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
-    every = formats()
+    every = tuple(map(described, formats()))
     if name is None:
         run.also = {"formats": plain(every)}
         run.next.append(("cpfls", "info", "--format", short(every[0])))
@@ -129,21 +129,23 @@ def _formats(run: Run, name: str | None) -> Shown:
     return Shown(described=chosen)
 
 
-def formats() -> tuple[Format, ...]:
-    """Describe every format of a file."""
-    files = (file for file in Path(__file__).parent.glob("*.py") if "\n@stage(" in file.read_text(encoding="utf-8"))
-    # What only answers has none, nor what fills a folder with results of other stages.
-    described = (_format(own) for file in files if hasattr((own := loaded(file.stem)).kind, "FORMAT"))
-    return tuple(sorted(described, key=short))
+def formats() -> list[Stage]:
+    """List the stages whose results have a format of their own, one for each format.
+
+    What only answers has none, nor what fills a folder with results of other stages.
+    """
+    files = (file for file in sorted(Path(__file__).parent.glob("*.py")) if "\n@stage(" in file.read_text("utf-8"))
+    stages = {str(own.kind.FORMAT): own for file in files if hasattr((own := loaded(file.stem)).kind, "FORMAT")}
+    return [stages[name] for name in sorted(stages)]
 
 
-def _format(own: Stage) -> Format:
+def described(own: Stage) -> Format:
+    """Describe the format of a stage."""
     first = str(own.kind.__doc__).split("\n", 1)[0].rstrip(".")
-    words = first[0].lower() + first[1:]
     return Format(
         format=own.kind.FORMAT,
-        description=words,
-        commands=(getattr(own.kind, "MADE_BY", own.name),),
+        description=first[0].lower() + first[1:],
+        commands=tuple(str(getattr(own.kind, "MADE_BY", own.name)).split(" or ")),
         datasets=_datasets(own),
     )
 

@@ -5,7 +5,7 @@ import subprocess
 
 import numpy as np
 
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import c_source, python_source
@@ -76,9 +76,16 @@ int main(int count, char **words)
 """
 
 
+ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n", version="0.1.0")
+
+
 def sheet_of_vehicle(model, name="vehicle", **changed):
     """Put a vehicle on a sheet."""
-    given = {"worth": ("It is worth a test.",), "origin": Header("0.1.0", 1, "seed: 1\n"), "file": "vehicle.h5"}
+    given = {
+        "worth": ("It is worth a test.",),
+        "origin": ORIGIN,
+        "file": "vehicle.h5",
+    }
     return Sheet(name=name, model=model, sha256="a" * 64, **(given | changed))
 
 

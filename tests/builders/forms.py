@@ -8,20 +8,15 @@ from html import unescape
 from types import SimpleNamespace
 from unittest.mock import patch
 
-from cpfls_cli.config.study import Study, resolved
+from cpfls_cli.config.study import Study
 from cpfls_cli.pages.page import report_page
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.content import Box, Document, Facts, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
-
-
-def source_of_record(record, label="record.h5"):
-    study = Study()
-    return Source(label, "f" * 64, record, resolved(study), study.vehicle, 0)
 
 
 def phrases(block):

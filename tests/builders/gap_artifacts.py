@@ -1,14 +1,13 @@
 """Artifacts of the gap workflow with numbers made up, quick to write and sound by their formats."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
-from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
@@ -79,12 +78,6 @@ def audit(findings=()):
         "audit/warning": texts(),
         "audit/note": texts("The motion follows the rotors by 12 ms."),
     }
-
-
-def vehicle(prefix):
-    """Give the datasets of the stated vehicle as a model."""
-    data = ModelRecord(vehicle=VehicleGroup.of(VehicleModel(vehicle=VehicleSettings()))).data
-    return {path.replace("vehicle", prefix, 1): values for path, values in data.items()}
 
 
 def flights(roles=("training", "held-out")):
@@ -191,6 +184,12 @@ def effects_of(data, named):
         for name, is_named, p_value, share, frequency, sentence in rows(data, "effect", *columns)
         if bool(is_named) is named
     )
+
+
+def numbers_of(data):
+    """Make numbers of the vehicle of their datasets."""
+    columns = ("name", "unit", "value", "low", "high")
+    return tuple(Estimate(*row, (np.nan, np.nan)) for row in rows(data, "parameter", *columns))
 
 
 def named_effect(
@@ -401,9 +400,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
             for axis, floors, signal, part_, hz, energy in unexplained
         ),
         not_excited=unseen(data),
-        vehicle_numbers=tuple(
-            Estimate(*row, (np.nan, np.nan)) for row in rows(data, "parameter", "name", "unit", "value", "low", "high")
-        ),
+        vehicle_numbers=numbers_of(data),
         gap=part(GapChange, chosen, "gap"),
         torque_alone=tuple(TorqueAlone(*row) for row in alone),
         notes=tuple(map(str, listed["note"])),
@@ -428,18 +425,17 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
 LISTED = ("impossible", "difference", "note", "warning")
 
 
-def extended(diagnosis_sha256="", **changed):
-    data = {
-        "inertia": np.array([0.61, 0.6, 1.2, 0.0, 0.0, 0.0]),
-        "thrust_scale": 1.0123,
-        **effects({}),
-        **sizes(),
-        **played_pair(),
-        **vehicle("vehicle"),
-        **{f"vehicle/repair/{path}": values for path, values in audit().items()},
-    }
-    source = InputFile("diagnosis.h5", diagnosis_sha256 or "0" * 64, "cpfls/diagnosis")
-    return Artifact(ExtendedRecord.spec(), Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
+def extended(**changed):
+    data = {**effects({}), **sizes(), **played_pair(), **audit()} | changed
+    return Extended(
+        model=replace(VehicleModel(vehicle=VehicleSettings()), repairs=audited(data)),
+        inertia=np.array([0.61, 0.6, 1.2, 0.0, 0.0, 0.0]),
+        thrust_scale=1.0123,
+        effects=effects_of(data, named=True),
+        vehicle_numbers=numbers_of(data),
+        gap=part(GapChange, {path: each for path, each in data.items() if path != "gap/channel"}, "gap"),
+        playback=along(PlaybackChange, data),
+    )
 
 
 def comes_again(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):

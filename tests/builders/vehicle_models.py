@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.check import Origin
+from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE

@@ -10,15 +10,15 @@ import pytest
 import yaml
 
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.store import read_any, write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.result import plain
 from cpfls_cli.store import read
-from tests.builders.artifacts import edited
+from tests.builders.artifacts import edited, read_result, with_fields
 from tests.builders.command_line import undrawn
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG
@@ -141,7 +141,7 @@ def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command
 
 
 def test_no_word_is_good_above_a_number_that_is_not_known(vehicle):
-    summary = read_any(vehicle).summary
+    summary = plain(read_result(vehicle))
     assert (summary["verdict"], summary["forecast_verdict"]) == ("shows-the-loop", "not-judged")
     assert summary["not_determined"] == ["inertia.Ixx"]
 
@@ -213,15 +213,13 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
 
 
 def test_two_vehicles_stand_side_by_side(cpfls, config, vehicle, tmp_path):
-    record, other = read_any(vehicle), tmp_path / "other.h5"
-    numbers = replace(
-        record.found,
-        value=np.array([0.0052, 0.0]),
-        low=np.array([0.005, 0.0]),
-        high=np.array([0.0054, 0.0]),
-        determined=np.array([True, True]),
+    made, other = read_result(vehicle), tmp_path / "other.h5"
+    first, second = made.numbers
+    numbers = (
+        first._replace(value=0.0052, low=0.005, high=0.0054, determined=True),
+        second._replace(value=0.0, low=0.0, high=0.0, determined=True),
     )
-    write_record(other, replace(record, found=numbers, loop=replace(record.loop, shown=False)))
+    with_fields(vehicle, other, numbers=numbers, loop=made.loop._replace(explained=np.ones(3)))
     with undrawn():
         assert cpfls("report", config, vehicle, other, "-o", tmp_path / "page.json").exit_code == 0
     page = json.loads((tmp_path / "page.json").read_text())

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import typer
 
-from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.cli.app import app
 from cpfls_cli.config.load import load_study
 from cpfls_cli.playback.model import VehicleModel
@@ -15,6 +14,7 @@ from tests.builders.autopilots import found_vehicle
 from tests.builders.changed_flights import flight_table, save
 from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import TINY
+from tests.builders.vehicle_models import write_vehicle
 from tests.builders.vehicle_search import CONFIG, left_out
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -103,7 +103,7 @@ def folder(cpfls, tmp_path_factory):
     text = CONFIG.replace("seed: 1", "seed: 4") + identification
     text = text.replace("trajectory: {", "trajectory: {next_flight: {starts: 1, iterations: 1}, ")
     study.write_text(text + "".join(f"{key}: {json.dumps(own)}\n" for key, own in SETTINGS.items()))
-    write_record(folder / "vehicle.h5", vehicle_of(load_study(study).vehicle))
+    write_vehicle(folder / "vehicle.h5", vehicle_of(load_study(study).vehicle))
     time = 0.01 * np.arange(400)
     save(
         folder / "log.csv",

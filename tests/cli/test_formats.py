@@ -5,36 +5,27 @@ from pathlib import Path
 
 import pytest
 
-from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
-from cpfls_cli.commands.formats import formats
+from cpfls_cli.result import datasets
+from cpfls_cli.stages.info import formats
 
 PAGE = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
 
 
 def test_page_names_the_schema_version_and_every_root_attribute():
     assert f"| `schema_version` | version of this page; {SCHEMA_VERSION} |" in PAGE
-    assert all(f"| `{name}` |" in PAGE for name in ("format", "kind", "cpfls_version", "seed", "config_sha256"))
+    assert all(f"| `{name}` |" in PAGE for name in ("format", "stage", "cpfls_version", "seed", "cautions"))
 
 
-@pytest.mark.parametrize("record", records(), ids=lambda record: record.FORMAT.name)
-def test_every_record_is_found_by_its_format(record):
-    assert record_of_format(record.FORMAT.name, record.FORMAT.kind) is record
-
-
-@pytest.mark.parametrize("spec", formats(), ids=lambda spec: f"{spec.name} {spec.kind}".strip())
-def test_every_dataset_is_described(spec):
-    assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)
-    assert {"config", "inputs"}.isdisjoint(dataset.path.split("/")[0] for dataset in spec.datasets)
-    for dataset in spec.datasets:
-        assert dataset.units
-        assert dataset.frame
-        assert dataset.description
-        assert "|" not in dataset.description
-
-
-def test_unknown_format():
-    assert record_of_format("cpfls/other") is None
+@pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
+def test_every_dataset_is_described(stage):
+    held = dict(datasets(stage.kind))
+    assert {"config", "inputs"}.isdisjoint(path.split("/")[0] for path in held)
+    for each in held.values():
+        assert each.about.unit
+        assert each.about.frame
+        assert each.about.text
+        assert "|" not in each.about.text
 
 
 def described(cpfls, *arguments):
@@ -43,11 +34,8 @@ def described(cpfls, *arguments):
 
 def test_one_format_is_described_without_a_file(cpfls):
     every = described(cpfls, "--format", "flight")
-    assert [(each["format"], each["commands"]) for each in every] == [
-        ("cpfls/flight", ["import"]),
-        ("cpfls/flight", ["simulate"]),
-    ]
-    flight = every[0]
+    (flight,) = every
+    assert (flight["format"], flight["commands"]) == ("cpfls/flight", ["simulate", "import"])
     torque = flight["datasets"]["body_torque"]
     assert (torque["dimensions"], torque["units"], torque["frame"]) == (["time", "axis"], "N m", "body (FLU)")
     lines = cpfls("info", "--format", "cpfls/flight").stdout
@@ -60,19 +48,14 @@ def test_results_of_stages_are_described_too(cpfls):
     assert look["datasets"]["balance/blocks"]["required"] is False
 
 
-def test_a_format_of_several_kinds_is_described_kind_by_kind(cpfls):
-    assert [each["kind"] for each in described(cpfls, "--format", "model")] == ["identified", "extended", "vehicle"]
-    assert [each["kind"] for each in described(cpfls, "--format", "vehicle-model")] == ["vehicle"]
-
-
 def test_without_a_name_all_are_listed(cpfls):
     names = [each["format"] for each in described(cpfls)]
     assert {"cpfls/flight", "cpfls/look"} <= set(names)
-    assert "cpfls info --format identified-model" in cpfls("info").stdout
+    assert "cpfls info --format changed" in cpfls("info").stdout
 
 
 def test_a_wrong_name_lists_those_that_there_are(cpfls):
     result = cpfls("info", "--format", "flihgt")
     assert result.exit_code == 2
-    assert "no such format (did you mean flight?); there are identified-model," in result.stderr
+    assert "no such format (did you mean flight or flight-numbers?); there are changed," in result.stderr
     assert "leave out FILE or --format" in cpfls("info", "flight.h5", "--format", "flight").stderr

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts import job
-from cpfls_cli.artifacts.store import file_sha256
+from cpfls_cli.files import read_content
 from cpfls_cli.flights import flight_source, training
 from tests.builders.artifacts import edited
 
@@ -114,10 +114,10 @@ def test_each_file_is_hashed_once(cpfls, study, pipeline, second, tmp_path, monk
 
     def counting(path):
         hashed.append(path)
-        return file_sha256(path)
+        return read_content(path)
 
     for stage in (job, training):
-        monkeypatch.setattr(stage, "file_sha256", counting)
+        monkeypatch.setattr(stage, "read_content", counting)
     selection, flights = tmp_path / "selection.h5", [pipeline.flight, second]
     run(cpfls, "reduce", study, *flights, "-o", selection)
     assert sorted(hashed) == sorted(flights)

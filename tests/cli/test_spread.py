@@ -121,10 +121,10 @@ def test_nothing_is_drawn_or_written_on_a_dry_run(cpfls, vehicle, monkeypatch):
     def never(*_):
         raise AssertionError("nothing is computed")
 
-    monkeypatch.setattr("cpfls_cli.commands.spread.drawn", never)
+    monkeypatch.setattr("cpfls_cli.stages.spread.drawn", never)
     result = cpfls("spread", vehicle, "-o", vehicle.with_name("s.json"), "-n", "5", "--dry-run")
     assert result.exit_code == 0
-    assert "s.json: would be written; 5 vehicles would be drawn from" in " ".join(
+    assert "s.json: would be written; all inputs are good 5 vehicles would be drawn from" in " ".join(
         (result.stdout + result.stderr).split()
     )
     assert not vehicle.with_name("s.json").exists()

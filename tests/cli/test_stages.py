@@ -11,7 +11,8 @@ import pytest
 import typer
 
 import cpfls_cli.stages
-from cpfls_cli.cli.stages import AllCommands, stage_commands
+from cpfls_cli.cli.app import AllCommands
+from cpfls_cli.cli.stages import stage_commands
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result

@@ -10,7 +10,8 @@ from statistics import median
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.formats import records
+from cpfls_cli.result import datasets
+from cpfls_cli.stages.info import formats
 
 PACKAGE = Path(cpfls_cli.__file__).parent
 TESTS = Path(__file__).parents[1]
@@ -126,38 +127,19 @@ def test_package_files_only_re_export(path):
     assert all(isinstance(node, allowed) for node in syntax(path).body)
 
 
-# Shows and checks artifacts of all formats alike, dataset by dataset.
-OF_ALL_FORMATS = {"commands/show.py"}
-GENERIC = {"Artifact", "read_artifact", "write_artifact"}
-PATHS = {spec.path for record in records() for spec in record.spec().datasets if "/" in spec.path}
-GROUPS = tuple(f"{group}/" for group in sorted({path.split("/")[0] for path in PATHS}))
+PATHS = {path for stage in formats() for path, _ in datasets(stage.kind) if "/" in path and "*" not in path}
 
 
 def looked_up(node):
-    """Give the dataset that a piece of code looks up by its path, or the way to do so; None for other code."""
-    match node:
-        case ast.Constant(value=str(text)) if text in PATHS:
-            return text
-        case ast.JoinedStr(values=[ast.Constant(value=str(text)), *_]) if text.startswith(GROUPS):
-            return f"{text}..."
-        case ast.Call(func=ast.Attribute(attr="array" | "number" | "text" | "texts"), args=[ast.Constant(str(text))]):
-            return text
-        case ast.Subscript(value=ast.Attribute(attr="data"), slice=ast.Constant(str(text))):
-            return text
-        case ast.Compare(left=ast.Constant(str(text)), comparators=[ast.Attribute(attr="data")]):
-            return text
-        case ast.ImportFrom(module=str(module), names=names) if module.startswith("cpfls_cli.artifacts"):
-            return next((alias.name for alias in names if alias.name in GENERIC), None)
-    return None
+    """Give the dataset that a piece of code looks up by its path; None for other code."""
+    return node.value if isinstance(node, ast.Constant) and node.value in PATHS else None
 
 
-def test_a_dataset_is_looked_up_by_its_path_in_artifacts_only():
-    """A path is written once, at a field of a record; everything else reads the field."""
-    lookups = {}
-    for path in MODULES:
-        name = path.relative_to(PACKAGE).as_posix()
-        if not name.startswith("artifacts/") and name not in OF_ALL_FORMATS:
-            lookups[name] = [text for node in nodes(path) if (text := looked_up(node)) is not None]
+def test_no_dataset_is_looked_up_by_its_path():
+    """A path is written once, at a field of a result; everything else reads the field."""
+    lookups = {
+        path.relative_to(PACKAGE).as_posix(): list(filter(None, map(looked_up, nodes(path)))) for path in MODULES
+    }
     assert {name: texts for name, texts in lookups.items() if texts} == {}
 
 
@@ -190,14 +172,12 @@ def test_tests_import_from_shared_builders_alone():
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to, a form of the report.
 ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
 SMALL_ALL_THE_SAME = {
-    "artifacts/rebuilt.py": "a record is read without numerics; it goes with the last records of models",
     "cli/command_lines.py": "reads sources",
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
-    "search/vehicle_search.py": "a search for a model does not load what plays a vehicle back",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

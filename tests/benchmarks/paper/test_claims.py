@@ -31,7 +31,6 @@ from benchmarks.paper.search_claims import (
     TYPICAL_ERRORS_CLAIM,
     paired_ratio,
 )
-from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Source
 from cpfls_cli.reduction.selection import Selection
@@ -45,8 +44,7 @@ NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 
 def sources(*records, times=()):
     """A report about records."""
-    named = [record.with_header(Header("1", 0, "")) if isinstance(record, Record) else record for record in records]
-    given = [Source("s.h5", "", record, {}, None, 0, found=Origin(stage="reduce")) for record in named]
+    given = [Source("s.h5", "", record, {}, None, 0, header=Origin(stage="reduce")) for record in records]
     return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 

@@ -7,26 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import ExtendedRecord, ExtendedVehicleGroup, LeftOutGroup
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.model import InertiaFunctionsGroup
-from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.config.load import stored_study
+from cpfls_cli.gap.before_after import LeftOut
+from cpfls_cli.inertia import six_parameters
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.store import read
-from tests.builders.artifacts import edited
+from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
 
 
 def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
-    record = read_record(extended, ExtendedRecord)
-    vehicle = vehicle_model(record.vehicle)
+    record = read(extended, Extended)[0]
+    vehicle = record.model
     effects = {one.name: one.coefficients for one in vehicle.effects}
     # The height, which the thrust alone does not show, is left open.
     assert effects["com_offset"] == pytest.approx([0.008, -0.005, 0.0], rel=0.05)
     assert vehicle.beside_table == ()
-    np.testing.assert_allclose(record.vehicle.inertia, record.inertia, rtol=1e-12)
+    np.testing.assert_allclose(six_parameters(vehicle.vehicle.inertia_kg_m2), record.inertia, rtol=1e-12)
 
 
 def test_it_is_exported(cpfls, extended, tmp_path):
@@ -39,21 +38,20 @@ def test_it_is_exported(cpfls, extended, tmp_path):
     # Where the centre of mass is off, equal rotors tilt the vehicle.
     wrench = names["wrench"](np.zeros(3), np.zeros(3), names["steady"](np.full(4, 350.0)))
     torque, force = wrench[:3], wrench[3:]
-    offset = read_record(extended, ExtendedRecord).vehicle.effect.linear_of("com_offset")
+    effects = {one.name: one.coefficients for one in read(extended, Extended)[0].model.effects}
+    offset = effects["com_offset"]
     thrust = 4 * 121.5e-6 * 350.0**2
     np.testing.assert_allclose(torque[:2], [-offset[1] * thrust, offset[0] * thrust], rtol=1e-9)
     assert force[2] == pytest.approx(thrust, rel=0.02)
 
 
 def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extended, tmp_path):
-    record = read_record(extended, ExtendedRecord)
-    size, ends = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.2, 0.3, 0.4]])
-    model = vehicle_model(record.vehicle)
+    record = read(extended, Extended)[0]
+    size, ends = np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), np.array([0.1, 0.2, 0.3, 0.4])
     sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
-    outside = ExtendedVehicleGroup.of(replace(model, effects=(*model.effects, sag)))
+    outside = replace(record.model, effects=(*record.model.effects, sag))
     path, output = tmp_path / "outside.h5", tmp_path / "m.c"
-    sizes = LeftOutGroup(name=("battery_sag",), wrench=size, ends=ends)
-    write_record(path, replace(record, vehicle=outside, left_out=sizes))
+    with_fields(extended, path, model=outside, left_out=(LeftOut("battery_sag", size, ends),))
     said = cpfls("export", path, "-o", output).stdout.splitlines()[-1]
     assert said.startswith("Not held, or only in part: battery sag (")
     floors = 0.4 / record.gap.floor[1]
@@ -65,10 +63,9 @@ def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extende
 
 
 def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path):
-    record, identified = read_record(extended, ExtendedRecord), read(pipeline.model, IdentifiedModel)[0]
+    record, identified = read(extended, Extended)[0], read(pipeline.model, IdentifiedModel)[0]
     path = tmp_path / "over.h5"
-    vehicle = replace(record.vehicle, inertia_functions=InertiaFunctionsGroup.of(identified.functions))
-    write_record(path, replace(record, vehicle=vehicle))
+    with_fields(extended, path, model=replace(record.model, fuzzy=identified.functions))
     said = cpfls("export", path, "--format", "casadi", "-o", tmp_path / "over_casadi.py").stdout
     assert said.splitlines()[-1] == "CasADi holds all of it."
     assert cpfls("export", path, "-o", tmp_path / "over.json").exit_code == 0

@@ -82,4 +82,4 @@ def test_a_model_of_another_vehicle_is_refused(refuse, gap_config, path, extende
 
 def test_a_file_that_is_no_model_is_refused(refuse, gap_config, path, tmp_path):
     (line,) = refuse("simulate", gap_config, path, *CLOSED, "--model", path, "-o", tmp_path / "x.h5")
-    assert "is a cpfls/trajectory; this command needs a cpfls/model" in line
+    assert "is a cpfls/trajectory; this command needs a model (made by `cpfls identify`" in line

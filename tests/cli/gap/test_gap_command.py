@@ -179,8 +179,8 @@ def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, found, 
 
 def test_extended_model_holds_the_effect_and_the_inertia(found):
     with h5py.File(found.folder / "extended.h5") as file:
-        assert file["effect/name"][()].tolist() == [b"com_offset"]
-        assert file["linear/value"][:2] == pytest.approx(OFFSET, rel=0.02)
+        assert file["effects/name"][()].tolist() == [b"com_offset"]
+        assert file["effects/linear/values"][:2] == pytest.approx(OFFSET, rel=0.02)
         assert file["inertia"][()] == pytest.approx([0.6, 0.6, 1.2, 0, 0, 0], rel=0.01, abs=1e-12)
 
 

@@ -298,7 +298,7 @@ def test_a_flight_of_another_vehicle_is_refused(cpfls, refused, gap_config, shif
 
 def test_what_is_no_model_is_refused(cpfls, refused, gap_config, shifted, tmp_path):
     flight = imported(cpfls, gap_config, shifted[0], tmp_path / "flight.h5")
-    assert "is a cpfls/flight; this command needs a cpfls/model" in refused(flight, shifted[0])
+    assert "is a cpfls/flight; this command needs a model (made by `cpfls identify`" in refused(flight, shifted[0])
 
 
 def test_an_identified_model_needs_the_attitude(refused, pipeline, shifted):

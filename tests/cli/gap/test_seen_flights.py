@@ -1,10 +1,8 @@
 """Which flights a model with effects learned from: in its file, and said wherever it is judged."""
 
-import h5py
 import pytest
 
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.store import read_record
+from tests.builders.artifacts import read_result
 from tests.builders.command_line import undrawn
 
 
@@ -19,8 +17,7 @@ def two_models(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
 
 
 def learned(path):
-    flights = read_record(path, ModelRecord).learned_from
-    return [(flight.file.name, flight.samples, flight.of) for flight in flights]
+    return [(flight.name, flight.samples, flight.of) for flight in read_result(path).learned_from]
 
 
 def test_the_file_says_what_the_effects_and_what_the_base_learned_from(extended, two_models, pipeline):
@@ -35,15 +32,6 @@ def test_stages_hand_the_flights_on(cpfls, gap_config, two_models, tmp_path):
     again = tmp_path / "again.h5"
     assert cpfls("extend", gap_config, diagnosis, "-o", again).exit_code == 0
     assert learned(again) == learned(two_models)
-
-
-def test_a_file_of_before_says_it_of_whole_flights(extended, tmp_path):
-    old = tmp_path / "old.h5"
-    old.write_bytes(extended.read_bytes())
-    with h5py.File(old, "r+") as file:
-        del file["learned"]
-    with h5py.File(old) as file:
-        assert sorted(file["inputs"]) == ["diagnosis", "flight-1", "flight-2"]
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from cpfls_cli.artifacts import store
+from cpfls_cli import store
 from cpfls_cli.evolution import engine
 from tests.builders.forked import Forked
 

@@ -11,45 +11,28 @@ from matplotlib.figure import Figure
 
 import cpfls_cli
 from cpfls_cli import store
-from cpfls_cli.artifacts.formats import records
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
 from cpfls_cli.errors import InputError
+from cpfls_cli.stages.info import formats
 from tests.builders.artifacts import edited
-from tests.builders.results import craft
+from tests.builders.results import craft, drawn
 
 
-def made_up(spec):
-    """An artifact with all datasets of its format, each label with a length of its own."""
-    labels = sorted({label for dataset in spec.datasets for label in dataset.dimensions if not label.isdigit()})
-    lengths = {label: 3 if label == "axis" else 4 + index for index, label in enumerate(labels)}
-    data = {}
-    for index, dataset in enumerate(spec.datasets):
-        shape = tuple(int(label) if label.isdigit() else lengths[label] for label in dataset.dimensions)
-        values = index + np.arange(np.prod(shape, dtype=int)).reshape(shape)
-        values = values % lengths[dataset.into] if dataset.into in lengths else values
-        data[dataset.path] = np.maximum(values, dataset.least).astype("U" if dataset.units == "text" else float)
-        if dataset.holds:
-            data[dataset.path] = np.append(data[dataset.path][1:], dataset.holds)
-    return Artifact(spec, Header("0", 1, "seed: 1\n"), data)
-
-
-@pytest.mark.parametrize("record", records(), ids=lambda record: record.FORMAT.name)
-def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record, tmp_path):
-    path, spec = tmp_path / "a.h5", record.spec()
-    write_artifact(path, made_up(spec))
-    artifact = cpfls_cli.read(path)
-    stored, named = artifact_data(artifact), artifact.to_xarray()
-    assert artifact.format == named.attrs["format"] == spec.name
-    assert list(artifact) == [dataset.path for dataset in spec.datasets]
-    for dataset in spec.datasets:
-        values = named[dataset.path]
-        np.testing.assert_array_equal(values, stored[dataset.path])
+@pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
+def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(stage, tmp_path):
+    path = tmp_path / "a.h5"
+    store.write(path, drawn(stage.kind, np.random.default_rng(5)), store.Origin(stage=stage.name, config="seed: 1\n"))
+    artifact, held = cpfls_cli.read(path), store.flat(path)
+    named = artifact.to_xarray()
+    assert artifact.format == named.attrs["format"] == stage.kind.FORMAT
+    assert list(artifact) == list(held)
+    for name, (about, stored) in held.items():
+        values = named[name]
+        np.testing.assert_array_equal(values, stored)
         assert len(set(values.dims)) == values.ndim
-        plain = [label.removesuffix("_2").removesuffix("_index") for label in values.dims]
-        assert plain == list(dataset.dimensions)
-        assert values.attrs == {"units": dataset.units, "frame": dataset.frame, "long_name": dataset.description}
-        assert artifact.about(dataset.path) == dataset
+        plain = [label.rpartition("/")[2].removesuffix("_2").removesuffix("_index") for label in values.dims]
+        assert plain == list(about.dimensions)
+        assert values.attrs == {"units": about.units, "frame": about.frame, "long_name": about.description}
+        assert artifact.about(name) == about
 
 
 def test_a_dimension_of_another_length_in_each_group_is_named_with_its_group(tmp_path):
@@ -116,7 +99,7 @@ def test_a_result_prints_shape_unit_and_meaning_of_every_dataset(pipeline):
 def test_it_is_written_again_byte_by_byte_and_never_over_a_file(pipeline, tmp_path):
     flight, copy = cpfls_cli.read(pipeline.flight), tmp_path / "copy.h5"
     flight.write(copy)
-    assert file_sha256(copy) == file_sha256(pipeline.flight)
+    assert copy.read_bytes() == pipeline.flight.read_bytes()
     assert flight.path == copy
     with pytest.raises(InputError, match="exists already"):
         flight.write(copy)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
+from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.job import input_file
 from cpfls_cli.store import Origin
 from tests.builders import gap_artifacts as made
 from tests.builders.command_line import run
@@ -26,17 +26,15 @@ FIGURES = [
     "compare-1-heat-map", "compare-1-playback",
 ]  # fmt: skip
 
-STAGES = {Diagnosis: "diagnose", Disagreement: "compare"}
+STAGES = {Diagnosis: "diagnose", Disagreement: "compare", Extended: "extend"}
 
 
 def written(path, given):
-    """Write an artifact or a result that is sound."""
-    if isinstance(given, Artifact):
-        assert check_artifact(given) == []
-        write_artifact(path, given)
-    else:
-        assert store.findings(given) == []
-        store.write(path, given, Origin(stage=STAGES[type(given)], seed=1, config="seed: 1\n"))
+    """Write a result that is sound; an extended model as if it came of the diagnosis beside it."""
+    assert store.findings(given) == []
+    source = path.with_name("diagnosis.h5")
+    inputs = {"diagnosis": input_file(source)} if isinstance(given, Extended) and source.exists() else {}
+    store.write(path, given, Origin(stage=STAGES[type(given)], seed=1, config="seed: 1\n", inputs=inputs))
     return path
 
 
@@ -57,13 +55,13 @@ def shown(folder, *artifacts, options=()):
 def full(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
     diagnosis = made.diagnosis(alone=[("torque_bias", 0.9)])
-    path = written(folder / "diagnosis.h5", diagnosis)
-    return shown(folder, made.disagreement(), diagnosis, made.extended(file_sha256(path)))
+    written(folder / "diagnosis.h5", diagnosis)
+    return shown(folder, made.disagreement(), diagnosis, made.extended())
 
 
 def test_the_answer_comes_first_and_every_figure_once(full):
     assert full.summary["sections"] == [
-        "summary", "model", "diagnose", "extension", "compare", "stated-vehicle", "provenance",
+        "summary", "diagnose", "extend", "compare", "stated-vehicle", "provenance",
     ]  # fmt: skip
     assert full.summary["figures"] == FIGURES
     assert full.summary["missing"] == []
@@ -147,7 +145,7 @@ def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
 def test_an_extended_model_alone_brings_its_figures(tmp_path):
     page = shown(tmp_path, made.extended())
     assert page.summary["figures"] == [
-        "extended-gap-sizes-1", "extended-prediction-error-1", "extended-intervals-1",
+        "extend-1-gap-sizes", "extend-1-playback", "extend-1-intervals",
     ]  # fmt: skip
     assert "the model with offset of the centre of mass" in page.text
     assert "its largest gap is 1.2 noise floors; it was 70" in page.text

@@ -6,21 +6,14 @@ from unittest.mock import patch
 
 import pytest
 
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.formats import records
-from cpfls_cli.artifacts.store import file_sha256, read_any
-from cpfls_cli.config.load import parse_config, validate
-from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import model
-from cpfls_cli.pages.source import Source
-from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.files import read_content
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
-from tests.builders import gap_artifacts
+from cpfls_cli.result import plain
+from cpfls_cli.stages.report import read_sources
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("model", "sweep")
-FORMATS = (*FROM_COMMANDS, "extended")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -37,35 +30,21 @@ def told(cpfls, study, tmp_path_factory):
     }
     artifacts = {}
     for name, command in given.items():
-        with patch("cpfls_cli.cli.app.tell") as tell:
+        with patch("cpfls_cli.cli.stages.tell") as tell:
             result = cpfls(*command, "-o", paths[name])
         assert result.exit_code == 0, result.stderr
-        source = source_of(read_any(paths[name]), f"{name}.h5", file_sha256(paths[name]))
+        (source,) = read_sources([paths[name]], [read_content(paths[name]).sha256])
         artifacts[name] = SimpleNamespace(source=source, outcome=tell.call_args.args[0])
     return artifacts
 
 
-def source_of(record, label, sha256="f" * 64):
-    study = validate(parse_config(record.origin.config, "/config"), "/config")
-    parameters = model_structure(study.identification).parameters
-    return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
-
-
 @pytest.fixture
 def answered(told):
-    """A record by its format, and the blocks that its command says."""
-
-    def of(name):
-        if name in told:
-            return told[name].source, told[name].outcome.blocks
-        made = gap_artifacts.extended()
-        source = source_of(ExtendedRecord.of_data(made.header, made.data), f"{name}.h5")
-        return source, tuple(model.answer(source))
-
-    return of
+    """A result by its name, and the blocks that its command says."""
+    return lambda name: (told[name].source, told[name].outcome.blocks)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", FROM_COMMANDS)
 def test_every_form_writes_every_sentence_and_number_of_a_block(answered, name):
     _, blocks = answered(name)
     said = [phrase for block in blocks for phrase in phrases(block)]
@@ -74,7 +53,7 @@ def test_every_form_writes_every_sentence_and_number_of_a_block(answered, name):
         assert [phrase for phrase in said if words(phrase) not in words(text)] == [], form
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", FROM_COMMANDS)
 def test_the_report_says_what_the_command_says(answered, name):
     """Each sentence stands on the page of the same record in every form, and each number of a table."""
     source, given = answered(name)
@@ -91,15 +70,6 @@ def test_the_report_says_what_the_command_says(answered, name):
 @pytest.mark.parametrize("name", FROM_COMMANDS)
 def test_what_json_prints_is_the_summary_of_the_record(told, name):
     """A command adds what is no fact of the record, such as how long it took."""
-    printed, summary = as_json(told[name].outcome.summary), as_json(told[name].source.record.summary)
+    printed, summary = as_json(told[name].outcome.summary), plain(told[name].source.record)
     known = {key: value for key, value in summary.items() if value is not None}
     assert known == {key: printed.get(key) for key in known}
-
-
-def test_every_format_with_a_page_is_here():
-    words = {"identified": "model"}
-    formats = {
-        words.get(record.FORMAT.kind, record.FORMAT.kind) or record.FORMAT.name.removeprefix("cpfls/")
-        for record in records()
-    }
-    assert formats - {"checkpoint", "vehicle-checkpoint"} == set(FORMATS)

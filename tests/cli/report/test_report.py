@@ -131,7 +131,7 @@ def test_everything_given_everything_shown(full):
         "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
         "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "convergence", "pareto-front", "ridge-curve",
         "figure-6-partitions", "predict-1-figure-7-error", "predict-1-torques", "predict-1-inertia-matrix",
-        "replicates",
+        "sweep-1-replicates",
     }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.report.content import Document, Listing, Section
 from cpfls_cli.report.markdown import markdown_page
 from tests.builders.artifacts import read_result
@@ -98,7 +98,7 @@ def test_the_json_form_says_where_everything_comes_from(as_json, pipeline):
     assert set(given) == {path.name for path in pipeline.paths.values()}
     model = given["model.h5"]
     assert model["inputs"]["flight"]["sha256"] == given["flight.h5"]["sha256"]
-    assert model["config"] == read_artifact(pipeline.model).header.config
+    assert model["config"] == read_origin(pipeline.model).config
 
 
 def test_every_row_of_a_markdown_table_has_as_many_cells_as_its_header(report):

@@ -8,12 +8,13 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt, lfilter
 
-from cpfls_cli.artifacts.audit import AuditGroup
-from cpfls_cli.artifacts.rebuilt import audit as audit_of
+from cpfls_cli import store
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.consistency.audit import audit
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, windows
+from tests.builders import gap_artifacts
 from tests.builders.closed_loop_flights import COARSE, PERIOD, flown, signals_of
 
 WINDOWS = windows(PERIOD, 0.4, 0.5)
@@ -225,7 +226,7 @@ def with_rotors_late(flights, *delays):
 
 
 @pytest.mark.parametrize(("delay", "words"), [(0.05, "late by"), (0.14, "late by"), (-0.08, "early by")])
-def test_rotors_on_another_clock_are_set_right(lively, delay, words):
+def test_rotors_on_another_clock_are_set_right(lively, delay, words, tmp_path):
     given = with_rotors_late(lively, delay, delay)
     found = audit(given, WINDOWS)
     [sentence] = found.settled
@@ -234,7 +235,7 @@ def test_rotors_on_another_clock_are_set_right(lively, delay, words):
     assert (found.warnings, found.named) == ((), ())
     true, now, before = (WINDOWS.average(s.rotor_speed) for s in (lively[0], found.repaired(given[0]), given[0]))
     assert np.abs(now - true).mean() < 0.1 * np.abs(before - true).mean()
-    again = audit_of(AuditGroup.of(found))
+    again = read_again(found, tmp_path)
     np.testing.assert_array_equal(again.repaired(given[0]).rotor_speed, found.repaired(given[0]).rotor_speed)
 
 
@@ -274,10 +275,20 @@ def test_what_was_made_of_the_accelerometer_follows_its_repair(flights):
     np.testing.assert_allclose(found.repaired(logged(flights[0])).acceleration, flights[0].acceleration, atol=1e-9)
 
 
-def test_repairs_come_back_from_an_artifact(flights):
+def read_again(found, folder):
+    """Write an audit with a model, and read it."""
+    extended = gap_artifacts.extended()
+    model = replace(extended.model, repairs=found)
+    store.write(
+        folder / "extended.h5", replace(extended, model=model), store.Origin(stage="extend", config="seed: 1\n")
+    )
+    return store.read(folder / "extended.h5", Extended)[0].model.repairs
+
+
+def test_repairs_come_back_from_an_artifact(flights, tmp_path):
     given = [WRONG["velocity in NED"][0](signals) for signals in flights]
     found = audit(given, WINDOWS)
-    again = audit_of(AuditGroup.of(found))
+    again = read_again(found, tmp_path)
     assert again.settled == found.settled
     np.testing.assert_array_equal(again.repaired(given[0]).velocity, found.repaired(given[0]).velocity)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.report.content import Facts, Table, Text, unfolded
 from cpfls_cli.result import plain
@@ -77,7 +76,7 @@ def test_machines_read_sizes():
 
 
 def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
-    air = DisturbanceGroup.of(FOUND, np.isfinite(FOUND.size))
+    air = replace(FOUND, alone=np.isfinite(FOUND.size))
     blocks = made.blocks_of(replace(made.diagnosis(named=({},) * 3), air=air), "diagnose")
     rows = [row for block in blocks if isinstance(block, Facts) for row in block.rows]
     (words,) = [words for name, words in rows if name == "Gusts"]

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.pages import model
 from cpfls_cli.report.content import Text
 from tests.builders import gap_artifacts as made
-from tests.builders.forms import in_all_forms, phrases, source_of_record, words
+from tests.builders.forms import in_all_forms, phrases, words
 
 GREW = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
 FAULT = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
@@ -27,6 +25,8 @@ BROKEN = made.texts("rotor 2 looks saturated")
         ("diagnose", made.diagnosis("AMBIGUOUS", alternatives=RIVALS)),
         ("diagnose", made.diagnosis("UNEXPLAINED", named=({"named": 0},), unexplained=LEFT)),
         ("diagnose", made.diagnosis("NO_GAP", named=(), force=False)),
+        ("extend", made.extended()),
+        ("extend", made.extended(**GREW)),
         (
             "diagnose",
             made.diagnosis(
@@ -37,12 +37,6 @@ BROKEN = made.texts("rotor 2 looks saturated")
 )
 def test_every_form_says_what_the_command_says(stage, found):
     _require_in_all_forms(made.source_of(found, stage), made.blocks_of(found, stage))
-
-
-@pytest.mark.parametrize("artifact", [made.extended(), made.extended(**GREW)])
-def test_every_form_says_of_an_extended_model_what_the_command_says(artifact):
-    source = source_of_record(ExtendedRecord.of_data(artifact.header, artifact.data))
-    _require_in_all_forms(source, list(model.answer(source)))
 
 
 def _holds(told, phrase):

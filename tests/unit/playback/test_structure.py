@@ -7,13 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
 from cpfls_cli.playback import structure
 from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
-from cpfls_cli.search.vehicle_search import kept_of
+from cpfls_cli.search.vehicle_search import KeptStructure
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 from tests.builders.vehicle_search import WITHOUT_FORESIGHT
 
@@ -93,7 +92,7 @@ def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
     without, told = searched
     with suppress(SearchStoppedError):
         chosen(flights, stopping)
-    kept = kept_of(VehicleCheckpointRecord.of(parts[-1]))
+    kept = dict(KeptStructure.of(each).pair for each in parts[-1])
     resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
     assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
     pairs = list(zip(told[-1][0], parts[-1], strict=True))

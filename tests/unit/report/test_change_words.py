@@ -14,7 +14,7 @@ from cpfls_cli.report.terminal import warnings_of
 from cpfls_cli.result import Estimate
 from cpfls_cli.stage import loaded
 from tests.builders.drawn_numbers import QUAD, drawn_changed, drawn_trend
-from tests.builders.forms import source_of_record
+from tests.builders.gap_artifacts import source_of as made_of
 
 made = {"changed": cache(drawn_changed), "trend": cache(drawn_trend)}
 
@@ -25,10 +25,15 @@ def found(name, *sizes, **more):
     return Found(**{"name": name, "named": True, "belief": 0.97, "unit": "1", "sizes": given, "alike": (), **more})
 
 
+def source_of(result, name):
+    """Say where a result of this vehicle comes from."""
+    return replace(made_of(result, name), vehicle=QUAD)
+
+
 def told(name, **more):
     """Give the blocks of the answer."""
     result = replace(made[name](), **more)
-    return page.blocks(loaded(name).text(result, about=replace(source_of_record(result), vehicle=QUAD)))
+    return page.blocks(loaded(name).text(result, about=source_of(result, name)))
 
 
 @pytest.mark.parametrize(
@@ -121,7 +126,7 @@ def test_verdicts_of_a_trend(more, verdict, title):
 @pytest.mark.parametrize("name", ["changed", "trend"])
 def test_each_has_a_figure_and_tables(name):
     result = made[name]()
-    section = loaded(name).section(replace(source_of_record(result), vehicle=QUAD), 1)
+    section = loaded(name).section(source_of(result, name), 1)
     assert section.plots == [f"{name}-1-numbers"]
     assert len(section.tables) == 2
     (fold,) = [block for block in section.blocks if isinstance(block, Folded)]

@@ -2,28 +2,27 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.checkpoint import CheckpointRecord
-from cpfls_cli.artifacts.job import header_of
+from cpfls_cli import store
+from cpfls_cli.artifacts.job import origin_before
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.evolution.engine import start, step
 from cpfls_cli.files import seal_of
 from cpfls_cli.identification.search import Unfinished
-from cpfls_cli.search.checkpoint import Checkpoint
+from cpfls_cli.search.checkpoint import Checkpoint, SearchState
 
 INPUTS = {"flight": InputFile("f.h5", "a" * 64, "cpfls/flight"), "validate-1": InputFile("v.h5", "b" * 64, "csv")}
 
 
 def header(inputs=INPUTS, seed=1, **keys):
     settings = {"population": 20, "generations": 9, "subpopulations": 2, **keys}
-    return header_of(validate({"seed": seed, "identification": settings}, "study.yaml"), inputs)
+    return origin_before(validate({"seed": seed, "identification": settings}, "study.yaml"), inputs)
 
 
 def settings():
@@ -94,7 +93,7 @@ def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finish
     if not finished:
         checkpoint.remove()
     checkpoint.add(unfinished())
-    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
+    assert store.findings_in(checkpoint.path, SearchState) == []
     stopped = checkpoint.read()
     for stored, kept in (
         (stopped.unfinished.submitted, unfinished().submitted),
@@ -111,7 +110,7 @@ def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finish
 
 
 def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_path):
-    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
+    assert store.findings_in(checkpoint.path, SearchState) == []
     other = Checkpoint.beside(tmp_path / "other.h5", header())
     other.write(checkpoint.read().state)
     assert other.path.read_bytes() == checkpoint.path.read_bytes()
@@ -162,18 +161,17 @@ def test_what_does_not_change_the_search_may_change(checkpoint, now):
 def test_every_bit_of_the_datasets_counts(checkpoint):
     checkpoint.add(unfinished())
     content = checkpoint.path.read_bytes()
-    sealed = content[-len(seal_of(content)) :]
-    artifact = read_artifact(checkpoint.path, CheckpointRecord.spec())
-    for name, value in artifact.data.items():
-        if np.asarray(value).dtype.kind == "U":
-            continue
-        changed = np.array(value)
+    held = {name: values for name, (_, values) in store.flat(checkpoint.path).items() if values.dtype.kind != "U"}
+    for name, values in held.items():
+        changed = np.array(values)
         changed.reshape(-1).view(np.uint8)[-1] ^= 1
-        write_artifact(checkpoint.path, replace(artifact, data={**artifact.data, name: changed}))
+        with h5py.File(checkpoint.path, "r+") as file:
+            file[name][...] = changed
         # A write of its own would seal the change; damage leaves the seal of before.
-        checkpoint.path.write_bytes(checkpoint.path.read_bytes()[: -len(sealed)] + sealed)
+        checkpoint.path.write_bytes(checkpoint.path.read_bytes() + seal_of(content[: -len(seal_of(content))]))
         with pytest.raises(InputError, match=r"model\.h5\.checkpoint: .*--force without --resume starts again"):
             checkpoint.read()
+        checkpoint.path.write_bytes(content)
 
 
 def test_damaged_file_is_refused_with_one_message(checkpoint):
