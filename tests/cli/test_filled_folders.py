@@ -60,7 +60,7 @@ def filled(tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
     monkeypatch.setattr(
         "cpfls_cli.stages.report.page_about",
-        lambda study, paths: " ".join(path.name for path in paths),
+        lambda _, paths: " ".join(path.name for path in paths),
     )
     log = tmp_path / "log.csv"
     log.write_text("1")
