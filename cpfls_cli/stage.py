@@ -34,8 +34,8 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import Box, Heading, Section, Text
+from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
-from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import plain

@@ -166,19 +166,12 @@ class Picture(Protocol):
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure, with a name that is unique on the page, and a description for those who do not see it.
-
-    Attributes
-    ----------
-    see : tuple of (str, str), or None
-        Where on the page more is said of it: an anchor, and the words that lead there.
-    """
+    """A figure, with a name that is unique on the page, and a description for those who do not see it."""
 
     name: str
     caption: str
     picture: Picture
     description: str = ""
-    see: tuple[str, str] | None = None
     kind: ClassVar[str] = "plot"
 
 
