@@ -254,16 +254,16 @@ class Stage:
 
     function: Callable[..., Any]
     kind: Any
-    title: str
-    figures: Mapping[str, Callable[[Any], str]]
-    words: Mapping[str, Any]
-    folder: bool
-    fills: Filled | None
-    study: bool | Callable[[Mapping[str, Any]], bool]
-    output: Any
-    several: bool
-    resumes: bool
-    overrides: Callable[..., list[str]] | None
+    title: str = ""
+    figures: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    words: Mapping[str, Any] = field(default_factory=dict)
+    folder: bool = False
+    fills: Filled | None = None
+    study: bool | Callable[[Mapping[str, Any]], bool] = False
+    output: Any = None
+    several: bool = False
+    resumes: bool = False
+    overrides: Callable[..., list[str]] | None = None
     together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -462,37 +462,9 @@ def stage_named(name: str) -> Stage:
     return loaded(stage_module({"stage": name}))
 
 
-def stage(
-    kind: Any,
-    *,
-    title: str = "",
-    figures: Mapping[str, Callable[[Any], str]] | None = None,
-    words: Mapping[str, Any] | None = None,
-    folder: bool = False,
-    fills: Filled | None = None,
-    study: bool | Callable[[Mapping[str, Any]], bool] = False,
-    output: Any = None,
-    several: bool = False,
-    resumes: bool = False,
-    overrides: Callable[..., list[str]] | None = None,
-    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
-) -> Callable[[Callable[..., Any]], Stage]:
-    """Make a function a stage."""
-    return lambda function: Stage(
-        function,
-        kind,
-        title,
-        figures or {},
-        words or {},
-        folder,
-        fills,
-        study,
-        output,
-        several,
-        resumes,
-        overrides,
-        together,
-    )
+def stage(kind: Any, **given: Any) -> Callable[[Callable[..., Any]], Stage]:
+    """Make a function a stage; what is given are attributes of `Stage`."""
+    return lambda function: Stage(function, kind, **given)
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

@@ -71,13 +71,13 @@ def messages_for_errors() -> Iterator[None]:
 
 def tell(outcome: Outcome, common: Common) -> None:
     """Print what a command has to say, and end with its exit code."""
-    from cpfls_cli.report.outcome import as_json
+    from cpfls_cli.result import plain
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # An encoding without a degree sign must not end a command that has done its work.
         sys.stdout.reconfigure(errors="replace")
     if common.as_json:
-        print(json.dumps(as_json(outcome.summary), allow_nan=False), flush=True)
+        print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     # On one terminal what is printed last is what stays on the screen.
     notes_first = not common.as_json and _columns() is not None and _columns(sys.stderr) is not None
     if notes_first:

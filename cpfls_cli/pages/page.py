@@ -25,7 +25,6 @@ from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.report.content import (
     Block,
     Box,
-    Document,
     Facts,
     Folded,
     Heading,
@@ -40,6 +39,7 @@ from cpfls_cli.report.content import (
 from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.json_page import json_page
+from cpfls_cli.report.source import Document
 from cpfls_cli.stage import stage_named
 
 
@@ -82,6 +82,7 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     return sections
 
 
+_HASH_SHOWN = 12
 _MODELS = attrgetter("models")
 _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
@@ -162,7 +163,7 @@ def written(document: Document, form: Form) -> str:
     """Write a report in a form."""
     if form is Form.JSON:
         return json_page(document)
-    files = ", ".join(f"{page.escaped(each.label)} {page.code(each.short_hash)}" for each in document.origins)
+    files = ", ".join(f"{page.escaped(each.label)} {page.code(each.sha256[:_HASH_SHOWN])}" for each in document.origins)
     parts = [f"# {page.escaped(document.title)}", f"Made by cpfls {page.escaped(document.version)} from {files}."]
     for section in document.sections:
         parts += [f"## {page.escaped(section.title)} {{#{section.name}}}", *_words(section.blocks)]
@@ -189,7 +190,8 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
                 rows = [[_toned(cell.text, cell.tone) for cell in row] for row in block.cells]
                 yield page.table([page.said(name) for name in block.header], rows, block.words)
             case Plot():
-                yield f"![{page.said(block.caption)}]({block.name})"
+                more = f" [{page.said(block.see[1])}](#{block.see[0]})" if block.see else ""
+                yield f"![{page.said(block.caption)}{more}]({block.name})"
             case Listing():
                 fence = "`" * max(3, 1 + max(map(len, re.findall("`+", block.text)), default=0))
                 yield f"::: {page.said(block.summary)}{' {open wide}' if block.shown else ''}"

@@ -11,8 +11,9 @@ from unittest.mock import patch
 from cpfls_cli.config.study import Study
 from cpfls_cli.pages.page import report_page, written
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Box, Document, Facts, Folded, Plot, Section, Table, Text
+from cpfls_cli.report.content import Box, Facts, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.forms import Form
+from cpfls_cli.report.source import Document
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
 
 

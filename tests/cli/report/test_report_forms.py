@@ -7,8 +7,9 @@ import pytest
 
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.pages.page import written
-from cpfls_cli.report.content import Document, Listing, Section
+from cpfls_cli.report.content import Listing, Section
 from cpfls_cli.report.forms import Form
+from cpfls_cli.report.source import Document
 from tests.builders.artifacts import read_result
 from tests.builders.command_line import undrawn
 
