@@ -31,8 +31,6 @@ FOUND_AS = {
 }
 """Numbers of a fit, by the keys under which people look for them."""
 
-THRUST_LAW = "thrust_law.linear"
-"""Number of a fit beside which the thrust factor is that of thrust."""
 
 _REMAINDER = "remainder"
 _NAMES = {

@@ -59,11 +59,11 @@ def is_identified(path: Path) -> bool:
 def any_model(path: Path) -> AnyModel:
     """Read which model a file is: identified, extended, or a vehicle that was found."""
     held = format_name(path)
-    if held in _READ:
-        return _READ[held](path)
     if held is None:
         # Says why it is no file of a stage.
         read_origin(path)
+    elif held in _READ:
+        return _READ[held](path)
     raise InputError(f"{path}: is a {held}; this command needs a model (made by {MAKERS})")
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import Drawn
-from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
-from cpfls_cli.words import capitalised
+from cpfls_cli.report.numbers import UNKNOWN, number, printed, whole_percent, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,31 +53,10 @@ def share_words(share: float) -> str:
     return whole_percent(share).replace("> ", "more than ").replace("< ", "less than ")
 
 
-def named_sentences(effects: Sequence[NamedEffect]) -> list[str]:
-    """Say how large named effects are, and how sure.
-
-    What is lost without each may add up to more than the gap, since others take over less than all of it.
-    """
-    overlap = sum(effect.share for effect in effects) > 1.0 + _ROUNDED
-    return [effect_sentence(effect, "the gap returns without it" if overlap else "the gap") for effect in effects]
-
-
-def effect_sentence(effect: NamedEffect, whole: str = "the gap") -> str:
-    """Say how large a named effect is, and how sure."""
-    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, whole)}."
-
-
 def number_words(effect: NamedEffect) -> str:
     """Write the numbers of an effect with their intervals."""
     relative = effect.name.endswith(_RELATIVE)
     return "; ".join(_relative(effect.name, each) if relative else _coefficient(each) for each in effect.numbers)
-
-
-def _size(effect: NamedEffect, whole: str) -> str:
-    """Write the numbers of an effect, how sure it is, and its share of a whole."""
-    chance = probability(effect.p_value)
-    p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
-    return f"{number_words(effect)} ({p_value}, {share_words(effect.share)} of {whole})".lstrip()
 
 
 def _coefficient(coefficient: Estimate) -> str:

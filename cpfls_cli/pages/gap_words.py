@@ -9,7 +9,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.repeated import OPEN
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages import effects, gap
-from cpfls_cli.pages.playback import ERRORS, against_rivals, draw_errors, errors_height
+from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
+from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.pages.repeats import NOT_SPLIT
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.canvas import Drawn
@@ -46,8 +47,8 @@ def playback_drawn() -> Drawn:
 
 
 GAP_WORDS: Mapping[str, Any] = {
+    **PLAYBACK_WORDS,
     "again_open": OPEN,
-    "against_rivals": against_rivals,
     "by_reason": by_reason,
     "channel_name": gap.channel_name,
     "channel_unit": gap.channel_unit,

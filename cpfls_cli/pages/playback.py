@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli import page
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.playback.errors import (
@@ -21,10 +19,8 @@ from cpfls_cli.playback.errors import (
     STATED,
     WITH_PAST,
     ByHorizon,
-    Region,
 )
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, line, plot, stacked, style_of
-from cpfls_cli.report.content import Plot, Table, Text
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, line, stacked, style_of
 from cpfls_cli.rounding import less
 from cpfls_cli.words import joined
 
@@ -122,48 +118,3 @@ def errors_height(r: ByHorizon) -> float:
 
 ERRORS = "Mean error by horizon, of the model and of what it has to beat"
 """What the figure of errors shows."""
-
-
-def playback_figure(name: str, r: ByHorizon, played: str) -> Plot | None:
-    """Draw the mean error over the horizon; None of a single one, or of flights that show no motion."""
-    if not any(map(r.moves, r.signals)) or len(r.horizon_s) < 2:
-        return None
-    caption = (
-        f"Mean error of {played} after so many seconds without correction. Grey: what it has to "
-        "beat. A curve that leaves the top of a panel is farther off than the panel is high."
-    )
-    return plot(name, caption, ERRORS, errors_height(r), partial(draw_errors, r))
-
-
-def _said(part: str, r: ByHorizon | None, **more: Any) -> list[str]:
-    blocks = page.blocks(page.words("playback_words", r, added=WORDS, part=part, **more))
-    return [block.text for block in blocks if isinstance(block, Text)]
-
-
-def against_rivals(r: ByHorizon | None) -> list[str]:
-    """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
-    return [] if r is None else _said("rivals", r)
-
-
-def trust_sentences(
-    word: str, r: ByHorizon | None, better: Region | None, contradictions: Sequence[str] | None
-) -> list[str]:
-    """Say what a model is good for, to which horizon, and where; by playback along flights held out alone."""
-    return _said("trust", r, word=word, better=better, contradictions=contradictions)
-
-
-def lost_words(r: ByHorizon) -> list[str]:
-    """Say where a model loses to what knows no model: where control lives, or in motion over all horizons."""
-    text = page.words("playback_words", r, added=WORDS, part="lost")
-    return text.strip().split("\n") if text.strip() else []
-
-
-def with_past_words(r: ByHorizon, past_s: float) -> list[str]:
-    """Say how much smaller errors are where the flight before each start is known as well, in one sentence, if any."""
-    return _said("past", r, past_s=past_s)
-
-
-def errors_table(name: str, r: ByHorizon, played: str, windows: int, flights: Sequence[str]) -> list[Text | Table]:
-    """Show the errors of all predictions after the first horizon, a fifth of the longest, the longest; and sums."""
-    text = page.words("playback_words", r, added=WORDS, part="table", played=played, windows=windows, flights=flights)
-    return [block for block in page.blocks(text, prefix=f"{name}-") if isinstance(block, Text | Table)]

@@ -29,7 +29,6 @@ NOT_SPLIT = (
     "lacks) and what does not (gusts, noise). Logged setpoints of position or velocity tell that too. To fly: "
     f"{WHAT_TO_FLY}"
 )
-NO_EFFECT = "What is left does not come again: no effect of the vehicle explains it."
 _COLUMNS = 3
 _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("again, explained", {"facecolor": "white"}),

@@ -73,11 +73,6 @@ def stopped_words(model: AnyModel) -> str:
     return said and f"{said}, go on with `cpfls {model.MADE_BY} ... --resume`"
 
 
-def trust_facts(model: AnyModel) -> list[tuple[str, str]]:
-    """Say in a word how far to trust a model, and which flights it learned from."""
-    return [("How far to trust it", model_words(model).sentence), ("Learned from", learned_words(model))]
-
-
 def learned_words(model: AnyModel) -> str:
     """Name the flights that a model learned from, each with the part of it."""
     flights = [_with_part(flight) for flight in model.learned_from]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from cpfls_cli.arrays import Array
@@ -226,13 +226,6 @@ class Box:
 
 
 Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading
-
-
-def in_short(box: Box, sentences: int, rest: str) -> Iterator[Block]:
-    """Keep the first sentences of a box, and fold the others away in words that say what they are."""
-    yield replace(box, sentences=box.sentences[:sentences])
-    if len(box.sentences) > sentences:
-        yield Folded(rest, [Text(each) for each in box.sentences[sentences:]], shown=True)
 
 
 def unfolded(blocks: Iterable[Block]) -> Iterator[Block]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.pages.effects import effect_sentence, effect_title, named_sentences
+from cpfls_cli.pages.effects import effect_title
 from cpfls_cli.report.content import Table, unfolded
 from tests.builders import gap_artifacts as made
 
@@ -23,6 +23,15 @@ OFFSET = made.named_effect(
 def closest_sentence(effect):
     box, *_ = made.blocks_of(replace(made.diagnosis("UNEXPLAINED", named=()), closest=(effect,)), "diagnose")
     return box.sentences[0]
+
+
+def named_sentences(effects):
+    box, *_ = made.blocks_of(replace(made.diagnosis(), effects=tuple(effects)), "diagnose")
+    return box.sentences
+
+
+def effect_sentence(effect):
+    return named_sentences([effect])[0]
 
 
 def tables(found):
@@ -71,13 +80,6 @@ def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     assert "Ixx −8 % [−20, +4] (p" in said("inertia_x", -0.08, -0.2, 0.04)
     assert ": drag factor +20.1 % [+18.0, +22.2] (p" in said("error", 0.201, 0.18, 0.222, effect="drag_factor_error")
     assert "thrust −9.00 % [−9.11, −8.89] (p" in said("thrust_scale", -0.09, -0.0911, -0.0889)
-
-
-def test_templates_say_of_effects_what_other_pages_say():
-    pair = (replace(OFFSET, share=0.7), replace(OFFSET, name="wind", share=0.6))
-    for named in ((OFFSET,), pair):
-        box, *_ = made.blocks_of(replace(made.diagnosis(), effects=named), "diagnose")
-        assert list(box.sentences) == named_sentences(named)
 
 
 def test_an_effect_stands_once_beside_its_coefficients():
