@@ -22,9 +22,11 @@ from cpfls_cli.cli.options import (
     Common,
     ConfigArgument,
     OutputOption,
+    check_order,
+    common_options,
+    is_argument,
     refuse_overrides,
     repeated,
-    with_common,
 )
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import ComputationError
@@ -73,7 +75,7 @@ class StageCommand(TyperCommand):
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
         assert self.name is not None, "a command has a name"
-        app.command(self.name)(with_common(command_of(self.name, self._line, self._stage)))
+        app.command(self.name)(command_of(self.name, self._line, self._stage))
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -155,7 +157,7 @@ def noted(job: Job) -> Iterator[None]:
 
 
 def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Callable[..., None]:
-    """Write the command line of a stage: its own parameters, its output, and a config where it takes one.
+    """Write the command line of a stage: its own parameters, its output, a config where it takes one, common options.
 
     Parameters
     ----------
@@ -163,39 +165,45 @@ def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Calla
         Gives the stage, when the command runs.
     """
     declared = any(each.name == "config" for each in line.parameters)
+    hints = {"config": ConfigArgument} if line.study and not declared else {}
+    hints |= {each.name: each.annotation for each in line.parameters}
+    arguments = [own for own, hint in hints.items() if is_argument(hint)]
+    shared = common_options(name, hints)
 
-    def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
+    def command(**given: Any) -> None:
+        common = Common(**{each.name: given.pop(each.name) for each in shared})
+        if "config" not in hints or (declared and given["config"] is None):
+            refuse_overrides(common)
+        check_order(name, {own: given[own] for own in arguments}, given.get("output"))
         with messages_for_errors():
-            from cpfls_cli.artifacts.output import locked
-
-            own = load()
-            narration = Narration(own.name, common.verbose and not common.quiet)
-            given |= {"config": config} if declared else {}
-            if (callable(own.study) and not own.study(given)) or (declared and config is None):
-                refuse_overrides(common)
-                config = None
-            if own.overrides:
-                common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
-            with nullcontext(_unshown) if own.output is False else progress_bar(own.name, common) as progress:
-                run = run_of(own, common, output, config, narration.reads, progress)
-                with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
-                    outcome = own.run(run, **given)
-            if output and not common.dry_run:
-                narration.wrote(output)
-            tell(outcome, common)
+            _run(load(), common, given, declared=declared)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    added = {"config": ConfigArgument} if line.study and not declared else {}
     option = line.output or (FilledOption if line.folder else FolderOption if line.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
     outputs = [] if line.output is False else [output.replace(default=None) if line.folder or line.output else output]
-    whole = [
-        *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
-        *(each.replace(kind=keyword) for each in line.parameters),
-        *outputs,
-        inspect.Parameter("common", keyword, annotation=Common),
-    ]
+    first = [] if declared or not line.study else [inspect.Parameter("config", keyword, annotation=ConfigArgument)]
+    whole = [*first, *(each.replace(kind=keyword) for each in line.parameters), *outputs, *shared]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in whole}
-    command.__name__ = name.replace("-", "_")
     return command
+
+
+def _run(own: Stage, common: Common, given: dict[str, Any], *, declared: bool) -> None:
+    """Run a stage as its command line says, and print what it says."""
+    from cpfls_cli.artifacts.output import locked
+
+    output, config = given.pop("output", None), given["config"] if declared else given.pop("config", None)
+    narration = Narration(own.name, common.verbose and not common.quiet)
+    if callable(own.study) and not own.study(given):
+        refuse_overrides(common)
+        config = None
+    if own.overrides:
+        common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
+    with nullcontext(_unshown) if own.output is False else progress_bar(own.name, common) as progress:
+        run = run_of(own, common, output, config, narration.reads, progress)
+        with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
+            outcome = own.run(run, **given)
+    if output and not common.dry_run:
+        narration.wrote(output)
+    tell(outcome, common)
