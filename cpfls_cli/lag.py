@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import exp
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -96,39 +94,6 @@ def lagged(values: Numbers, ratio: Any, between: Between = "cubic") -> Lagged:
     # The equation of the lag, averaged over the step.
     mean = _sum(_CURVES[between] @ (1.0 / np.arange(1, 5)), parts) - ratio * (end - start)
     return Lagged(mean, end, start)
-
-
-@dataclass
-class HeldLag:
-    """A first-order lag taken step by step: `lagged` of what stays the same during each step.
-
-    Attributes
-    ----------
-    ratio : float
-        tau in steps; 0 for none.
-    value : array
-        At the start of the next step.
-    """
-
-    ratio: float
-    value: Array
-
-    def middle(self, wanted: Array) -> Array:
-        """Take one step towards a value, and give what is reached in its middle."""
-        begin = self.value
-        self.value = after_step(begin, wanted, 1.0, self.ratio)
-        return after_step(begin, wanted, 0.5, self.ratio)
-
-
-def after_step(before: Array, wanted: Array, elapsed: float, time_constant: float) -> Array:
-    """Compute what a first-order lag has reached some time after a step, ``w + (b - w) exp(-t / tau)``.
-
-    Parameters
-    ----------
-    elapsed, time_constant : float
-        In one unit; a time constant of 0 is no lag.
-    """
-    return wanted if time_constant == 0 else np.asarray(wanted + (before - wanted) * exp(-elapsed / time_constant))
 
 
 def _moments(ratio: Any, decay: Any) -> Numbers:

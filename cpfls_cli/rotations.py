@@ -20,24 +20,17 @@ def rotation_matrix(attitude: Array) -> Array:
     array, shape (time, 3, 3)
         ``v_world = R @ v_body``.
     """
-    one = len(attitude) == 1
-    if one:
-        # At one instant NumPy spends ten times as long on its arrays as on what is in them.
-        (sr, sp, sy), (cr, cp, cy) = np.sin(attitude[0]).tolist(), np.cos(attitude[0]).tolist()
-    else:
-        (sr, cr), (sp, cp), (sy, cy) = ((np.sin(a), np.cos(a)) for a in attitude.T)
+    (sr, cr), (sp, cp), (sy, cy) = ((np.sin(a), np.cos(a)) for a in attitude.T)
     rows = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    return np.array(rows)[None] if one else np.array(rows).transpose(2, 0, 1)
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def cross(first: Array, second: Array) -> Array:
     """Compute the cross product along the last axis.
-
-    Bit for bit that of NumPy, which spends several times as long on its axes where there is one instant.
 
     Parameters
     ----------
@@ -48,10 +41,6 @@ def cross(first: Array, second: Array) -> Array:
     -------
     array, shape (..., 3)
     """
-    if first.size == second.size == 3:
-        (x, y, z), (p, q, r) = first.ravel().tolist(), second.ravel().tolist()
-        one = np.array([y * r - z * q, z * p - x * r, x * q - y * p])
-        return one if first.ndim == second.ndim == 1 else one.reshape(max(first.shape, second.shape, key=len))
     (a, b, c), (u, v, w) = ((each[..., 0], each[..., 1], each[..., 2]) for each in (first, second))
     along = b * w - c * v
     product = np.empty((*along.shape, 3))
@@ -168,12 +157,6 @@ def attitude_rate(attitude: Array, body_rate: Array) -> Array:
     array, shape (..., time, 3), rad/s
         Not finite where the pitch is exactly +-90 degrees.
     """
-    if attitude.size == body_rate.size == 3:
-        ((sr, sp, _),), ((cr, cp, _),) = np.sin(attitude).tolist(), np.cos(attitude).tolist()
-        if cp != 0.0:
-            ((p, q, r),) = body_rate.tolist()
-            yaw_rate = (sr * q + cr * r) / cp
-            return np.array([[p + sp * yaw_rate, cr * q - sr * r, yaw_rate]])
     (sr, cr), (sp, cp) = ((np.sin(a), np.cos(a)) for a in attitude.T[:2])
     p, q, r = (body_rate[..., axis] for axis in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):

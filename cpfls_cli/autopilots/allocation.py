@@ -87,7 +87,7 @@ class Allocation:
             # The stick's throttle is bent back, so that it hovers where it did.
             amount = self.curve.expo - 0.5 * self.curve.expo**2
             thrust = np.asarray(thrust) / (1 + amount * (1 - np.asarray(thrust)) ** 2)
-        return self.curve.signal(self.thrusts(thrust, turning), battery)
+        return np.asarray(self.curve.signal(self.thrusts(thrust, turning), battery))
 
     def limited(self, thrust: Array, turning: Array) -> Array:
         """Mark the samples that do not fit and are changed, shape (sample,)."""

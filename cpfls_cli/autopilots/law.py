@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
 from cpfls_cli.filters import SecondOrder
+from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import Functions, Value, Vector, dot, plus, times, transposed
 
 AXES = ("roll", "pitch", "yaw")
 FilterKind = Literal["first", "second", "notch"]
@@ -20,8 +24,6 @@ STAGES: tuple[Stage, ...] = ("measured", "target", "error", "slope", "output")
 _HIGHEST = 0.45
 """Frequency of a filter over that of the loop, above which it is taken to be there."""
 _BUTTERWORTH = 0.5**0.5
-PASSES = SecondOrder(np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), 1.0)
-"""A filter that changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -182,53 +184,8 @@ class Law:
         return self.axes[axis].rate_response(frequency, self.period, integrates_first=self.integrates_first)
 
 
-class _Chain:
-    """Filters of all three axes in series; the first value is where they have settled."""
-
-    def __init__(self, by_axis: list[tuple[Filter, ...]], period: float) -> None:
-        longest = max(len(each) for each in by_axis)
-        self._sections = [
-            _stacked([each[place].section(period) if place < len(each) else PASSES for each in by_axis])
-            for place in range(longest)
-        ]
-        self._states: list[Numbers] | None = None
-
-    def __call__(self, value: Array) -> Array:
-        if self._states is None:
-            # What stays the same passes unchanged, so all see this value.
-            self._states = [section.settled(value) for section in self._sections]
-        passed: Numbers = value
-        for place, section in enumerate(self._sections):
-            passed, self._states[place] = section.step(passed, self._states[place])
-        return np.asarray(passed)
-
-
-def _stacked(sections: list[SecondOrder]) -> SecondOrder:
-    over, under = (np.array([getattr(each, name) for each in sections]).T for name in ("over", "under"))
-    return SecondOrder(over, under, 1.0)
-
-
-@dataclass(frozen=True)
-class _Gains:
-    angle: Array
-    angle_integral: Array
-    angle_slope: Array
-    angle_integral_limit: Array
-    p: Array
-    i: Array
-    d: Array
-    ff: Array
-    integral_limit: Array
-    limit: Array
-    rate_limit: Array
-
-    @classmethod
-    def of(cls, axes: tuple[AxisLaw, ...]) -> _Gains:
-        return cls(**{name: np.array([getattr(axis, name) for axis in axes]) for name in cls.__dataclass_fields__})
-
-
 class Controller:
-    """The law of an autopilot with its state, for all three axes at once.
+    """The law of an autopilot with its state, for all three axes at once, step by step.
 
     Parameters
     ----------
@@ -238,83 +195,103 @@ class Controller:
     """
 
     def __init__(self, law: Law, period: float | None = None) -> None:
-        self._period = law.period if period is None else period
-        self._law, self._gains = law, _Gains.of(law.axes)
-        chains = {stage: [getattr(axis, stage) for axis in law.axes] for stage in STAGES}
-        self._filters = {stage: _Chain(filters, self._period) for stage, filters in chains.items()}
-        self._of_error = np.array([axis.slope_of_error for axis in law.axes])
-        self._integral, self._angle_integral = np.zeros(3), np.zeros(3)
-        self._before: Array | None = None
+        step = law.period if period is None else period
+        self._asking = Machine.of(lambda memory, given: _asked_rate(law, memory, given[:3], given[3:]), 6, step)
+        self._commanding = Machine.of(
+            lambda memory, given: _command(law, memory, given[:3], given[3:6], given[6:]), 9, step
+        )
 
-    def asked_rate(self, error: Array, body_rate: Array) -> Array:
-        """Turn the error of the attitude into a rate.
+    def asked_rate(self, error: Iterable[float], body_rate: Iterable[float]) -> Flat:
+        """Turn the error of the attitude into a rate, rad/s, body frame.
 
         Parameters
         ----------
-        error : array, shape (3,), rad, body frame
+        error : three floats, rad, body frame
             Rotation from the attitude to the asked one.
-        body_rate : array, shape (3,), rad/s
-
-        Returns
-        -------
-        array, shape (3,), rad/s, body frame
+        body_rate : three floats, rad/s
         """
-        gains = self._gains
-        grown = self._angle_integral + gains.angle_integral * error * self._period
-        self._angle_integral = _within(grown, gains.angle_integral_limit)
-        rate = gains.angle * error + self._angle_integral - gains.angle_slope * body_rate
-        return _within(rate, gains.rate_limit)
+        return self._asking.advance((*map(float, error), *map(float, body_rate)))
 
-    def command(self, asked: Array, gyroscope: Array, saturated: BoolArray | None = None) -> Array:
+    def command(
+        self, asked: Iterable[float], gyroscope: Iterable[float], saturated: Iterable[bool] | None = None
+    ) -> Flat:
         """Take one step of the rate control.
 
         Parameters
         ----------
-        asked, gyroscope : array, shape (3,), rad/s, body frame
-        saturated : array, shape (3,), or None
+        asked, gyroscope : three floats, rad/s, body frame
+        saturated : three bools, or None
             Where the motors did not follow the last command.
 
         Returns
         -------
-        array, shape (3,)
+        three floats
             Commands about the body axes, shares of the full ones.
         """
-        gains, filters = self._gains, self._filters
-        measured, target = filters["measured"](gyroscope), filters["target"](asked)
-        error = filters["error"](target - measured)
-        differed = np.where(self._of_error, error, -measured)
-        before = differed if self._before is None else self._before
-        slope = filters["slope"]((differed - before) / self._period)
-        self._before = differed
-        used = self._integral
-        self._integral = self._grown(error, saturated)
-        integral = self._integral if self._law.integrates_first else used
-        total = gains.p * error + integral + gains.d * slope + gains.ff * target
-        return _within(filters["output"](total), gains.limit)
-
-    def _grown(self, error: Array, saturated: BoolArray | None) -> Array:
-        gains = self._gains
-        step = gains.i * error * self._period
-        if saturated is not None and self._law.holds_integral:
-            step = np.where(saturated & (step * self._integral > 0), 0.0, step)
-        return _within(self._integral + step, gains.integral_limit)
+        held = (0.0, 0.0, 0.0) if saturated is None else map(float, saturated)
+        return self._commanding.advance((*map(float, asked), *map(float, gyroscope), *held))
 
 
-def _within(values: Array, limit: Array) -> Array:
-    # Of three numbers `np.clip` takes five times as long.
-    return np.minimum(np.maximum(values, -limit), limit)
+def _asked_rate(law: Law, memory: Memory, error: Vector, body_rate: Vector) -> Vector:
+    before = memory.recall([0.0] * 3)
+    grown = tuple(
+        _within(plus(had, times(axis.angle_integral * memory.step, off)), axis.angle_integral_limit)
+        for axis, had, off in zip(law.axes, before.values, error, strict=True)
+    )
+    before.keep(grown)
+    rates = (
+        plus(times(axis.angle, off), integral, times(-axis.angle_slope, rate))
+        for axis, off, integral, rate in zip(law.axes, error, grown, body_rate, strict=True)
+    )
+    return tuple(_within(rate, axis.rate_limit) for axis, rate in zip(law.axes, rates, strict=True))
 
 
-def attitude_error(rotation: Array, target: Array) -> Array:
-    """Rotate from an attitude to a target, twice the vector part of the quaternion, shape (3,), rad, body frame.
+def _command(law: Law, memory: Memory, asked: Vector, gyroscope: Vector, saturated: Vector) -> Vector:
+    axes = zip(law.axes, asked, gyroscope, saturated, strict=True)
+    return tuple(_axis_command(law, axis, memory, *given) for axis, *given in axes)
+
+
+def _axis_command(law: Law, axis: AxisLaw, memory: Memory, asked: Value, gyroscope: Value, saturated: Value) -> Value:
+    def passed(stage: Stage, value: Value) -> Value:
+        # What stays the same passes unchanged, so all see the first value as where they have settled.
+        out = value
+        for each in getattr(axis, stage):
+            out = memory.passed(each.section(memory.step), out, value)
+        return out
+
+    measured, target = passed("measured", gyroscope), passed("target", asked)
+    error = passed("error", target - measured)
+    differed = error if axis.slope_of_error else 0.0 - measured
+    before, integral = memory.recall((0.0,)), memory.recall((0.0,))
+    last = memory.functions.where(memory.first, differed, before.values[0])
+    before.keep((differed,))
+    slope = passed("slope", (differed - last) * (1 / memory.step))
+    (used,), step = integral.values, times(axis.i * memory.step, error)
+    if law.holds_integral:
+        grows = memory.functions.where(step * used > 0.0, 0.0, step)
+        step = memory.functions.where(saturated > 0.5, grows, step)
+    grown = _within(plus(used, step), axis.integral_limit)
+    integral.keep((grown,))
+    total = plus(
+        times(axis.p, error), grown if law.integrates_first else used, times(axis.d, slope), times(axis.ff, target)
+    )
+    return _within(passed("output", total), axis.limit)
+
+
+def _within(value: Value, limit: float) -> Value:
+    return SYMBOLS.smallest(SYMBOLS.largest(value, -limit), limit) if limit < inf else value
+
+
+def attitude_error(rotation: Sequence[Vector], target: Sequence[Vector], functions: Functions = SYMBOLS) -> Vector:
+    """Rotate from an attitude to a target, twice the vector part of the quaternion, rad, body frame.
 
     Parameters
     ----------
-    rotation, target : array, shape (3, 3)
+    rotation, target : rows of a matrix
         Body to world.
     """
-    turned = rotation.T @ target
-    vector = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
+    back, columns = transposed(rotation), transposed(target)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (tuple(dot(row, column) for column in columns) for row in back)
     # 2 sin(angle / 2) of the axis, from sin(angle) of it.
-    half = np.sqrt(max(1.0 + float(np.trace(turned)), 1e-6))
-    return np.asarray(vector / half)
+    half = functions.sqrt(functions.largest(1.0 + (xx + yy + zz), 1e-6))
+    return tuple(each / half for each in (zy - yz, xz - zx, yx - xy))

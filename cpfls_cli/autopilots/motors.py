@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from functools import cached_property, reduce
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Machine
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import ARRAYS, Functions, Value, Vector
 
 _CHANGE = 1e-4
 """Step of a derivative along a thrust curve."""
 _HALVES = 40
 """Times that the range is halved to invert a thrust curve that only grows."""
+_LEAST_YAW = 1e-12
+"""Share of the thrust of a rotor, up to which yaw does not need it."""
 _SHARES, _TRIED = np.linspace(0.0, 1.0, 101), 1e-3
 """Shares of the full thrust along which a curve is to make thrust straight, and the step in which it is looked for."""
 
@@ -38,16 +44,16 @@ class ThrustCurve:
     high: float = 1.0
     series: bool = False
 
-    def signal(self, thrust: Array, battery: Array | float = 1.0) -> Array:
+    def signal(self, thrust: Value, battery: Array | float = 1.0, functions: Functions = ARRAYS) -> Any:
         """Give the signals for shares of the full thrust.
 
         Parameters
         ----------
-        thrust : array, shape (..., rotor)
+        thrust : array, shape (..., rotor), or value by rotor
         battery : float or array, shape (..., 1)
             Voltage over that of the full battery, which the signals make good, as ArduPilot does; 1 where they do not.
         """
-        share = np.clip(thrust, 0.0, 1.0)
+        share = _clipped(thrust, functions)
         if self.series:
             share = self._reached(share)
         else:
@@ -55,24 +61,28 @@ class ThrustCurve:
             share = share * (self.expo * battery**2 + (1 - self.expo) * battery)
             if abs(self.expo) > 1e-9:
                 straight = 1 - self.expo
-                share = (np.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
-            share = np.minimum(share / battery, 1.0)
-        return np.asarray(self.low + (self.high - self.low) * share)
+                share = (functions.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
+            share = functions.smallest(share / battery, 1.0)
+        return self.low + (self.high - self.low) * share
 
-    def thrust(self, signal: Array) -> Array:
+    def thrust(self, signal: Value, functions: Functions = ARRAYS) -> Any:
         """Give the shares of the full thrust that lead to signals, shape (rotor,)."""
-        share = np.clip((np.asarray(signal) - self.low) / (self.high - self.low), 0.0, 1.0)
+        share = _clipped((signal - self.low) / (self.high - self.low), functions)
         if not self.series:
-            return np.asarray(self.expo * share**2 + (1 - self.expo) * share)
-        low, high = np.zeros_like(share), np.ones_like(share)
+            return self.expo * share**2 + (1 - self.expo) * share
+        low, high = 0.0 * share, 0.0 * share + 1.0
         for _ in range(_HALVES):
             middle = 0.5 * (low + high)
             beyond = self._reached(middle) > share
-            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-        return np.asarray(0.5 * (low + high))
+            low, high = functions.where(beyond, low, middle), functions.where(beyond, middle, high)
+        return 0.5 * (low + high)
 
-    def _reached(self, share: Array) -> Array:
+    def _reached(self, share: Value) -> Value:
         return share * (1 + self.expo * (1 - share) ** 2)
+
+
+def _clipped(share: Value, functions: Functions) -> Value:
+    return functions.smallest(functions.largest(share, 0.0), 1.0)
 
 
 def straightening(curve: ThrustCurve, linear: float, most: float) -> float:
@@ -201,21 +211,38 @@ class Motors:
 
     def speeds(self, thrust: float, turning: Array) -> Mixed:
         """Mix thrust, a share of the full one, and commands about the body axes, shape (3,)."""
-        base = self.mix[:, 0] * min(max(thrust, 0.0), 1.0)
-        tilt, yaw = self.mix[:, 1:3] @ turning[:2], self.mix[:, 3] * turning[2]
-        share = _room(base + tilt, yaw)
-        shares = base + tilt + share * yaw
-        over, under = max(float(shares.max()) - 1.0, 0.0), max(-float(shares.min()), 0.0)
+        out, rotors = np.array(self._machine.advance((thrust, *turning))), len(self.mix)
+        return Mixed(out[:rotors], out[rotors:-2], np.array([out[-2], out[-2], out[-1]]) > 0.0)
+
+    @cached_property
+    def _machine(self) -> Machine:
+        return Machine.of(lambda _memory, given: self._mixed(given[0], given[1:]), 4)
+
+    def _mixed(self, thrust: Value, turning: Vector) -> Vector:
+        """Give speeds, shares of thrust wanted, and 1 where roll and pitch, and where yaw, are cut."""
+        functions = SYMBOLS
+        lift, roll, pitch, yawing = (functions.rotors(column) for column in self.mix.T.tolist())
+        upright = lift * _clipped(thrust, functions) + roll * turning[0] + pitch * turning[1]
+        yaw = yawing * turning[2]
+        share: Value = 1.0
+        # The part of the yaw command that fits between 0 and 1.
+        for straight, turned in zip(upright, yaw, strict=True):
+            size = functions.absolute(turned)
+            room = functions.where(turned > 0.0, 1.0 - straight, straight) / functions.largest(size, _LEAST_YAW)
+            share = functions.where(size > _LEAST_YAW, functions.smallest(room, share), share)
+        share = functions.largest(share, 0.0)
+        shares = upright + share * yaw
+        largest, smallest = (reduce(choose, shares) for choose in (functions.largest, functions.smallest))
         # Where one end is exceeded the whole moves; where both are, roll and pitch are cut.
-        both = float(np.ptp(shares)) > 1.0
-        shares = shares - over + under if not both else shares
-        wanted = base + tilt + yaw
-        saturated = np.array([both, both, share < 1.0])
-        return Mixed(self.curve.signal(shares) * self.speed_max, wanted, saturated)
+        both = largest - smallest > 1.0
+        moved = functions.largest(0.0 - smallest, 0.0) - functions.largest(largest - 1.0, 0.0)
+        speed = self.curve.signal(shares + functions.where(both, 0.0, moved), functions=functions) * self.speed_max
+        cut = functions.where(both, 1.0, 0.0), functions.where(share < 1.0, 1.0, 0.0)
+        return *speed, *(upright + yaw), *cut
 
     def share_of(self, speed: float) -> float:
         """Give the share of the full thrust that is asked for to turn all rotors at a speed, rad/s."""
-        return float(self.curve.thrust(np.array(speed / self.speed_max)))
+        return float(self.curve.thrust(speed / self.speed_max))
 
     def speed_at(self, share: float) -> float:
         """Give the speed of rotors at a share of the full thrust, rad/s."""
@@ -226,12 +253,3 @@ class Motors:
         ends = min(max(share, _CHANGE), 1 - _CHANGE) + np.array([-_CHANGE, _CHANGE])
         low, high = self.curve.signal(ends)
         return float((high - low) / (2 * _CHANGE) * self.speed_max)
-
-
-def _room(shares: Array, yaw: Array) -> float:
-    """Give the part of a yaw command, at most 1, that fits between 0 and 1."""
-    turned = np.abs(yaw) > 1e-12
-    if not turned.any():
-        return 1.0
-    room = np.where(yaw > 0, 1.0 - shares, shares)[turned] / np.abs(yaw)[turned]
-    return float(np.clip(room.min(), 0.0, 1.0))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.lag import delayed
+from cpfls_cli.vehicle.stepping import Memory, RotorMotion
 
 _HIGHEST = 0.45
 """Frequency of a filter over that of the sampling, above which it is taken to be there."""
@@ -42,35 +40,6 @@ def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
     return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
 
 
-@dataclass
-class DelayLine:
-    """Rotors behind a delay, step by step, in straight lines; before the first have arrived they keep their speed.
-
-    Attributes
-    ----------
-    steps : float
-        Delay in steps, at least 0.
-    past : list of RotorMotion
-        What is still under way.
-    """
-
-    steps: float
-    past: list[RotorMotion] = field(default_factory=list)
-
-    def __call__(self, rotors: RotorMotion) -> RotorMotion:
-        """Take up the rotors of a step, and give those that arrive."""
-        if self.steps == 0:
-            return rotors
-        self.past.append(rotors)
-        whole = int(self.steps)
-        del self.past[: max(len(self.past) - whole - 2, 0)]
-        first, second = self.past[0], self.past[min(1, len(self.past) - 1)]
-        if len(self.past) < whole + 2:
-            return RotorMotion(first.speed, np.zeros_like(first.speed))
-        share = self.steps - whole
-        return RotorMotion(*((1 - share) * new + share * old for old, new in zip(first, second, strict=True)))
-
-
 @dataclass(frozen=True)
 class CommandFilter:
     """A second-order filter between command and rotors, with the functions that an effect is made of.
@@ -93,16 +62,6 @@ class CommandFilter:
         """Filter what drives the rotors of a flight."""
         return with_actuation(signals, self._passing(shape, signals.period).along)
 
-    def link(self, values: Mapping[str, float], step: float) -> Link:
-        """Filter speeds and accelerations of the rotors, which were settled before the first step."""
-        passing = self._passing(values, step)
-        state: list[Array] = []
-
-        def link(rotors: RotorMotion) -> RotorMotion:
-            now = np.concatenate([rotors.speed, rotors.acceleration])
-            if not state:
-                state.append(passing.settled(np.concatenate([rotors.speed, np.zeros_like(rotors.acceleration)])))
-            passed, state[0] = passing.step(now, state[0])
-            return RotorMotion(*np.split(passed, 2))
-
-        return link
+    def link(self, rotors: RotorMotion, values: Mapping[str, float], memory: Memory) -> RotorMotion:
+        """Filter speeds and accelerations of the rotors."""
+        return memory.filtered(self._passing(values, memory.step), rotors)

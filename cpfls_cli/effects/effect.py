@@ -9,10 +9,12 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.effects.hooks import Actuation, CarriedBody, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
+from cpfls_cli.effects.hooks import Actuation, Body, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench, about_centre
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import Linear, Vector, zero
 
 Kind = Literal["wrench", "actuator", "sensor", "parameter"]
 
@@ -159,7 +161,7 @@ class Effect:
         Effects that look alike, each with the flight that tells them apart.
     columns : callable or None
         ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
-        None for what only the audit of the sensors can see.
+        Left out, it follows from `acts`; None for what only the audit of the sensors can see.
     physical : PhysicalNumbers or None
         None: the linear coefficients are the physical ones, whose bounds bound them.
     apply : callable or None
@@ -180,9 +182,13 @@ class Effect:
         Whether the columns have a lever for the forces of all other effects.
     actuation : Actuation or None
         For effects between command and rotors: how they are simulated.
-    carried : callable or None
-        For effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of the
-        columns.
+    acts : callable or None
+        ``acts(see, p) -> Wrench`` at an instant, of its numbers by name: what is simulated. None for what changes only
+        the log or the actuators, or has a state of its own.
+    air : callable or None
+        ``air(values)``: velocity of the air that all effects meet, m/s, world frame.
+    carried : Body or None
+        For effects with a state of their own, in place of `acts`.
     log : SensorLog or None
         For effects on the log: how they are simulated.
     test : SensorTest or None
@@ -222,7 +228,9 @@ class Effect:
     order: int = 1000
     of_all_forces: bool = False
     actuation: Actuation | None = None
-    carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
+    acts: Callable[[Instant, Numbers], Wrench] | None = None
+    air: Callable[[Mapping[str, float]], tuple[float, float, float]] | None = None
+    carried: Body | None = None
     log: SensorLog | None = None
     test: SensorTest | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
@@ -231,10 +239,12 @@ class Effect:
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
 
     def __post_init__(self) -> None:
-        """Give an actuator the change of wrench as its column."""
+        """Give an actuator the change of wrench as its column, and others what they do for one unit of each number."""
         apply = self.apply
         if self.columns is None and self.kind == "actuator" and apply is not None:
             object.__setattr__(self, "columns", lambda signals, shape: wrench_change(signals, apply(signals, shape)))
+        elif self.columns is None and self.acts is not None:
+            object.__setattr__(self, "columns", columns_of(self.acts, [each.name for each in self.coefficients]))
 
     @property
     def unit_coefficient(self) -> bool:
@@ -262,6 +272,32 @@ class Effect:
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that the effect needs and the flight lacks."""
         return tuple(sorted(self.needs - signals.available))
+
+
+def columns_of(
+    acts: Callable[[Instant, Numbers], Wrench], names: Sequence[str]
+) -> Callable[[Signals, Mapping[str, float]], Columns]:
+    """Make columns of what an effect does at an instant, which is linear in the coefficients of these names."""
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        see, unit = signals.instants, {name: Linear({place: 1.0}) for place, name in enumerate(names)}
+        given = acts(see, Numbers({**shape, **unit}))
+        torque, force = about_centre(see, given)
+        direct = _filled((*torque, *force), len(signals), names)
+        turns = not all(map(zero, given.momentum))
+        return Columns(direct, _filled(given.momentum, len(signals), names) if turns else None)
+
+    return columns
+
+
+def _filled(components: Vector, samples: int, names: Sequence[str]) -> Array:
+    """Arrange components as columns, shape (time, 6, coefficient)."""
+    filled = np.zeros((samples, 6, max(len(names), 1)))
+    for row, component in enumerate(components):
+        by = component.by if isinstance(component, Linear) else {0: component}
+        for place, values in by.items():
+            filled[:, row, place] = values
+    return filled
 
 
 def stack(*wrenches: Array) -> Array:
@@ -331,23 +367,6 @@ def thrust_wrench(hubs: Array, thrust: Array) -> Array:
 def wrench_change(before: Signals, after: Signals) -> Columns:
     """Compute the change of wrench by another actuation as a column."""
     return Columns(stack(after.wrench - before.wrench))
-
-
-def thrust_column(signals: Signals, thrust: Array) -> Columns:
-    """Make a column of changes of thrust, shape (time, rotor), N."""
-    return Columns(stack(thrust_wrench(signals.hubs, thrust)))
-
-
-def torque_column(torque: Array) -> Columns:
-    """Make a column of a body torque, shape (time, 3), N m."""
-    return Columns(stack(wrench(torque)))
-
-
-def torque_by_axis(torque: Array) -> Columns:
-    """Make three columns of a body torque, shape (time, 3), N m: one for each axis."""
-    direct = np.zeros((len(torque), 6, 3))
-    direct[:, :3] = torque[:, :, None] * np.eye(3)
-    return Columns(direct)
 
 
 def a_few_percent(_number: str, _values: Mapping[str, float]) -> float:

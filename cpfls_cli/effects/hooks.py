@@ -4,30 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Memory, RotorMotion
+from cpfls_cli.vehicle.values import Value, Vector
 
-
-class RotorMotion(NamedTuple):
-    """Rotors in the middle of a step.
-
-    Attributes
-    ----------
-    speed : array, shape (rotor,), rad/s
-    acceleration : array, shape (rotor,), rad/s^2
-    """
-
-    speed: Array
-    acceleration: Array
-
-
-Link = Callable[[RotorMotion], RotorMotion]
-"""A link of the actuator chain; called once in each step, it may keep a state."""
+Link = Callable[[RotorMotion, Mapping[str, float], Memory], RotorMotion]
+"""A link of the actuator chain, of its values; it keeps in the memory what the next step needs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,17 +28,17 @@ class Actuation:
     lag : callable or None
         ``lag(values) -> float``: time constant in s that replaces that of the rotors.
     link : callable or None
-        ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
+        ``link(rotors, values, memory) -> RotorMotion`` after the lag, at each step.
     delay : callable or None
         ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
     supply : callable or None
-        ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
+        ``supply(values, voltage)``: factor on the rotor speed at a share of the full voltage, which is logged.
     """
 
     lag: Callable[[Mapping[str, float]], float] | None = None
-    link: Callable[[Mapping[str, float], float], Link] | None = None
+    link: Link | None = None
     delay: Callable[[Mapping[str, float]], float] | None = None
-    supply: Callable[[Mapping[str, float], float], float] | None = None
+    supply: Callable[[Mapping[str, float], Value], Value] | None = None
 
 
 class PhysicalNumbers(NamedTuple):
@@ -85,57 +74,19 @@ class VehicleParts(NamedTuple):
     effects: tuple[tuple[str, Mapping[str, float], Array], ...] = ()
 
 
-class Carrier(NamedTuple):
-    """The vehicle that carries a body.
+class Body(NamedTuple):
+    """A body with a state of its own on the vehicle.
 
     Attributes
     ----------
-    mass : float, kg
-    inertia : array, shape (3, 3), kg m^2, body frame
-    rotation : array, shape (3, 3)
-        Body to world.
-    body_rate : array, shape (3,), rad/s, body frame
-    acceleration : array, shape (3,), m/s^2, world frame
-        Without the carried body.
-    turning : array, shape (3,), rad/s^2, body frame
-        The same.
+    pull : callable
+        ``pull(see, p, state, carrier) -> Pull``, see `Carried`.
+    start : tuple of float
+        Its state at the start.
     """
 
-    mass: float
-    inertia: Array
-    rotation: Array
-    body_rate: Array
-    acceleration: Array
-    turning: Array
-
-
-class Pull(NamedTuple):
-    """Acceleration of the carrier by a carried body, and the derivative of its state.
-
-    Attributes
-    ----------
-    acceleration : array, shape (3,), m/s^2, world frame
-    turning : array, shape (3,), rad/s^2, body frame
-    change : array, shape (state,)
-        Derivative of the state of the body.
-    """
-
-    acceleration: Array
-    turning: Array
-    change: Array
-
-
-class CarriedBody(Protocol):
-    """A body with a state of its own on the vehicle."""
-
-    @property
-    def start(self) -> Array:
-        """State at the start, shape (state,)."""
-        ...
-
-    def pull(self, carrier: Carrier, state: Array) -> Pull:
-        """Compute the pull on a carrier."""
-        ...
+    pull: Callable[[Instant, Numbers, Vector, Carrier], Pull]
+    start: tuple[float, ...]
 
 
 class TrueMotion(NamedTuple):

@@ -11,8 +11,10 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.vehicle.motion import Instant
 from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import ARRAYS, Value
 
 _T = TypeVar("_T")
 
@@ -24,10 +26,6 @@ _OF_MOTION = (
     *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
 )
 """Cached properties that no rotor speed changes."""
-_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")
-"""Cached properties that no motion changes."""
-_OF_FORCE = ("force", "available", "of_motion", "made")
-"""What is kept of a flight and may hang on the force that is felt."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,6 +205,11 @@ class Signals:
         return self.ground_velocity if self.wind is None else self.ground_velocity - self.wind @ self.rotation
 
     @cached_property
+    def instants(self) -> Instants:
+        """See what effects see, at all samples."""
+        return Instants(self)
+
+    @cached_property
     def of_motion(self) -> dict[Hashable, Array]:
         """Keep what effects derive from the motion alone, for the same flight with other rotor speeds."""
         return {}
@@ -277,26 +280,45 @@ class Signals:
         return changed
 
 
-_FIELDS = tuple(each.name for each in fields(Signals))
+class _Taken:
+    """An attribute of `Instants` that follows from its signals, when it is asked for, and is kept."""
+
+    def __init__(self, make: Callable[[Signals], Value]) -> None:
+        self._make = make
+
+    def __set_name__(self, _owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, _owner: type) -> Any:
+        found = instance.__dict__[self._name] = self._make(instance.signals)
+        return found
 
 
-def at_another_instant(signals: Signals, channels: Mapping[str, Array]) -> Signals:
-    """Exchange channels of one instant; what follows from the vehicle alone is kept.
+class Instants(Instant):
+    """What effects see at all samples of a flight, as far as it is known; arrays by rotor have the rotors first.
 
-    A simulation does so at each of its steps, where `replace` takes as long as all that is computed.
+    Thrust and torque of the rotors are as stated where their speeds are not known, with what else is known.
     """
-    changed = object.__new__(Signals)
-    changed.__dict__.update({name: getattr(signals, name) for name in (*_FIELDS, *_OF_VEHICLE)}, **channels)
-    return changed
+
+    def __init__(self, signals: Signals) -> None:
+        self.__dict__.update(signals=signals, vehicle=signals.vehicle, functions=ARRAYS)
+
+    air_velocity: Any = _Taken(lambda signals: tuple(signals.air_velocity.T))
+    body_rate: Any = _Taken(lambda signals: tuple(signals.body_rate.T))
+    attitude: Any = _Taken(lambda signals: tuple(_known(signals.attitude).T))
+    rotation: Any = _Taken(lambda signals: tuple(map(tuple, np.moveaxis(signals.rotation, 0, 2))))
+    force: Any = _Taken(lambda signals: tuple(signals.force.T))
+    thrust: Any = _Taken(lambda signals: signals.wrench[:, 5])
+    rotor_torque: Any = _Taken(lambda signals: tuple(signals.wrench[:, :3].T))
+    rotor_speed: Any = _Taken(lambda signals: signals.speed.T)
+    rotor_thrust: Any = _Taken(lambda signals: signals.rotor_thrust.T)
+    hub_height: Any = _Taken(lambda signals: signals.hub_height.T)
+    hub_velocity: Any = _Taken(lambda signals: tuple(np.moveaxis(signals.hub_velocity, (0, 1, 2), (2, 1, 0))))
 
 
-def feeling(signals: Signals, specific_force: Array) -> Signals:
-    """Exchange the specific force, shape (time, 3), m/s^2, and keep all that does not follow from it."""
-    changed = object.__new__(Signals)
-    changed.__dict__.update(signals.__dict__, specific_force=specific_force)
-    for name in _OF_FORCE:
-        changed.__dict__.pop(name, None)
-    return changed
+def _known(values: Array | None) -> Array:
+    assert values is not None, "an effect that needs it declares so"
+    return values
 
 
 def stretch_of(signals: Signals, part: slice) -> Signals:

@@ -9,7 +9,7 @@ path, or what was asked for, tell the parts, so that no gust is mistaken for the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -19,6 +19,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import Functions, Vector, plus, times
 
 _BEGIN_S = (0.15, 0.6)
 """Where the memory begins."""
@@ -88,16 +90,9 @@ class Lack:
     def drawn(self, model: VehicleModel, rng: np.random.Generator, step: float, count: int) -> DrawnLack:
         """Draw it for a flight of the model, whose parts these are, at instants a step apart, s."""
         process = Gusts.known(np.where(np.isfinite(self.memory), 1.0, np.nan), self.memory)
-        weights = np.array([model.parts[name] for name in self.part])
-        alike = np.stack([weights[..., 0], *(weights[..., own].sum(axis=-1) for own in _powers(model.rotors))])
         share, rest = np.zeros((len(self.part), len(GUST_AXES))), np.zeros(len(GUST_AXES))
         share[:, : len(self.rest)], rest[: len(self.rest)] = np.nan_to_num(self.share).T, np.nan_to_num(self.rest)
-        return DrawnLack(model, process.drawn(rng, step, count), alike, share, rest)
-
-
-def _powers(rotors: int) -> tuple[slice, slice]:
-    """Place the speeds of rotors and their squares among the terms of the rotors."""
-    return slice(1, 1 + rotors), slice(1 + rotors, 1 + 2 * rotors)
+        return DrawnLack(model, process.drawn(rng, step, count), self.part, share, rest)
 
 
 @dataclass(frozen=True)
@@ -108,31 +103,36 @@ class DrawnLack:
     ----------
     unit : array, shape (step, 6)
         Of unit size.
-    weights : array, shape (3, part, 6, term)
-        Of what each part gives by the terms of the motion, for powers 0 to 2 of the speed that all rotors have.
+    part : tuple of str
+        Of the model.
     share : array, shape (part, 6)
     rest : array, shape (6,), N m and N
     """
 
     model: VehicleModel
     unit: Array
-    weights: Array
+    part: tuple[str, ...]
     share: Array
     rest: Array
 
-    def at(self, number: int, velocity: Array, speed: Array) -> Array:
-        """Give torque and force at a step, shape (6,), N m and N, body frame.
+    def at(self, unit: Vector, given: Mapping[str, tuple[Vector, Vector]], functions: Functions = SYMBOLS) -> Vector:
+        """Give torque and force, N m and N, body frame.
 
         Parameters
         ----------
-        velocity : array, shape (3,), m/s, body frame
-            Through the air.
-        speed : array, shape (rotor,), rad/s
+        unit : vector of 6
+            Of unit size, at a step.
+        given : mapping of str to tuple of vector
+            Torque and force that each part of the model gives there.
         """
-        square = float((speed**2).mean())
-        terms = self.model.table.terms(velocity[None], np.zeros((1, 3)))[0]
-        given = np.tensordot([1.0, np.sqrt(square), square], self.weights, 1) @ terms
-        return np.asarray(self.unit[number] * np.sqrt(self.rest**2 + ((self.share * given) ** 2).sum(axis=0)))
+        squares = [square * square for square in self.rest.tolist()]
+        for name, shares in zip(self.part, self.share.tolist(), strict=True):
+            parts = (*given[name][0], *given[name][1])
+            squares = [
+                plus(square, times(share * share, own**2))
+                for square, share, own in zip(squares, shares, parts, strict=True)
+            ]
+        return tuple(times(functions.sqrt(square), each) for square, each in zip(squares, unit, strict=True))
 
 
 def lack_of(power: Array, squares: Array, known: Array, rest: Rest) -> AxisLack:

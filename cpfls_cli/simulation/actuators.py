@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
-from math import prod, sqrt
+from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import DelayLine
-from cpfls_cli.effects.hooks import Link, RotorMotion
+from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.lag import HeldLag
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Memory, RotorMotion
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import Functions, Value, Vector, dot, times, transposed
 
 # Of a squared speed, in parts of the largest.
 _ROUNDING = 1e-12
@@ -41,22 +42,29 @@ class Mixer:
     inverse: Array
     limit: float
 
-    def demand(self, wrench: Array) -> Array:
-        """Compute the squared speeds that a wrench, shape (4,), asks for, whether possible or not, rad^2/s^2."""
-        return np.asarray(wrench @ self.inverse)
+    def mixed(self, wrench: Vector, functions: Functions = SYMBOLS) -> tuple[Value, Value]:
+        """Find rotor speeds for a wrench, thrust in N and torque in N m.
 
-    def command(self, wrench: Array) -> Array:
-        """Compute the possible rotor speeds, shape (rotor,), rad/s, nearest to a wrench, shape (4,)."""
-        limit, share = self.limit, 1.0
-        upright_all, yaw_all = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
-        # Four numbers take NumPy longer than Python.
-        by_rotor = list(zip(upright_all.tolist(), yaw_all.tolist(), strict=True))
-        for upright, yaw in by_rotor:
-            # What yaw does not change by more than rounding sets no limit.
-            if abs(yaw) > _ROUNDING * limit:
-                share = min(share, (limit - upright if yaw > 0 else upright) / abs(yaw))
-        share = max(share, 0.0)
-        return np.array([sqrt(min(max(upright + share * yaw, 0.0), limit)) for upright, yaw in by_rotor])
+        Returns
+        -------
+        speed : value by rotor, rad/s
+            What is possible.
+        demand : value by rotor, rad^2/s^2
+            Squared speeds that the wrench asks for, whether possible or not.
+        """
+        by_rotor = transposed(self.inverse.tolist())
+        upright = functions.rotors(dot(wrench[:3], own[:3]) for own in by_rotor)
+        yaw = functions.rotors(times(wrench[3], own[3]) for own in by_rotor)
+        share: Value = 1.0
+        # What yaw does not change by more than rounding sets no limit.
+        least = _ROUNDING * self.limit
+        for straight, turning in zip(upright, yaw, strict=True):
+            size = functions.absolute(turning)
+            room = functions.where(turning > 0.0, self.limit - straight, straight) / functions.largest(size, least)
+            share = functions.where(size > least, functions.smallest(room, share), share)
+        share = functions.largest(share, 0.0)
+        squared = functions.smallest(functions.largest(upright + share * yaw, 0.0), self.limit)
+        return functions.sqrt(squared), upright + yaw
 
 
 def mixer(vehicle: VehicleSettings) -> Mixer:
@@ -93,134 +101,87 @@ class Battery:
     duration: float
     hover_cubed: float
 
-    def voltage(self, time: float, rotor_speed: Array) -> float:
-        """Compute the voltage some time after take-off, s, at rotor speeds, shape (rotor,), rad/s."""
-        power = float((rotor_speed**3).sum()) / self.hover_cubed
-        return max(1 - self.use * time / self.duration - self.load * (power - 1), _LOWEST_VOLTAGE)
+    def voltage(self, time: Value, rotor_speed: Value, functions: Functions) -> Value:
+        """Compute the voltage some time after take-off, s, at rotor speeds, rad/s."""
+        power = functions.total(rotor_speed**3) * (1 / self.hover_cubed)
+        left = 1 - (self.use / self.duration) * time - self.load * (power - 1)
+        return functions.largest(left, _LOWEST_VOLTAGE)
 
 
-@dataclass(frozen=True)
-class Rotors:
-    """Rotors in the middle of a step.
+class Rotors(NamedTuple):
+    """Rotors in the middle of a step, each a value by rotor but for the voltage.
 
     Attributes
     ----------
-    command : array, shape (rotor,), rad/s
-    lagged : array, shape (rotor,), rad/s
+    lagged : rad/s
         The command after the lag.
-    measured : array, shape (rotor,), rad/s
+    measured : rad/s
         Speed that is logged: at the end of the chain.
-    speed, acceleration : array, shape (rotor,), rad/s and rad/s^2
+    speed, acceleration : rad/s and rad/s^2
         What acts: the same, or later where the model of a whole vehicle says so.
-    slow : array, shape (rotor,), rad^2/s^2
-        Squared speed that slow actuation has come to.
-    voltage : float
+    slow : rad^2/s^2
+        Squared speed that slow actuation has come to; 0 without any.
+    voltage : value
         Share of the full battery.
     """
 
-    command: Array
-    lagged: Array
-    measured: Array
-    speed: Array
-    acceleration: Array
-    slow: Array
-    voltage: float
-
-    @classmethod
-    def settled(cls, speed: Array) -> Rotors:
-        """Turn at constant speeds, with a full battery."""
-        return cls(speed, speed, speed, speed, np.zeros_like(speed), speed**2, 1.0)
+    lagged: Value
+    measured: Value
+    speed: Value
+    acceleration: Value
+    slow: Value
+    voltage: Value
 
 
-@dataclass
-class Response:
-    """Delay, lag and slow actuation of the model of a whole vehicle, behind the speed that is logged.
-
-    Attributes
-    ----------
-    lag, slow : HeldLag
-        Of speeds in rad/s, and of squared speeds in rad^2/s^2.
-    step : float, s
-    """
-
-    delay: DelayLine
-    lag: HeldLag
-    slow: HeldLag
-    step: float
-
-    @classmethod
-    def of(cls, response: RotorResponse, step: float, speed: Array) -> Response:
-        """Begin as if the rotors had long turned at a speed, shape (rotor,), rad/s."""
-        lag, slow = HeldLag(response.lag_s / step, speed), HeldLag(response.slow_s / step, speed**2)
-        return cls(DelayLine(response.delay_s / step), lag, slow, step)
-
-    def advance(self, measured: RotorMotion) -> tuple[RotorMotion, Array]:
-        """Take one step, exactly for speeds that stay the same during it.
-
-        Parameters
-        ----------
-        measured : RotorMotion
-            In the middle of the step.
-
-        Returns
-        -------
-        acting : RotorMotion
-        slow : array, shape (rotor,), rad^2/s^2
-        """
-        acting = self.delay(measured)
-        if self.lag.ratio > 0:
-            acting = _behind(self.lag, acting.speed, self.step)
-        return acting, self.slow.middle(acting.speed**2)
-
-
-def _behind(lag: HeldLag, wanted: Array, step: float) -> RotorMotion:
-    """Take one step of rotors behind a lag."""
-    reached = lag.middle(wanted)
-    return RotorMotion(reached, (wanted - reached) / (lag.ratio * step))
-
-
-@dataclass
+@dataclass(frozen=True)
 class Actuators:
-    """First-order lag, then the links of effects, then what the battery leaves; the state moves on with each step.
+    """First-order lag, then the links of effects, then what the battery leaves, then the response of a whole vehicle.
 
     Attributes
     ----------
-    lag : HeldLag
-        Of the commanded speeds, rad/s.
-    supplies : tuple of callable
-        Factors on the speed at a voltage.
-    step : float, s
-    response : Response
-        Of the model of a whole vehicle.
-    steps : int
-        Taken so far.
+    lag : float, s
+        Time constant behind the command.
+    acting : tuple of (Actuation, mapping of str to float)
+        What effects do between command and rotors, with their values.
+    response : RotorResponse
+        Of the model of a whole vehicle, behind the speed that is logged.
+    start : array, shape (rotor,), rad/s
+        At which the rotors have long turned before the first step.
     """
 
-    lag: HeldLag
-    links: tuple[Link, ...]
-    supplies: tuple[Callable[[float], float], ...]
+    lag: float
+    acting: tuple[tuple[Actuation, Mapping[str, float]], ...]
     battery: Battery
-    step: float
-    response: Response
-    steps: int = 0
+    response: RotorResponse
+    start: Array
 
-    def advance(self, command: Array) -> Rotors:
-        """Take one step, exactly for a command that stays the same during it.
-
-        Parameters
-        ----------
-        command : array, shape (rotor,), rad/s
-            In the middle of the step, as is what is returned.
-        """
-        lagged = motion = _behind(self.lag, command, self.step)
-        self.steps += 1
-        for link in self.links:
-            motion = link(motion)
-        voltage = self.battery.voltage((self.steps - 0.5) * self.step, motion.speed)
-        factor = prod(supply(voltage) for supply in self.supplies)
+    def rotors(self, command: Value, memory: Memory) -> Rotors:
+        """Take one step, exactly for a command, rad/s, that stays the same during it."""
+        start, functions = self.start.tolist(), memory.functions
+        motion = _behind(command, self.lag, start, memory)
+        lagged = motion.speed
+        for actuation, values in self.acting:
+            if actuation.link is not None:
+                motion = actuation.link(motion, values, memory)
+        voltage = self.battery.voltage((memory.number + 0.5) * memory.step, motion.speed, functions)
+        supplies = [(each.supply, values) for each, values in self.acting if each.supply is not None]
+        factor = prod(supply(values, voltage) for supply, values in supplies)
         measured = RotorMotion(factor * motion.speed, factor * motion.acceleration)
-        acting, slow = self.response.advance(measured)
-        return Rotors(command, lagged.speed, measured.speed, acting.speed, acting.acceleration, slow, voltage)
+        response = self.response
+        acting = memory.delayed(measured, response.delay_s / memory.step)
+        if response.lag_s > 0:
+            acting = _behind(acting.speed, response.lag_s, start, memory)
+        slow: Value = 0
+        if response.slow_roll_pitch or response.slow_yaw:
+            squares = (self.start**2).tolist()
+            slow = memory.lagged(acting.speed**2, response.slow_s / memory.step, squares)
+        return Rotors(lagged, measured.speed, acting.speed, acting.acceleration, slow, voltage)
+
+
+def _behind(wanted: Value, time_constant: float, start: list[float], memory: Memory) -> RotorMotion:
+    """Put rotors behind a lag, s."""
+    reached = memory.lagged(wanted, time_constant / memory.step, start)
+    return RotorMotion(reached, (wanted - reached) * (1 / time_constant))
 
 
 def actuators(
@@ -229,7 +190,6 @@ def actuators(
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
     speed: Array,
-    step: float,
     duration: float,
 ) -> Actuators:
     """Build the actuator chain of a vehicle with its effects.
@@ -240,17 +200,10 @@ def actuators(
         Behind the speeds that are logged.
     speed : array, shape (rotor,), rad/s
         At the start.
-    step, duration : float, s
+    duration : float, s
     """
-    listed = effects.ordered
-    acting = [(one.effect.actuation, one.values) for one in listed if one.effect.actuation is not None]
+    acting = [(one.effect.actuation, one.values) for one in effects.ordered if one.effect.actuation is not None]
     lags = [each.lag(values) for each, values in acting if each.lag is not None]
     hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
-    return Actuators(
-        lag=HeldLag((lags[-1] if lags else settings.rotor_time_constant_s) / step, speed),
-        links=tuple(each.link(values, step) for each, values in acting if each.link is not None),
-        supplies=tuple(partial(each.supply, values) for each, values in acting if each.supply is not None),
-        battery=Battery(settings.battery_use, settings.battery_load, duration, hover),
-        step=step,
-        response=Response.of(response, step, speed),
-    )
+    battery = Battery(settings.battery_use, settings.battery_load, duration, hover)
+    return Actuators(lags[-1] if lags else settings.rotor_time_constant_s, tuple(acting), battery, response, speed)

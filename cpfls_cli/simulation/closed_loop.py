@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import ceil, cos, pi
+from math import ceil, cos, isfinite
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -12,24 +12,36 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
-from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, integration_rate, law_pilot
+from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
+from cpfls_cli.simulation.autopilot import Autopilot, PlanPilot, plan_of
+from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, along_path, integration_rate, law_pilot
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
+    TURNING_NUMBERS,
+    Plant,
+    acting_of,
+    flown_vehicle,
+    given_turning,
+    turning_of,
+)
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.trajectory.planning import sample_interval
+from cpfls_cli.vehicle.motion import (
     ATTITUDE,
     BODY_RATE,
     POSITION,
     VEHICLE_STATES,
     VELOCITY,
-    Plant,
-    plant_of,
+    Instant,
+    Vehicle,
+    wrench_by_part,
 )
-from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.trajectory.planning import sample_interval
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
+from cpfls_cli.vehicle.tracing import Symbol
+from cpfls_cli.vehicle.values import Each, Value, Vector, add, scaled
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.lack import DrawnLack
@@ -38,133 +50,6 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
 _REMEDY = "fly more gently, make the effects smaller, or change the frequencies of simulation.closed_loop"
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A planned motion at the steps of the autopilot; time is the first axis.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : array, shape (time, 3), m and s, world frame
-    attitude : array, shape (time, 3), rad
-    body_rate : array, shape (time, 3), rad/s, body frame
-    body_acceleration : array, shape (time, 3), rad/s^2, body frame
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    attitude: Array
-    body_rate: Array
-    body_acceleration: Array
-
-
-def reference(planned: Mapping[str, Array], time: Array, at: Array) -> Reference:
-    """Interpolate a planned motion by cubic splines.
-
-    Parameters
-    ----------
-    planned : mapping of str to array
-        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-        (time, 3) each.
-    time : array, shape (time,), s
-    at : array, shape (step,), s
-        Times asked for.
-    """
-    from scipy.interpolate import CubicSpline
-
-    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
-    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
-    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
-    return Reference(
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        attitude=q,
-        body_rate=rotations.body_rate(q, qd),
-        body_acceleration=rotations.body_acceleration(q, qd, qdd),
-    )
-
-
-class Autopilot:
-    """Track a planned motion with the vehicle's model, without knowledge of the effects.
-
-    References
-    ----------
-    Lee, Leok and McClamroch 2010, Geometric tracking control of a quadrotor UAV on SE(3).
-    """
-
-    def __init__(self, vehicle: VehicleSettings, settings: ClosedLoopSettings, planned: Reference) -> None:
-        position = 2 * pi * settings.position_frequency_hz
-        attitude = 2 * pi * np.array([settings.attitude_frequency_hz] * 2 + [settings.yaw_frequency_hz])
-        self._position_gain, self._velocity_gain = position**2, 2 * settings.position_damping * position
-        self._attitude_gain, self._rate_gain = attitude**2, 2 * settings.attitude_damping * attitude
-        self._planned = planned
-        self._inertia = inertia_tensor(vehicle)
-        self._mass = vehicle.mass_kg
-        self._gravity = np.array([0.0, 0.0, vehicle.gravity_m_s2])
-
-    def wrench(self, step: int, position: Array, velocity: Array, rotation: Array, body_rate: Array) -> Array:
-        """Compute the thrust and the torque that the motion asks for.
-
-        Parameters
-        ----------
-        step : int
-            Index into the planned motion.
-        position, velocity : array, shape (3,), m and m/s, world frame
-        rotation : array, shape (3, 3)
-            Body to world.
-        body_rate : array, shape (3,), rad/s, body frame
-
-        Returns
-        -------
-        array, shape (4,), N and N m
-            Thrust along body z, body torque.
-        """
-        pull = self._pull(step, position, velocity)
-        target = upright(pull, self._planned.attitude[step, 2])
-        torque = self._torque(step, target.T @ rotation, body_rate)
-        return np.array([self._mass * (pull @ rotation[:, 2]), *torque])
-
-    def target(self, step: int, position: Array, velocity: Array) -> Array:
-        """Orient the body as the path asks for, shape (3, 3), body to world; arguments are those of `wrench`."""
-        return upright(self._pull(step, position, velocity), self._planned.attitude[step, 2])
-
-    def _pull(self, step: int, position: Array, velocity: Array) -> Array:
-        """Compute what the thrust has to pull with, shape (3,), m/s^2, world frame."""
-        planned = self._planned
-        pull = self._gravity + planned.acceleration[step] + self._position_gain * (planned.position[step] - position)
-        return np.asarray(pull + self._velocity_gain * (planned.velocity[step] - velocity))
-
-    def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
-        """Compute the torque that turns the body to its target attitude."""
-        (_, xy, xz), (yx, _, yz), (zx, zy, _) = turned.tolist()
-        error = np.array([0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)])
-        rate_error = body_rate - turned.T @ self._planned.body_rate[step]
-        wanted = turned.T @ self._planned.body_acceleration[step]
-        wanted = wanted - self._attitude_gain * error - self._rate_gain * rate_error
-        return np.asarray(self._inertia @ wanted + rotations.cross(body_rate, self._inertia @ body_rate))
-
-
-def upright(pull: Array, yaw: float) -> Array:
-    """Orient a body whose z axis points along the pull, with a given yaw.
-
-    Parameters
-    ----------
-    pull : array, shape (3,), world frame
-    yaw : float, rad
-
-    Returns
-    -------
-    array, shape (3, 3)
-        Body to world.
-    """
-    up = pull / np.sqrt(pull @ pull)
-    # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
-    forward = rotations.cross(np.array([-np.sin(yaw), np.cos(yaw), 0.0]), up)
-    forward /= np.sqrt(forward @ forward)
-    return np.array([forward, rotations.cross(up, forward), up]).T.copy()
 
 
 @dataclass(frozen=True)
@@ -210,102 +95,116 @@ def between(middles: Array) -> Array:
     return np.asarray(0.5 * (longer[1:] + longer[:-1]))
 
 
-@dataclass(frozen=True)
-class LoopStep:
-    """Derivative, rotors and demand in the middle of a step.
-
-    Attributes
-    ----------
-    change : array, shape (state,)
-        Derivative of the state, in the middle of the step.
-    rotors : Rotors
-        In the middle of the step.
-    demand : array, shape (rotor,), rad^2/s^2
-        Squared speeds that the autopilot asked for, not clipped.
-    """
-
-    change: Array
-    rotors: Rotors
-    demand: Array
-
-
 class Pilot(Protocol):
-    """What commands the rotors."""
+    """What commands the rotors: numbers that it gives to each step, and what the traced step makes of them."""
 
-    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:
-        """Command a step.
+    def size(self, rotors: int) -> int:
+        """Count the numbers."""
+        ...
+
+    def given(self, number: int, start: Flat) -> Flat:
+        """Give the numbers of a step, by the steps done so far and the state at its start."""
+        ...
+
+    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
+        """Command the rotors.
 
         Parameters
         ----------
-        number : int
-            Steps done so far.
-        start, middle : array, shape (state,)
-            The state at the start of the step, and in its middle.
+        middle : vector
+            The state in the middle of the step.
 
         Returns
         -------
-        command : array, shape (rotor,), rad/s
-        demand : array, shape (rotor,), rad^2/s^2
+        command : value by rotor, rad/s
+        demand : value by rotor, rad^2/s^2
             Squared speeds asked for, possible or not.
         """
-
-
-@dataclass(frozen=True)
-class PlanPilot:
-    """The autopilot that knows the vehicle, with its mixer; it answers at once."""
-
-    autopilot: Autopilot
-    mixer: Mixer
-
-    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """Command a step; the plan has the start before the middle of each step."""
-        wrench = self.autopilot.wrench(number + 1, *_seen(middle))
-        return self.mixer.command(wrench), self.mixer.demand(wrench)
+        ...
 
 
 @dataclass
 class Loop:
     """The midpoint rule with one evaluation a step.
 
-    The middle of a step is reached with the derivative of the step before, so that the rule is of second order.
+    The middle of a step is reached with the derivative of the step before, so that the rule is of second order. All of
+    a step is traced into plain Python, but for the law of another autopilot and for an inertia that depends on the
+    attitude, which are evaluated apart and given to it.
 
     Attributes
     ----------
-    state : array, shape (state,)
-    change : array, shape (state,)
-        Derivative of the state in the step before.
-    push : array, shape (step, 6), N m and N, body frame
+    model : VehicleModel or None
+    state, change : array, shape (state,)
+        At the start, and its derivative.
+    push : array, shape (step, 6), N m and N, body frame, or None
         Of gusts, in the middle of each step.
     lacking : DrawnLack or None
-        What acts beside it and the model lacks.
+        What the model lacks, drawn for the steps.
     """
 
     pilot: Pilot
     actuators: Actuators
-    plant: Plant
+    vehicle: Vehicle
+    model: VehicleModel | None
     state: Array
     change: Array
-    push: Array
+    clock: Clock
+    push: Array | None = None
     lacking: DrawnLack | None = None
 
-    def advance(self, number: int) -> LoopStep:
-        """Take one step.
+    def machine(self) -> tuple[Machine, Callable[[int, Machine], Flat]]:
+        """Trace a step, and give what it is to be given by number."""
+        rotors, turning = len(self.vehicle.settings.rotors), turning_of(self.vehicle, self.model)
+        pilot, push, lacking, step = self.pilot, self.push, self.lacking, self.clock.step
+        columns = [each for each in (push, None if lacking is None else lacking.unit) if each is not None]
+        rows = np.hstack(columns).tolist() if columns else [()] * self.clock.steps
+        sizes = {
+            "piloted": pilot.size(rotors),
+            "push": 0 if push is None else 6,
+            "unit": 0 if lacking is None else 6,
+            "turning": 0 if turning is None else TURNING_NUMBERS,
+        }
+        states = len(self.state)
 
-        Parameters
-        ----------
-        number : int
-            Steps done so far.
-        """
-        middle = self.state + 0.5 * self.actuators.step * self.change
-        command, demand = self.pilot.command(number, self.state, middle)
-        rotors = self.actuators.advance(command)
-        push = self.push[number]
+        def given(number: int, machine: Machine) -> Flat:
+            state = machine.kept[:states]
+            piloted = pilot.given(number, state)
+            if turning is None:
+                return (*piloted, *rows[number])
+            middle = [x + 0.5 * step * rate for x, rate in zip(state, machine.kept[states:], strict=False)]
+            return (*piloted, *rows[number], *turning(tuple(middle)))
+
+        def build(memory: Memory, numbers: tuple[Symbol, ...]) -> Vector:
+            parts, first = {}, 0
+            for name, size in sizes.items():
+                parts[name], first = numbers[first : first + size], first + size
+            return self._traced(memory, parts)
+
+        return Machine.of(build, sum(sizes.values()), step), given
+
+    def _traced(self, memory: Memory, given: Mapping[str, Vector]) -> Vector:
+        """Take a step: derivative; command, lagged command, logged speeds, voltage and demand in its middle."""
+        state, change = memory.recall(self.state.tolist()), memory.recall(self.change.tolist())
+        middle = add(state.values, scaled(0.5 * memory.step, change.values))
+        command, demand = self.pilot.commanded(given["piloted"], middle)
+        rotors = self.actuators.rotors(command, memory)
+        instant = self.vehicle.instant(middle, rotors.speed, rotors.acceleration, rotors.slow)
+        push = given["push"] or None
         if self.lacking is not None:
-            _, velocity, rotation, _ = _seen(middle)
-            push = push + self.lacking.at(number, velocity @ rotation, rotors.speed)
-        self.change = self.plant.derivative(middle, rotors, push)
-        self.state = self.state + self.actuators.step * self.change
-        return LoopStep(self.change, rotors, demand)
+            lacking = self.lacking.at(given["unit"], wrench_by_part(acting_of(self.lacking.model), _evenly(instant)))
+            push = lacking if push is None else add(push, lacking)
+        turning = given_turning(given["turning"]) if given["turning"] else None
+        now = self.vehicle.derivative(instant, middle, push, turning)
+        state.keep(add(state.values, scaled(memory.step, now)))
+        change.keep(now)
+        return (*now, *command, *rotors.lagged, *rotors.measured, rotors.voltage, *demand)
+
+
+def _evenly(instant: Instant) -> Instant:
+    """See the same flow on a body that does not turn, whose rotors all turn alike."""
+    square = instant.functions.total(instant.rotor_speed**2) * (1 / len(instant.vehicle.rotors))
+    speed = Each([instant.functions.sqrt(square)] * len(instant.vehicle.rotors))
+    return Instant(instant.vehicle, speed, instant.air_velocity, slow_square=speed**2, functions=instant.functions)
 
 
 @dataclass(frozen=True)
@@ -370,24 +269,25 @@ def fly(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     clock = clock_of(time, settings)
-    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
+    autopilot, mix = Autopilot(vehicle, settings), mixer(vehicle)
+    planned_pilot = PlanPilot(autopilot, mix, plan_of(planned, time, clock.instants))
     attitude, rate = planned["attitude"][:1], planned["attitude_rate"][:1]
     state = np.zeros(VEHICLE_STATES)
     state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
     state[ATTITUDE], state[BODY_RATE] = attitude[0], rotations.body_rate(attitude, rate)[0]
-    mix = mixer(vehicle)
-    speed = mix.command(autopilot.wrench(0, *_seen(state)))
-    pilot: Pilot = PlanPilot(autopilot, mix)
+    speed = np.array([*planned_pilot.commanded(planned_pilot.plan[0], tuple(state.tolist()))[0]])
+    pilot: Pilot = planned_pilot
     if settings.law is not None:
         motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
-        pilot = law_pilot(settings.law, motors, _along_path(autopilot, motors, vehicle), clock.step, speed, noise)
+        asked = along_path(planned_pilot, motors, vehicle)
+        pilot = law_pilot(settings.law, motors, asked, clock.step, speed, noise)
     flight = _loop(pilot, state, speed, vehicle, settings, model, effects, clock, push)
 
-    def check(sample: int, state: Array) -> None:
+    def check(sample: int, state: Flat) -> None:
         _refuse_lost(state, time, sample)
         _refuse_far(state, planned["position"][sample], time[sample], settings.deviation_max_m)
 
-    return _flown(flight, clock, check, progress)
+    return flown(flight, check, progress)
 
 
 @dataclass(frozen=True)
@@ -455,85 +355,38 @@ def fly_setpoints(
     pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
     flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
     flight.lacking = lacking
-    return _flown(flight, clock, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
+    return flown(flight, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
 
 
-def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Array], Asked]:
-    targets = None if setpoints.attitude is None else rotations.rotation_matrix(setpoints.attitude)
-    rates = np.zeros((len(setpoints.thrust), 3)) if setpoints.body_rate is None else setpoints.body_rate
-
-    def asked(number: int, _state: Array) -> Asked:
-        sample = min(number // parts, len(rates) - 1)
-        target = None if targets is None else targets[sample]
-        return Asked(target, rates[sample], float(setpoints.thrust[sample]))
-
-    return asked
+def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
+    count = len(setpoints.thrust)
+    targets: list[Flat | None] = [None] * count
+    if setpoints.attitude is not None:
+        targets = [tuple(row) for row in rotations.rotation_matrix(setpoints.attitude).reshape(-1, 9).tolist()]
+    rates = np.zeros((count, 3)) if setpoints.body_rate is None else setpoints.body_rate
+    samples = list(map(Asked, targets, map(tuple, rates.tolist()), setpoints.thrust.tolist()))
+    return lambda number, _state: samples[min(number // parts, count - 1)]
 
 
-def _along_path(autopilot: Autopilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Array], Asked]:
-    """Ask for attitude and thrust along a path, in the units of a law."""
-    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
-
-    def asked(number: int, state: Array) -> Asked:
-        position, velocity, rotation, body_rate = _seen(state)
-        thrust = float(autopilot.wrench(number, position, velocity, rotation, body_rate)[0])
-        share = motors.share_of(float(np.sqrt(max(thrust, 0.0) / lift)))
-        return Asked(autopilot.target(number, position, velocity), np.zeros(3), share)
-
-    return asked
-
-
-def _flown(
-    flight: Loop,
-    clock: Clock,
-    check: Callable[[int, Array], None],
-    progress: Callable[[float, int], None],
-) -> SimulatedMotion:
+def flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]) -> SimulatedMotion:
     """Take all steps, and check the state at each sample."""
-    states, steps = [flight.state], []
-    # A vehicle that is lost may reach infinity before the next sample, where it is told.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+    clock, size = flight.clock, len(flight.state)
+    machine, given = flight.machine()
+    states, steps = [machine.kept[:size]], []
+    try:
         for number in range(clock.steps):
-            steps.append(flight.advance(number))
+            steps.append(machine.advance(given(number, machine)))
             if (number + 1) % clock.parts == 0:
-                check(len(states), flight.state)
-                states.append(flight.state)
+                state = machine.kept[:size]
+                check(len(states), state)
+                states.append(state)
             if number % _STEPS_BETWEEN_REPORTS == 0:
                 progress(number, clock.steps)
+    except (ArithmeticError, ValueError):
+        # What is lost may be beyond all numbers before the next sample.
+        check(len(states), (np.nan,) * size)
     progress(clock.steps, clock.steps)
-    return _sampled(np.array(states), steps, clock.parts)
-
-
-def asked(
-    time: Array,
-    planned: Mapping[str, Array],
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    state: Array,
-) -> dict[str, Array]:
-    """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
-
-    Parameters
-    ----------
-    time, planned
-        As `fly` takes them.
-    state : array, shape (time, state)
-        Of the flight, at the samples of the plan.
-
-    Returns
-    -------
-    dict of str to array, shape (time, 3), m, m/s, rad
-        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
-        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
-    """
-    autopilot = Autopilot(vehicle, settings, reference(planned, time, time))
-    targets = [autopilot.target(step, own[POSITION], own[VELOCITY]) for step, own in enumerate(state)]
-    flown = state[:, ATTITUDE]
-    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
-    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
-    if settings.law is not None:
-        found["thrust"] = np.array([autopilot.wrench(step, *_seen(own))[0] for step, own in enumerate(state)])
-    return found
+    return _sampled(np.array(states), np.array(steps), clock.parts, len(flight.vehicle.settings.rotors))
 
 
 def _loop(
@@ -548,19 +401,12 @@ def _loop(
     push: Array | None,
 ) -> Loop:
     """Set up the loop at a state, shape (12,), with the rotors at a speed that they were commanded to."""
-    plant = plant_of(vehicle, model, effects, state, speed)
-    state = np.concatenate([state, *(body.start for body in plant.carried)])
-    push = np.zeros((clock.steps, 6)) if push is None else push
-    change = plant.derivative(state, Rotors.settled(speed), push[0])
+    flown = flown_vehicle(vehicle, model, effects)
+    state = np.concatenate([state, flown.start])
+    change = Plant(flown, model).settled(state, speed, None if push is None else push[0])
     response = RotorResponse() if model is None else model.response
-    chain = actuators(effects, response, vehicle, settings, speed, clock.step, clock.step * clock.steps)
-    return Loop(pilot, chain, plant, state, change, push)
-
-
-def _seen(state: Array) -> tuple[Array, Array, Array, Array]:
-    """Give position, velocity, rotation and body rate, as an autopilot takes them."""
-    rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
-    return state[POSITION], state[VELOCITY], rotation, state[BODY_RATE]
+    chain = actuators(effects, response, vehicle, settings, speed, clock.step * clock.steps)
+    return Loop(pilot, chain, flown, model, state, change, clock, push)
 
 
 class LostVehicleError(ComputationError):
@@ -577,16 +423,16 @@ class LostVehicleError(ComputationError):
         self.sample = sample
 
 
-def _refuse_lost(state: Array, time: Array, sample: int) -> None:
-    if not np.isfinite(state).all():
+def _refuse_lost(state: Flat, time: Array, sample: int) -> None:
+    if not all(map(isfinite, state)):
         raise LostVehicleError(f"the flight is out of control at t = {time[sample]:g} s: {_REMEDY}", sample)
     roll, pitch, _ = state[ATTITUDE]
     if cos(roll) * cos(pitch) <= 0:
         raise LostVehicleError(f"the vehicle tilts beyond 90 degrees at t = {time[sample]:g} s: {_REMEDY}", sample)
 
 
-def _refuse_far(state: Array, planned: Array, time: float, limit: float) -> None:
-    away = float(np.linalg.norm(state[POSITION] - planned))
+def _refuse_far(state: Flat, planned: Array, time: float, limit: float) -> None:
+    away = float(np.linalg.norm(np.array(state[POSITION]) - planned))
     if away > limit:
         raise ComputationError(
             f"the vehicle is {away:.3g} m away from the path at t = {time:g} s (limit "
@@ -594,18 +440,9 @@ def _refuse_far(state: Array, planned: Array, time: float, limit: float) -> None
         )
 
 
-def _sampled(states: Array, steps: Sequence[LoopStep], parts: int) -> SimulatedMotion:
+def _sampled(states: Array, steps: Array, parts: int, rotors: int) -> SimulatedMotion:
     """Interpolate values in the middle of steps to the samples."""
-
-    def at_samples(of_step: Callable[[LoopStep], Array | float]) -> Array:
-        return between(np.array([of_step(step) for step in steps]))[::parts]
-
-    return SimulatedMotion(
-        state=states,
-        change=at_samples(lambda step: step.change),
-        command=at_samples(lambda step: step.rotors.command),
-        lagged=at_samples(lambda step: step.rotors.lagged),
-        speed=at_samples(lambda step: step.rotors.measured),
-        voltage=at_samples(lambda step: step.rotors.voltage),
-        demand=at_samples(lambda step: step.demand),
-    )
+    size = states.shape[1]
+    places = np.cumsum([size, rotors, rotors, rotors, 1])
+    change, command, lagged, speed, voltage, demand = np.split(between(steps)[::parts], places, axis=1)
+    return SimulatedMotion(states, change, command, lagged, speed, voltage[:, 0], demand)

@@ -19,8 +19,8 @@ from cpfls_cli.playback.lack import DrawnLack, Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.closed_loop import Clock, LostVehicleError, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.model import SimulatedEffects, with_effects
-from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 RATES, ANGLES = ("roll rate", "pitch rate", "yaw rate"), ("roll", "pitch", "yaw")

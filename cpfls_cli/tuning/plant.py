@@ -13,9 +13,9 @@ from cpfls_cli.autopilots.law import Law
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffects, with_effects
-from cpfls_cli.simulation.plant import BODY_RATE, VEHICLE_STATES, Plant, plant_of
+from cpfls_cli.simulation.plant import Plant, flown_vehicle
+from cpfls_cli.vehicle.motion import BODY_RATE, VELOCITY
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _RATE_STEP, _SPEED_SHARE = 1e-3, 1e-4
@@ -132,16 +132,13 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
     held, effects = with_effects(model, SimulatedEffects())
     flown = vehicle if held is None else held.vehicle
     motors = Motors.of(law.mixer, law.curve, flown)
-    state = np.zeros(VEHICLE_STATES)
-    rotors = len(flown.rotors)
-    plant = plant_of(flown, held, effects, state, np.full(rotors, 0.5 * motors.speed_max))
-    state = np.concatenate([state, *(body.start for body in plant.carried)])
-    share = _hover_share(plant, motors, state)
-    speed = np.full(rotors, motors.speed_at(share))
+    plant = Plant(flown_vehicle(flown, held, effects), held)
+    share = _hover_share(plant, motors)
+    speed = np.full(len(flown.rotors), motors.speed_at(share))
     slope = motors.speed_slope(share)
     lag, delay, slow_s = _lateness(model, effects, rotor_lag)
-    by_speed, by_acceleration, by_slow = _slopes(plant, state, speed)
-    by_rate = _damping(plant, state, speed)
+    by_speed, by_acceleration, by_slow = _slopes(plant, speed)
+    by_rate = _damping(plant, speed)
     turned = slope * motors.mix[:, 1:]
     axes = tuple(
         AxisPlant(
@@ -159,12 +156,12 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
     return HoverPlant((axes[0], axes[1], axes[2]), share, motors.speed_at(share) / motors.speed_max)
 
 
-def _hover_share(plant: Plant, motors: Motors, state: Array) -> float:
+def _hover_share(plant: Plant, motors: Motors) -> float:
     """Find the share of the full thrust at which nothing rises or falls."""
 
     def climbs(share: float) -> bool:
         speed = np.full(len(motors.mix), motors.speed_at(share))
-        return bool(plant.derivative(state, Rotors.settled(speed), np.zeros(6))[5] > 0)
+        return bool(plant.settled(plant.start, speed)[VELOCITY][2] > 0)
 
     if not climbs(1.0):
         raise ComputationError(
@@ -199,37 +196,31 @@ def _lateness(model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: 
     return rotor_lag + behind.lag_s, behind.delay_s, behind.slow_s
 
 
-def _slopes(plant: Plant, state: Array, speed: Array) -> tuple[Array, Array, Array]:
+def _slopes(plant: Plant, speed: Array) -> tuple[Array, Array, Array]:
     """Differentiate angular acceleration by speeds, their accelerations and slow squares, shape (3, rotor) each."""
-    still = Rotors.settled(speed)
     step = _SPEED_SHARE * float(speed.mean())
+    still = speed, np.zeros_like(speed), speed**2
 
-    def turning(changed: Rotors) -> Array:
-        return plant.derivative(state, changed, np.zeros(6))[BODY_RATE]
+    def slope(place: int, size: float) -> Array:
+        def turning(change: Array) -> Array:
+            rotors = (each + change if at == place else each for at, each in enumerate(still))
+            return plant.derivative(plant.start, *rotors)[BODY_RATE]
 
-    def slope(name: str, size: float) -> Array:
-        columns = []
-        for unit in np.eye(len(speed)):
-            ends = [replace(still, **{name: getattr(still, name) + sign * size * unit}) for sign in (1.0, -1.0)]
-            columns.append((turning(ends[0]) - turning(ends[1])) / (2 * size))
-        return np.array(columns).T
+        return np.array([turning(size * unit) - turning(-size * unit) for unit in np.eye(len(speed))]).T / (2 * size)
 
     # Slowness is that behind the present square, which a change of the speed alone leaves where it was.
-    return slope("speed", step), slope("acceleration", step), slope("slow", 2 * step * float(speed.mean()))
+    return slope(0, step), slope(1, step), slope(2, 2 * step * float(speed.mean()))
 
 
-def _damping(plant: Plant, state: Array, speed: Array) -> Array:
+def _damping(plant: Plant, speed: Array) -> Array:
     """Differentiate angular acceleration by body rate about the same axis, shape (3,), 1/s."""
-    still = Rotors.settled(speed)
-    slopes = []
-    for axis in range(3):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = state.copy()
-            moved[BODY_RATE.start + axis] += sign * _RATE_STEP
-            ends.append(plant.derivative(moved, still, np.zeros(6))[BODY_RATE][axis])
-        slopes.append((ends[0] - ends[1]) / (2 * _RATE_STEP))
-    return np.array(slopes)
+
+    def turning(axis: int, rate: float) -> float:
+        moved = plant.start.copy()
+        moved[BODY_RATE.start + axis] += rate
+        return float(plant.settled(moved, speed)[BODY_RATE][axis])
+
+    return np.array([turning(axis, _RATE_STEP) - turning(axis, -_RATE_STEP) for axis in range(3)]) / (2 * _RATE_STEP)
 
 
 def spread_of(intervals: Mapping[str, tuple[float, float]], moment: str, factor: str) -> Spread:

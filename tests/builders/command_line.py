@@ -1,6 +1,7 @@
 """Commands in the process of the tests, and what ends their searches too early."""
 
 import itertools
+import json
 import os
 import signal
 from contextlib import contextmanager
@@ -28,6 +29,21 @@ def run(*words):
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
+
+
+def done(*words):
+    """Run a command that must end well."""
+    result = run(*words)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def told(*words):
+    """Give what a command that ends well tells machines."""
+    return json.loads(done(*words, "--json").stdout)
+
+
+run.done, run.told = done, told
 
 
 @contextmanager

@@ -60,8 +60,7 @@ def pipeline(cpfls, study):
     paths, commands = stages(study, study.parent)
     printed = {}
     for stage, words in commands.items():
-        result = cpfls(*words, "-o", paths[stage], "--json")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(*words, "-o", paths[stage], "--json")
         printed[stage] = result.stdout
     return SimpleNamespace(
         **paths, paths=paths, printed=printed, summaries={k: json.loads(v) for k, v in printed.items()}

@@ -58,9 +58,7 @@ def wrong(refuse, log_study, write, tmp_path):
 )
 def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, content, name):
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", log_study, write(content, name), "-o", flight, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
+    summary = cpfls.told("import", log_study, write(content, name), "-o", flight)
     assert summary["samples"] == 200
     assert not any(summary["dropped"].values())
     assert summary["rate_hz"] == pytest.approx(50.0)
@@ -128,14 +126,13 @@ def changed(column, value, row=slice(None)):
 
 def test_one_value_that_no_flight_has_is_missing_and_told(cpfls, log_study, write, tmp_path):
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", log_study, write(changed("mx", "1e308", slice(40, 41))), "-o", flight, "--json")
-    assert result.exit_code == 0
+    result = cpfls.done("import", log_study, write(changed("mx", "1e308", slice(40, 41))), "-o", flight, "--json")
     assert json.loads(result.stdout)["missing"] == {"mx": 1}
     assert (
         "body_torque: column 'mx' holds 1 of 200 values that no flight has, the first 1e+308 in row 41 "
         "(beyond 1e+06 N m): taken as missing"
     ) in result.stderr
-    assert cpfls("check", flight).exit_code == 0
+    cpfls.done("check", flight)
 
 
 @pytest.mark.parametrize(
@@ -171,8 +168,7 @@ def test_quaternions_without_a_length_are_missing(cpfls, log_study, write, tmp_p
     values[zeros, 1:] = 0.0
     lines = "\n".join(",".join(map(str, row)) for row in values)
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", log_study, write("t,qw,qx,qy,qz\n" + lines + "\n"), "-o", flight)
-    assert result.exit_code == 0
+    result = cpfls.done("import", log_study, write("t,qw,qx,qy,qz\n" + lines + "\n"), "-o", flight)
     rows = zeros.stop - zeros.start
     assert f"quaternion: {rows} rows are 0 0 0 0, not an attitude: taken as missing" in result.stderr
     with h5py.File(flight) as file:
@@ -208,7 +204,7 @@ def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, log_study, 
     flight = tmp_path / "flight.h5"
     without = "import:\n  signals:\n    attitude: {columns: [roll, pitch, yaw], unit: rad}\n  torque_source: null\n"
     log_study.write_text(without + VEHICLE)
-    assert cpfls("import", log_study, write(table()), "-o", flight).exit_code == 0
+    cpfls.done("import", log_study, write(table()), "-o", flight)
     (line,) = refuse("identify", log_study, flight, "-o", tmp_path / "model.h5")
     assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")
 

@@ -32,15 +32,14 @@ def short(tmp_path_factory, cpfls):
     folder = tmp_path_factory.mktemp("closed_loop")
     config, path = folder / "short.yaml", folder / "trajectory.h5"
     config.write_text(SHORT.replace("simulation:", "simulation:\n  mode: closed-loop") + VEHICLE)
-    assert cpfls("trajectory", config, "-o", path).exit_code == 0
+    cpfls.done("trajectory", config, "-o", path)
     return config, path
 
 
 @pytest.fixture
 def fly(short, cpfls, tmp_path):
     def call(*options, name="flight.h5"):
-        result = cpfls("simulate", *short, *options, "-o", tmp_path / name)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("simulate", *short, *options, "-o", tmp_path / name)
         return tmp_path / name, result.stdout
 
     return call
@@ -55,7 +54,7 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
     path, said = fly()
     assert "off the path by" in said
     assert "effects: none\nnext:\n" in said
-    assert cpfls("check", path).exit_code == 0
+    cpfls.done("check", path)
     speed, command, rate, torque = read(path, "rotor_speed", "rotor_command", "body_rate", "torque")
     assert speed.shape == command.shape == (301, 4)
     assert rate.shape == torque.shape == (301, 3)
@@ -128,8 +127,7 @@ def test_mode_of_the_command_line_goes_before_that_of_the_config(fly, short, cpf
 
 def test_a_flight_in_closed_loop_can_be_identified(fly, short, cpfls, tmp_path):
     path, _ = fly()
-    result = cpfls("identify", short[0], path, "-o", tmp_path / "model.h5")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("identify", short[0], path, "-o", tmp_path / "model.h5")
 
 
 @pytest.mark.parametrize(

@@ -30,14 +30,14 @@ def test_resolving_twice_changes_nothing(cpfls, configs, tmp_path):
 
 def test_any_yaml_reader_reads_it_as_the_json_says(cpfls, configs):
     for config in configs:
-        as_json = json.loads(cpfls("config", config, "--json").stdout)
+        as_json = cpfls.told("config", config)
         assert yaml.safe_load(cpfls("config", config).stdout) == as_json
 
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_section(cpfls, study, section):
     printed = yaml.safe_load(cpfls("config", study, "--section", section).stdout)
-    whole = json.loads(cpfls("config", study, "--json").stdout)
+    whole = cpfls.told("config", study)
     assert printed == {"seed": 1, section: whole[section]}
 
 
@@ -60,6 +60,6 @@ def test_overrides_need_a_config(refuse):
 
 def test_overrides_show(cpfls, study):
     words = ("config", study, "--set", "vehicle.rotors.0.spin=-1", "--set", "reduction.criterion=A", "--seed", 9)
-    shown = json.loads(cpfls(*words, "--json").stdout)
+    shown = cpfls.told(*words)
     assert (shown["seed"], shown["reduction"]["criterion"]) == (9, "A")
     assert [rotor["spin"] for rotor in shown["vehicle"]["rotors"]] == [-1, -1, 1, -1]

@@ -27,7 +27,7 @@ def again(cpfls, pipeline, study, tmp_path_factory):
         ("predict", study, pipeline.model, pipeline.flight, "-o", out["prediction"]),
     )
     for words in commands:
-        assert cpfls(*words).exit_code == 0
+        cpfls.done(*words)
     return out
 
 
@@ -40,7 +40,7 @@ def test_noise_too_comes_from_the_seed(cpfls, pipeline, study, tmp_path):
     files = [tmp_path / f"{number}.h5" for number in range(3)]
     for path, seed in zip(files, (5, 5, 6), strict=True):
         noise = ("--set", "simulation.relative_noise={torque: 0.05}", "--seed", seed)
-        assert cpfls("simulate", study, pipeline.trajectory, "-o", path, *noise).exit_code == 0
+        cpfls.done("simulate", study, pipeline.trajectory, "-o", path, *noise)
     first, same, other = (path.read_bytes() for path in files)
     assert first == same
     assert first != other
@@ -48,7 +48,7 @@ def test_noise_too_comes_from_the_seed(cpfls, pipeline, study, tmp_path):
 
 def test_another_seed_gives_another_model(cpfls, pipeline, study, tmp_path):
     words = ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", tmp_path / "m.h5")
-    assert cpfls(*words, "--seed", 7).exit_code == 0
+    cpfls.done(*words, "--seed", 7)
     with h5py.File(tmp_path / "m.h5") as other, h5py.File(pipeline.model) as first:
         assert not np.array_equal(other["pareto_front/objectives"], first["pareto_front/objectives"])
 

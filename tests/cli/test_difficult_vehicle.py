@@ -126,14 +126,11 @@ def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command
     assert "vehicle.inertia_kg_m2" in line
     assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found" in line
     assert "--accept-guesses" in line
-    guessed = cpfls(*command(name), "--accept-guesses", "--json")
-    assert guessed.exit_code == 0, guessed.stderr
-    (said,) = json.loads(guessed.stdout)["cautions"]
+    (said,) = cpfls.told(*command(name), "--accept-guesses")["cautions"]
     assert said.startswith(GUESSED)
     assert "inertia 0.8 to 4" in said
     # A gap is told from a body alone.
-    found = cpfls(*command(name), "--model", heavy if name == "gap" else vehicle, "--json", "--force")
-    assert found.exit_code == 0, found.stderr
+    found = cpfls.done(*command(name), "--model", heavy if name == "gap" else vehicle, "--json", "--force")
     first, *others = json.loads(found.stdout)["cautions"]
     assert first == f"vehicle.h5: {HEADLINE}"
     assert any(HEAVY in each for each in others)
@@ -147,13 +144,13 @@ def test_no_word_is_good_above_a_number_that_is_not_known(vehicle):
 
 
 def test_found_numbers_stand_in_for_open_ones(cpfls, command, vehicle, tmp_path):
-    assert cpfls(*command("replay"), "--model", vehicle).exit_code == 0
+    cpfls.done(*command("replay"), "--model", vehicle)
     stored = yaml.safe_load(read(tmp_path / "out", Playback)[1].config)["vehicle"]
     assert stored["inertia_kg_m2"] == pytest.approx(TRUE)
 
 
 def test_what_was_made_from_an_inertia_of_no_body_is_read_again(cpfls, config, command, vehicle, tmp_path):
-    assert cpfls(*command("replay"), "--model", vehicle).exit_code == 0
+    cpfls.done(*command("replay"), "--model", vehicle)
     with undrawn():
         read = cpfls("report", config, tmp_path / "out", "-o", tmp_path / "page.html")
     assert read.exit_code == 0, read.stderr
@@ -180,9 +177,7 @@ def test_every_export_says_it_at_its_top(cpfls, vehicle, tmp_path, form):
     words = ("export", vehicle, "-o", output, "--format", form)
     refused = cpfls(*words)
     assert (refused.exit_code, "impossible numbers" in refused.stderr, output.exists()) == (2, True, False)
-    result = cpfls(*words, "--anyway", "--json")
-    assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["cautions"][0] == HEADLINE
+    assert cpfls.told(*words, "--anyway")["cautions"][0] == HEADLINE
     shown = cpfls(*words, "--anyway", "--force").stdout
     for path in [output, *output.parent.glob("*.h")]:
         text = path.read_text()
@@ -198,16 +193,15 @@ def test_every_export_says_it_at_its_top(cpfls, vehicle, tmp_path, form):
 
 def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_path):
     compared = tmp_path / "compared.h5"
-    made = cpfls("compare", config, flight, "--model", vehicle, "-o", compared)
-    assert made.exit_code == 0, made.stderr
+    made = cpfls.done("compare", config, flight, "--model", vehicle, "-o", compared)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
     header = read(compared, Disagreement)[1]
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
-    told = json.loads(cpfls("info", compared, "--json").stdout)
+    told = cpfls.told("info", compared)
     assert told["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     with undrawn():
-        assert cpfls("report", config, compared, "-o", tmp_path / "page.md").exit_code == 0
+        cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
     summary = (tmp_path / "page.md").read_text().split("## ")[1]
     assert summary.count(HEADLINE) == 1
 
@@ -221,7 +215,7 @@ def test_two_vehicles_stand_side_by_side(cpfls, config, vehicle, tmp_path):
     )
     with_fields(vehicle, other, numbers=numbers, loop=made.loop._replace(explained=np.ones(3)))
     with undrawn():
-        assert cpfls("report", config, vehicle, other, "-o", tmp_path / "page.json").exit_code == 0
+        cpfls.done("report", config, vehicle, other, "-o", tmp_path / "page.json")
     page = json.loads((tmp_path / "page.json").read_text())
     (section,) = [each for each in page["sections"] if each["name"] == "vehicles"]
     (table,) = [block for block in section["blocks"] if block["kind"] == "table"]

@@ -1,6 +1,5 @@
 """`cpfls effects`: the table, one effect in full, and a name that is none."""
 
-import json
 import re
 
 from cpfls_cli import page
@@ -33,10 +32,10 @@ def test_what_takes_an_effects_place_once_it_is_named_is_listed(cpfls):
 
 
 def test_machines_get_the_same(cpfls):
-    summary = json.loads(cpfls("effects", "motor_lag", "--json").stdout)
+    summary = cpfls.told("effects", "motor_lag")
     assert (summary["kind"], summary["shapes"][0]["name"]) == ("actuator", "time_constant_s")
     assert set(summary["rivals"]) == set(CATALOGUE["motor_lag"].rivals)
-    assert len(json.loads(cpfls("effects", "--json").stdout)["effects"]) == len(CATALOGUE)
+    assert len(cpfls.told("effects")["effects"]) == len(CATALOGUE)
 
 
 def test_an_unknown_name_is_refused(refuse):

@@ -79,7 +79,6 @@ def test_texts_with_a_byte_order_mark_and_ends_of_lines_of_windows_are_read(cpfl
         study, path, flight = (folder / f"{number} {name}" for name in ("study.yaml", "log.csv", "flight.h5"))
         study.write_bytes((mark + (LOG_STUDY + VEHICLE).replace("\n", ends)).encode())
         path.write_bytes((mark + log(ends)).encode())
-        imported = cpfls("import", study, path, "-o", flight)
-        assert imported.exit_code == 0, imported.stderr
+        cpfls.done("import", study, path, "-o", flight)
         made.append(cpfls("info", flight, "--json").stdout.count("attitude"))
     assert made[0] == made[1] > 0

@@ -8,6 +8,7 @@ import typer
 
 from cpfls_cli.cli.app import app
 from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.autopilots import found_vehicle
@@ -103,7 +104,8 @@ def folder(cpfls, tmp_path_factory):
     text = CONFIG.replace("seed: 1", "seed: 4") + identification
     text = text.replace("trajectory: {", "trajectory: {next_flight: {starts: 1, iterations: 1}, ")
     study.write_text(text + "".join(f"{key}: {json.dumps(own)}\n" for key, own in SETTINGS.items()))
-    write_vehicle(folder / "vehicle.h5", vehicle_of(load_study(study).vehicle))
+    stated = load_study(study)
+    write_vehicle(folder / "vehicle.h5", vehicle_of(stated.vehicle), resolved_yaml(stated))
     time = 0.01 * np.arange(400)
     save(
         folder / "log.csv",
@@ -132,6 +134,8 @@ def options_of(command):
     return [set(one.opts) for one in offered if one.name != "help"]
 
 
+EXISTS = {"exists", "--force", "--resume"}
+"""Words of which one says what keeps a file that is there."""
 COMMANDS = typer.main.get_command(app).commands
 
 
@@ -146,8 +150,13 @@ def test_every_option_has_a_line():
     assert missing == ELSEWHERE
 
 
+def held(folder):
+    """What lies in a folder, and since when."""
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+
+
 def test_every_line_is_answered(cpfls, folder, monkeypatch):
-    """With all common options at once; one line of each command first without doing anything, and silently."""
+    """With all common options at once, and never again without --force; first dry and silent."""
     monkeypatch.chdir(folder)
     wrong, alone = {}, set()
     for line in LINES:
@@ -155,10 +164,21 @@ def test_every_line_is_answered(cpfls, folder, monkeypatch):
         name, *words = words.split()
         offered = set().union(*options_of(COMMANDS[name])) - {*words}
         common = [word for option in COMMON if option in offered for word in (option, *COMMON[option].split())]
-        turns = [common] if name in alone else [*(["--force", option] for option in ALONE), common]
+        dry = ["--force", *(option for option in ALONE[:1] if option in offered)]
+        turns = [common] if name in alone else [dry, [*dry, ALONE[1]], common]
         alone.add(name)
         for added in turns:
+            before = held(folder)
             result = cpfls(name, *words, *added)
             if bool(result.exit_code) != bool(refusal) or refusal not in result.stderr:
                 wrong[name, *words, *added] = result.stderr
-    assert wrong == {}
+            if "--quiet" in added and result.output and not result.exit_code:
+                wrong[name, *words, *added] = "is not silent"
+            if "--dry-run" in added and held(folder) != before:
+                wrong[name, *words, *added] = "has written"
+        # The folder of a trend grows from run to run.
+        if "-o" in words and "--resume" not in words and not refusal and name != "trend":
+            again = cpfls(name, *words)
+            if again.exit_code != 2 or not EXISTS & {*again.stderr.split()}:
+                wrong[name, *words] = "is done again without --force"
+    assert not wrong, wrong

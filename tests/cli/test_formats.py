@@ -1,6 +1,5 @@
 """The formats are well formed, `cpfls info --format` describes them, and docs/format.md says what all share."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -29,7 +28,7 @@ def test_every_dataset_is_described(stage):
 
 
 def described(cpfls, *arguments):
-    return json.loads(cpfls("info", *arguments, "--json").stdout)["formats"]
+    return cpfls.told("info", *arguments)["formats"]
 
 
 def test_one_format_is_described_without_a_file(cpfls):

@@ -25,8 +25,7 @@ def fly(cpfls, tmp_path_factory):
     def call(seed):
         path, flight = (folder / f"{name}-{seed}.h5" for name in ("path", "flight"))
         for words in (("trajectory", CONFIG, *SHORT, "-o", path), ("simulate", CONFIG, path, "-o", flight)):
-            result = cpfls(*words, "--seed", seed)
-            assert result.exit_code == 0, result.stderr
+            cpfls.done(*words, "--seed", seed)
         return flight
 
     return call
@@ -40,8 +39,7 @@ def flights(fly):
 def test_the_model_of_one_flight_is_exact_on_another(cpfls, flights, tmp_path):
     first, _, other = flights
     words = ("identify", CONFIG, first, "--validate", other, "-o", tmp_path / "model.h5", "--json")
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     summary = json.loads(result.stdout)
     assert (summary["rank"], summary["parameters"]) == (61, 61)
     assert summary["held_out"][other.name]["relative_error"] < 1e-8
@@ -52,9 +50,8 @@ def test_attitudes_not_visited_are_trusted_to_one_rule_with_known_coefficients(c
     other = fly(4)
     for name, training, said in (("a", flights[:1], "do not trust"), ("b", flights, "the same coefficients hold")):
         model = tmp_path / f"{name}.h5"
-        assert cpfls("identify", CONFIG, *training, "-o", model).exit_code == 0
-        result = cpfls("predict", CONFIG, model, other, "-o", tmp_path / f"{name}-prediction.h5")
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("identify", CONFIG, *training, "-o", model)
+        result = cpfls.done("predict", CONFIG, model, other, "-o", tmp_path / f"{name}-prediction.h5")
         assert f"samples lie outside the attitudes that training visited: {said}" in result.stderr
 
 
@@ -63,14 +60,13 @@ def test_its_sweep_tells_structures_apart(cpfls, flights, tmp_path):
     first, kept, other = flights
     output = tmp_path / "sweep.h5"
     words = ("sweep", CONFIG, first, "--choose-on", kept, "--validate", other, "-o", output)
-    assert cpfls(*words, "--dry-run").exit_code == 0
+    cpfls.done(*words, "--dry-run")
     shipped = yaml.safe_load(CONFIG.read_text())["sweep"]["settings"]
     small, best = "seesaw, 3 functions", "harmonic 2 tensor, 1 function"
     settings = [setting for setting in shipped if setting["name"] in {small, best}]
     search = {"population": 4, "generations": 1, "local_search": {"enabled": False}}
     less = [word for key, value in search.items() for word in ("--set", f"identification.{key}={json.dumps(value)}")]
-    result = cpfls(*words, "--set", f"sweep.settings={json.dumps(settings)}", *less)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words, "--set", f"sweep.settings={json.dumps(settings)}", *less)
     with h5py.File(output) as file:
         error = dict(zip(file["setting/name"].asstr(), file["run/relative_error"][:, 1], strict=True))
     assert error[best] < 1e-8 < 0.05 < error[small]

@@ -37,8 +37,7 @@ def imported(cpfls, tmp_path):
         np.savetxt(log, rows, delimiter=",", header=",".join(names), comments="")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
         config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: {source}}}\n{VEHICLE}")
-        result = cpfls("import", config, log, "-o", flight, "--force", "-v")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("import", config, log, "-o", flight, "--force", "-v")
         begin = "cpfls: note: "
         notes = [line.removeprefix(begin) for line in result.stderr.splitlines() if line.startswith(begin)]
         return result.stdout.splitlines(), notes, flight
@@ -111,8 +110,7 @@ def notes_of(cpfls, tmp_path):
         np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
         config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: rotor-command}}\n{VEHICLE}")
-        result = cpfls("import", config, log, "-o", flight, "--force", "-v", *words)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("import", config, log, "-o", flight, "--force", "-v", *words)
         return [line for line in result.stderr.splitlines() if line.startswith("cpfls: note: ")], flight
 
     return call

@@ -23,8 +23,7 @@ def folder(tmp_path_factory):
 
 def report(cpfls, folder, form):
     page = folder / f"page.{form}"
-    result = cpfls("report", folder / "study.yaml", folder / "vehicle.h5", "-o", page, "--format", form, "--force")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("report", folder / "study.yaml", folder / "vehicle.h5", "-o", page, "--format", form, "--force")
     return page.read_text()
 
 
@@ -49,8 +48,7 @@ def test_no_export_holds_it_unless_it_is_asked_for(cpfls, folder, tmp_path, comm
 @pytest.mark.parametrize("output", ["v.c", "v.py", "v.xml", "v.sdf", "v.urdf", "v.toml"])
 def test_who_asks_for_it_reads_it_first(cpfls, folder, tmp_path, output):
     form = ("--format", "jax") if output == "v.py" else ()
-    result = cpfls("export", folder / "vehicle.h5", "-o", tmp_path / output, *form, "--anyway")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", folder / "vehicle.h5", "-o", tmp_path / output, *form, "--anyway")
     assert f"IMPOSSIBLE NUMBERS, which no such vehicle has: {HEAVY}." in result.stdout
     written = (tmp_path / output).read_text()
     assert written.index("IMPOSSIBLE NUMBERS") < written.index("Vehicle: 1.2 kg")

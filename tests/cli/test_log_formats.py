@@ -43,8 +43,7 @@ def write(path):
 @pytest.mark.usefixtures("fake_format")
 def test_import_takes_a_log_of_a_new_format(cpfls, log_study, tmp_path):
     log = write(tmp_path / "log.FAKE")
-    result = cpfls("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
     assert json.loads(result.stdout)["samples"] == 200
     assert "cpfls: note: the logger was tired" in result.stderr.splitlines()
 
@@ -97,9 +96,8 @@ def test_a_flight_from_hdf5_with_stamps_in_milliseconds(cpfls, tmp_path):
         '    attitude: {columns: ["pose[0]", "pose[1]", "pose[2]"], unit: rad}\n'
         '    body_torque: {columns: ["moment[0]", "moment[1]", "moment[2]"], unit: N m}\n' + VEHICLE
     )
-    result = cpfls("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["log_rate_hz"] == pytest.approx(50)
+    told = cpfls.told("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5")
+    assert told["log_rate_hz"] == pytest.approx(50)
 
 
 @pytest.mark.parametrize("kind", [".db3", ".mcap"])
@@ -122,9 +120,8 @@ def test_a_bag_is_imported_on_the_clock_of_its_fastest_topic(kind, cpfls, tmp_pa
         '    quaternion: {columns: ["/imu.orientation.w", "/imu.orientation.x", "/imu.orientation.y",'
         ' "/imu.orientation.z"], unit: "1"}\n' + VEHICLE
     )
-    result = cpfls("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["log_rate_hz"] == pytest.approx(100)
+    told = cpfls.told("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5")
+    assert told["log_rate_hz"] == pytest.approx(100)
 
 
 def test_of_the_folder_of_a_bag_the_file_is_asked_for(refuse, log_study, tmp_path):

@@ -1,6 +1,5 @@
 """`cpfls look` on logs of each autopilot, from the command line to what a person reads."""
 
-import json
 import re
 
 import numpy as np
@@ -83,8 +82,7 @@ def logs(tmp_path_factory):
     [("px4 log.ulg", "PX4", 4), ("ap.bin", "ArduCopter", 4), ("bf.bbl", "Betaflight 4.5.1", 4)],
 )
 def test_one_log_is_answered_in_fifteen_lines(cpfls, logs, name, system, rotors):
-    result = cpfls("look", logs / name)
-    assert result.exit_code == 0, result.output
+    result = cpfls.done("look", logs / name)
     first, facts, answers, *rest = result.stdout.splitlines()
     assert first.startswith("Flies")
     assert facts.startswith(f"{name}: {system}")
@@ -108,8 +106,7 @@ def test_what_is_no_log_is_refused_with_code_2(refuse, logs):
 
 def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = cpfls("look", logs / "px4 log.ulg", logs / "bf.bbl", logs / "blind.csv", "-o", "out")
-    assert result.exit_code == 0, result.output
+    result = cpfls.done("look", logs / "px4 log.ulg", logs / "bf.bbl", logs / "blind.csv", "-o", "out")
     assert result.stdout.startswith("3 flights\n")
     index = (tmp_path / "out" / "index.html").read_text()
     assert '<a href="px4%20log.html">px4 log.ulg</a>' in index
@@ -130,7 +127,7 @@ def test_where_all_are_refused_nothing_is_written(refuse, logs, tmp_path):
 
 def test_page_and_json_have_the_answer(cpfls, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = json.loads(cpfls("look", logs / "px4 log.ulg", "-o", "out", "--json").stdout)
+    told = cpfls.told("look", logs / "px4 log.ulg", "-o", "out")
     assert [own["question"] for own in told["answers"]][-1] == "inertia, drag, what a model misses"
     assert told["next_steps"][-1]["command"].startswith("cpfls init 'px4 log.ulg' ")
     shown = (tmp_path / "out" / "px4 log.html").read_text()

@@ -163,8 +163,7 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
     model, prediction = tmp_path / "model.h5", tmp_path / "prediction.h5"
     changed = [word for key, value in STRUCTURES[name].items() for word in ("--set", f"identification.{key}={value}")]
     small = [word for key in SMALL for word in ("--set", f"identification.{key}")]
-    result = cpfls("identify", study, pipeline.flight, "-o", model, *changed, *small)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("identify", study, pipeline.flight, "-o", model, *changed, *small)
     with edited(model) as file:
         # Other numbers than those identified, or a fuzzy part that is switched off would prove nothing.
         numbers = np.random.default_rng(11)
@@ -172,7 +171,7 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
             file[key][:] = numbers.uniform(0.5, 1.5, file[key].shape) * (
                 key != "model/fuzzy/rigid_body" or "rigid" in name
             )
-    assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
+    cpfls.done("predict", study, model, pipeline.flight, "-o", prediction)
     stored = Stored(model)
     with h5py.File(pipeline.flight) as flight, h5py.File(prediction) as predicted:
         motion = [flight[key][:] for key in ("attitude", "attitude_rate", "attitude_acceleration")]

@@ -132,8 +132,7 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
     (tmp_path / "study.yaml").write_text(
         VEHICLE + yaml.safe_dump({"import": {"time_column": time, "signals": signals}})
     )
-    result = cpfls("import", tmp_path / "study.yaml", tmp_path / name, "-o", tmp_path / "flight.h5")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("import", tmp_path / "study.yaml", tmp_path / name, "-o", tmp_path / "flight.h5")
     with h5py.File(tmp_path / "flight.h5") as file:
         assert len(file["time"]) == len(TIME)
         np.testing.assert_allclose(file["time"], TIME, atol=1e-8)

@@ -100,8 +100,9 @@ def told(cpfls, folder):
 
     def call(*words):
         output, table = folder / "response.h5", folder / "response.csv"
-        result = cpfls("response", folder / "study.yaml", *words, "-o", output, "--csv", table, "--json", "--force")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(
+            "response", folder / "study.yaml", *words, "-o", output, "--csv", table, "--json", "--force"
+        )
         return json.loads(result.stdout), output, table
 
     return call
@@ -127,7 +128,7 @@ def test_json_tells_curves_and_costs(cpfls, told, folder):
     frequency, lag = np.array(speed["frequency"]), np.array(speed["phase_deg"], dtype=float)
     expected = -np.degrees(np.arctan(2 * np.pi * frequency * LAG_S))
     assert np.abs(lag - expected)[(frequency > 0.6) & (frequency < 6.0)].max() < 4.0
-    assert cpfls("check", output).exit_code == 0
+    cpfls.done("check", output)
     assert json.loads(json.dumps(answer)) == answer
     assert list(store.read(output, Responses)[0].responses) == names
 
@@ -153,8 +154,7 @@ def test_the_table_holds_what_json_tells(told, folder):
 
 
 def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
-    result = cpfls("response", folder / "study.yaml", folder / "light.csv", "-o", tmp_path / "r.h5", "-v")
-    assert result.exit_code == 0
+    result = cpfls.done("response", folder / "study.yaml", folder / "light.csv", "-o", tmp_path / "r.h5", "-v")
     first = " ".join(result.stdout.split())
     assert first.startswith("RESPONSE: The vehicle of the config: not judged: these flights show the loop")
     assert "Rotor speed: 45° behind what is asked at" in first
@@ -164,7 +164,7 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
 def test_a_report_shows_bode_plots(cpfls, told, folder, tmp_path):
     _, output, _ = told(folder / "light.csv")
     page = tmp_path / "page.html"
-    assert cpfls("report", folder / "study.yaml", output, "-o", page).exit_code == 0
+    cpfls.done("report", folder / "study.yaml", output, "-o", page)
     html = page.read_text()
     assert "How a vehicle answers its rotors" in html
     assert "Frequency responses" in html
@@ -175,7 +175,7 @@ def test_equal_flights_give_equal_files(cpfls, folder, tmp_path):
     outputs = [tmp_path / "a.h5", tmp_path / "b.h5"]
     for output in outputs:
         words = ("response", folder / "study.yaml", folder / "light.csv", folder / "heavy.csv", "-o", output)
-        assert cpfls(*words).exit_code == 0
+        cpfls.done(*words)
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 
@@ -192,13 +192,6 @@ def test_what_is_refused(refuse, folder, tmp_path):
     assert "light.csv" in message
 
 
-def test_a_dry_run_writes_nothing(cpfls, folder, tmp_path):
-    output, table = tmp_path / "r.h5", tmp_path / "r.csv"
-    words = ("response", folder / "study.yaml", folder / "light.csv", "-o", output, "--csv", table, "--dry-run")
-    assert cpfls(*words).exit_code == 0
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
     config = tmp_path / "open.yaml"
     config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
@@ -208,8 +201,7 @@ def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
 
 def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
     words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     told = json.loads(result.stdout)
     assert told["model"] == "model.h5"
     assert list(told["responses"])[:3] == ["roll", "pitch", "yaw"]
@@ -224,9 +216,7 @@ def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
     vehicle_models.write_vehicle(model, vehicle_models.vehicle_of(whole), resolved_yaml(load_study(config)))
-    result = cpfls("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = cpfls.told("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5")
     assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in told["warnings"]
     assert told["responses"]["roll"]["cost"] < 5.0
 
@@ -237,8 +227,7 @@ def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
     words = ("response", folder / "study.yaml", "-o", tmp_path / "r.h5", "--json", "--force")
     alone = json.loads(cpfls(*words, logs[0]).stdout)
     assert alone["instruments"] == "none"
-    together = cpfls(*words, *logs, folder / "heavy.csv")
-    assert together.exit_code == 0, together.stderr
+    together = cpfls.done(*words, *logs, folder / "heavy.csv")
     told = json.loads(together.stdout)
     assert told["instruments"] == "repeats"
     assert any(warning.startswith("heavy.csv: no other of these flights") for warning in told["warnings"])

@@ -39,8 +39,7 @@ def shaken(pipeline, tmp_path_factory):
 
 def said(cpfls, *words):
     """Run a command; give its words without numbers, and its numbers."""
-    result = cpfls(*words, "--force")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words, "--force")
     text = result.stdout + result.stderr
     for word in words:
         # The same flight stands in two folders, and what comes next is told with its place.
@@ -64,8 +63,7 @@ def test_an_identification_chooses_and_says_the_same(cpfls, pipeline, shaken, st
     summaries = []
     for flight in (pipeline.flight, shaken):
         words = ("identify", study, flight, "-o", tmp_path / "m.h5", "--set", f"identification.choice={choice}")
-        result = cpfls(*words, *FASTER, "--force", "--json")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(*words, *FASTER, "--force", "--json")
         with h5py.File(tmp_path / "m.h5") as file:
             chosen = file["weights"][()].tolist()
         verdict = json.loads(result.stdout)["verdict"]

@@ -1,7 +1,5 @@
 """What was asked of an autopilot, from the log to the flight, its page and its playback."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -49,8 +47,7 @@ def flown(tmp_path):
 def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
     config, log, columns = flown
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", config, log, "-o", flight)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("import", config, log, "-o", flight)
     words = " ".join(result.stdout.split())
     assert "Setpoints attitude, thrust (at 160 of 300 samples)" in words
     with h5py.File(flight) as file:
@@ -58,7 +55,7 @@ def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
         assert "setpoint_position" not in file
         assert np.isnan(file["setpoint_thrust"][:140]).all()
         assert len(file["time"]) == SAMPLES
-    summary = json.loads(cpfls("import", config, log, "-o", flight, "--force", "--json").stdout)
+    summary = cpfls.told("import", config, log, "-o", flight, "--force")
     assert summary["setpoints"] == {"attitude": 300, "thrust": 160}
 
 
@@ -68,7 +65,7 @@ def test_readers_of_flights_give_what_is_known_throughout(cpfls, flown, tmp_path
     path = log
     if imported:
         path = tmp_path / "flight.h5"
-        assert cpfls("import", config, log, "-o", path).exit_code == 0
+        cpfls.done("import", config, log, "-o", path)
     study = load_study(config)
     (played,) = flights_to_play([path], study)
     recording = read_flights([path], study).recordings[0]
@@ -83,7 +80,7 @@ def test_a_flight_without_them_has_none(cpfls, flown, tmp_path):
     flight = tmp_path / "flight.h5"
     without = [line for line in config.read_text().splitlines() if "setpoint_" not in line]
     config.write_text("\n".join(without))
-    assert cpfls("import", config, log, "-o", flight).exit_code == 0
+    cpfls.done("import", config, log, "-o", flight)
     (played,) = flights_to_play([flight], load_study(config))
     assert played.playback.setpoints == {}
 
@@ -105,8 +102,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
     }
     log, config, made = tmp_path / "log.ulg", tmp_path / "study.yaml", tmp_path / "flight.h5"
     log.write_bytes(ulog_of_flight(own, asked=asked))
-    said = cpfls("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
-    assert said.exit_code == 0, said.stderr
+    cpfls.done("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
     assert "the attitude follows it" in " ".join(config.read_text().replace("#", "").split())
     signals = yaml.safe_load(config.read_text())["import"]["signals"]
     assert signals["setpoint_thrust"] == {
@@ -115,9 +111,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
         "sign": [-1],
         "required": False,
     }
-    result = cpfls("import", config, log, "-o", made, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
+    summary = cpfls.told("import", config, log, "-o", made)
     samples = summary["samples"]
     assert summary["setpoints"] == {"position": samples, "attitude": samples, "thrust": samples}
     with h5py.File(made) as file:

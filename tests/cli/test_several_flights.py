@@ -19,7 +19,7 @@ def second(cpfls, study, tmp_path_factory):
         ("trajectory", study, *turned, "-o", folder / "trajectory.h5"),
         ("simulate", study, folder / "trajectory.h5", "-o", folder / "second.h5"),
     ):
-        assert cpfls(*words).exit_code == 0
+        cpfls.done(*words)
     return folder / "second.h5"
 
 
@@ -28,15 +28,9 @@ def stored(path, *names):
         return [np.asarray(file[name][()]) for name in names]
 
 
-def run(cpfls, *words):
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.output
-    return result
-
-
 def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
     model = tmp_path / "model.h5"
-    run(cpfls, "identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
+    cpfls.done("identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
     lengths = [len(stored(path, "time")[0]) for path in (pipeline.flight, second)]
     (indices, samples) = stored(model, "training_indices", "judged/samples")
     np.testing.assert_array_equal(indices, np.arange(sum(lengths)))
@@ -51,14 +45,14 @@ def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
 def test_what_each_flight_taught_is_said(cpfls, study, pipeline, second, tmp_path):
     """Of two flights a model has learned from a part each, and has not seen a third one."""
     model, share = tmp_path / "model.h5", ("--set", "identification.training_share=0.6")
-    run(cpfls, "identify", study, pipeline.flight, second, "-o", model, *share)
+    cpfls.done("identify", study, pipeline.flight, second, "-o", model, *share)
     third = tmp_path / "third.h5"
     noisy = ("--set", "simulation.noise.torque=0.1")
-    run(cpfls, "simulate", study, pipeline.trajectory, "-o", third, *noisy)
+    cpfls.done("simulate", study, pipeline.trajectory, "-o", third, *noisy)
     for name, path in (("first", pipeline.flight), ("second", second), ("third", third)):
         output = tmp_path / f"{name}-prediction.h5"
-        printed = run(cpfls, "predict", study, model, path, "-o", output).stdout
-        run(cpfls, "report", study, model, output, "-o", tmp_path / f"{name}.md")
+        printed = cpfls.done("predict", study, model, path, "-o", output).stdout
+        cpfls.done("report", study, model, output, "-o", tmp_path / f"{name}.md")
         page = (tmp_path / f"{name}.md").read_text()
         if name == "third":
             assert "learned from" not in printed
@@ -74,22 +68,22 @@ def test_what_each_flight_taught_is_said(cpfls, study, pipeline, second, tmp_pat
 
 def test_a_flight_that_a_model_was_chosen_on_is_no_new_one(cpfls, study, pipeline, second, tmp_path):
     model, held_out = tmp_path / "model.h5", ("--set", "identification.choice=held-out")
-    run(cpfls, "identify", study, pipeline.flight, "--choose-on", second, "-o", model, *held_out)
-    printed = run(cpfls, "predict", study, model, second, "-o", tmp_path / "p.h5").stdout
+    cpfls.done("identify", study, pipeline.flight, "--choose-on", second, "-o", model, *held_out)
+    printed = cpfls.done("predict", study, model, second, "-o", tmp_path / "p.h5").stdout
     assert f"model.h5 along {second.name}: a flight that it was chosen on" in printed.splitlines()
 
 
 def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study, pipeline, second, tmp_path):
     selection, model = tmp_path / "selection.h5", tmp_path / "model.h5"
     share = ("--set", "identification.training_share=0.6")
-    run(cpfls, "reduce", study, pipeline.flight, second, "-o", selection, *share)
+    cpfls.done("reduce", study, pipeline.flight, second, "-o", selection, *share)
     (indices,) = stored(selection, "indices")
     first = len(stored(pipeline.flight, "time")[0])
     assert np.any(indices < first)
     assert np.any(indices >= first)
     # Of each flight only the leading part trains.
     assert not np.any((indices >= round(0.6 * first)) & (indices < first))
-    run(cpfls, "identify", study, pipeline.flight, second, "--selection", selection, "-o", model, *share)
+    cpfls.done("identify", study, pipeline.flight, second, "--selection", selection, "-o", model, *share)
     learned, parts = stored(model, "training_indices", "judged/parts")
     np.testing.assert_array_equal(learned, np.sort(indices))
     assert parts.tolist() == [
@@ -101,7 +95,7 @@ def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study
 
 def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline, second, tmp_path):
     selection = tmp_path / "selection.h5"
-    run(cpfls, "reduce", study, pipeline.flight, second, "-o", selection)
+    cpfls.done("reduce", study, pipeline.flight, second, "-o", selection)
     output = ("-o", tmp_path / "model.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--selection", selection, *output)
     assert "was made from 2 flights, and 1 is given; " in message
@@ -119,10 +113,10 @@ def test_each_file_is_hashed_once(cpfls, study, pipeline, second, tmp_path, monk
     for stage in (job, training):
         monkeypatch.setattr(stage, "read_content", counting)
     selection, flights = tmp_path / "selection.h5", [pipeline.flight, second]
-    run(cpfls, "reduce", study, *flights, "-o", selection)
+    cpfls.done("reduce", study, *flights, "-o", selection)
     assert sorted(hashed) == sorted(flights)
     hashed.clear()
-    run(cpfls, "identify", study, *flights, "--selection", selection, "-o", tmp_path / "model.h5")
+    cpfls.done("identify", study, *flights, "--selection", selection, "-o", tmp_path / "model.h5")
     assert sorted(hashed) == sorted([*flights, selection])
 
 
@@ -138,8 +132,8 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
     for name, limit in (("held", None), ("streamed", 100)):
         if limit:
             monkeypatch.setattr(flight_source, "IN_MEMORY", limit)
-        run(cpfls, "reduce", *words, "-o", tmp_path / f"{name}-selection.h5")
-        run(cpfls, "identify", *words, "-o", tmp_path / f"{name}-model.h5")
+        cpfls.done("reduce", *words, "-o", tmp_path / f"{name}-selection.h5")
+        cpfls.done("identify", *words, "-o", tmp_path / f"{name}-model.h5")
     for kind in ("selection", "model"):
         assert (tmp_path / f"held-{kind}.h5").read_bytes() == (tmp_path / f"streamed-{kind}.h5").read_bytes()
 
@@ -169,6 +163,6 @@ def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     lacking.write_bytes(pipeline.flight.read_bytes())
     with edited(lacking) as file:
         del file["torque"]
-    run(cpfls, "reduce", study, lacking, "-o", tmp_path / "selection.h5")
+    cpfls.done("reduce", study, lacking, "-o", tmp_path / "selection.h5")
     (message,) = refuse("identify", study, lacking, "-o", tmp_path / "model.h5")
     assert "lacks torque" in message

@@ -1,6 +1,5 @@
 """A vehicle flown in MuJoCo comes back as a flight that its own model plays back: docs/simulators.md, shortened."""
 
-import json
 import runpy
 from pathlib import Path
 
@@ -24,15 +23,16 @@ def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):
     vehicle = vehicle_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)))
     model, uav, log, flight = (tmp_path / name for name in ("model.h5", "uav.xml", "log.h5", "flight.h5"))
     write_vehicle(model, vehicle, resolved_yaml(study))
-    assert cpfls("export", model, "-o", uav).exit_code == 0
+    cpfls.done("export", model, "-o", uav)
     script = runpy.run_path(str(ROOT / "examples" / "fly_mujoco.py"))
     script["main"].__globals__.update(BEGIN_S=2.0, END_S=4.0)
     script["main"](str(uav), str(CONFIG), str(log))
     with h5py.File(log) as file:
         assert len(file["time"]) == 200
         assert np.abs(file["x"][:]).max() < 5.0
-    assert cpfls("import", CONFIG, log, "-o", flight).exit_code == 0
-    result = cpfls("replay", CONFIG, model, flight, "-o", tmp_path / "replay.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    sums = {name: each["body_rate"]["sum"] for name, each in json.loads(result.stdout)["models"].items()}
+    cpfls.done("import", CONFIG, log, "-o", flight)
+    sums = {
+        name: each["body_rate"]["sum"]
+        for name, each in cpfls.told("replay", CONFIG, model, flight, "-o", tmp_path / "replay.h5")["models"].items()
+    }
     assert sums["model"] < 0.1 * sums["stated"]

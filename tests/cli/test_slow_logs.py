@@ -32,8 +32,7 @@ def slow(cpfls, logs):
     """The config that `init` writes, its logs, and what it said."""
     first, second = logs(10)
     config = first.with_name("study.yaml")
-    said = cpfls("init", first, second, "--mass", 0.8, "--arm", 0.16, "-o", config)
-    assert said.exit_code == 0, said.stderr
+    said = cpfls.done("init", first, second, "--mass", 0.8, "--arm", 0.16, "-o", config)
     return config, first, second, said
 
 
@@ -44,8 +43,7 @@ def test_init_says_what_to_set(slow):
 def test_vehicle_says_it_first_and_fits_only_what_can_be_told(cpfls, slow):
     config, first, second, _ = slow
     output = config.with_name("vehicle.h5")
-    result = cpfls("vehicle", config, first, "--held-out", second, "-o", output)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("vehicle", config, first, "--held-out", second, "-o", output)
     assert result.stderr.startswith("vehicle: The rotors are logged 10 times a second")
     # What to set is said once, in the answer.
     assert (result.stdout.count("SDLOG_PROFILE"), result.stderr.count("SDLOG_PROFILE")) == (1, 0)

@@ -23,8 +23,7 @@ def vehicle(tmp_path):
 
 def written(cpfls, vehicle, ending, *words):
     output = vehicle.with_name(f"spread.{ending}")
-    result = cpfls("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words)
     return result, output
 
 
@@ -122,8 +121,7 @@ def test_nothing_is_drawn_or_written_on_a_dry_run(cpfls, vehicle, monkeypatch):
         raise AssertionError("nothing is computed")
 
     monkeypatch.setattr("cpfls_cli.stages.spread.drawn", never)
-    result = cpfls("spread", vehicle, "-o", vehicle.with_name("s.json"), "-n", "5", "--dry-run")
-    assert result.exit_code == 0
+    result = cpfls.done("spread", vehicle, "-o", vehicle.with_name("s.json"), "-n", "5", "--dry-run")
     assert "s.json: would be written; all inputs are good 5 vehicles would be drawn from" in " ".join(
         (result.stdout + result.stderr).split()
     )

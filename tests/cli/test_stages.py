@@ -252,18 +252,18 @@ def looked(cpfls, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_csv(tmp_path / "log.csv", flat_log(flight(seconds=12.0)))
     (tmp_path / "study.yaml").write_text(TINY + VEHICLE)
-    assert cpfls("look", "log.csv", "-o", "out").exit_code == 0
+    cpfls.done("look", "log.csv", "-o", "out")
     return tmp_path / "out" / "log.h5"
 
 
 def test_info_check_and_report_know_results(cpfls, looked):
-    told = json.loads(cpfls("info", looked, "--json").stdout)
+    told = cpfls.told("info", looked)
     assert (told["format"], told["result"]["name"]) == ("cpfls/look", "log.csv")
     said = cpfls("info", looked, "-v").stdout
     assert "log.csv (sha256 " in said
     assert cpfls("check", looked).stdout.startswith(f"{looked}: good (cpfls/look)\n")
     for name in ("r.html", "r.md", "r.json"):
-        assert cpfls("report", "study.yaml", looked, "-o", name).exit_code == 0
+        cpfls.done("report", "study.yaml", looked, "-o", name)
         assert "log.csv" in (looked.parents[1] / name).read_text()
     assert (looked.parents[1] / "r.html").read_text() == looked.with_suffix(".html").read_text()
 
@@ -271,7 +271,7 @@ def test_info_check_and_report_know_results(cpfls, looked):
 def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
     log = looked.parents[1] / "log.csv"
     for words, message in (
-        (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a cpfls/model"),
+        (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a model"),
         (("look", looked), "is an artifact of this program"),
         (("look", log, "-o", "x.html"), "-o x\n"),
         (("look", log, "-o", "out"), "--force"),

@@ -112,7 +112,7 @@ def test_what_the_folder_holds(cpfls, told):
     assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
     summary = json.loads((told.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
-    assert cpfls("check", told.out / "trend.h5").exit_code == 0
+    cpfls.done("check", told.out / "trend.h5")
     assert "Since log11.csv" in cpfls("info", told.out / "trend.h5").stdout
 
 
@@ -167,7 +167,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     assert f"what was read is kept in {tmp_path / 'trend' / 'flights'}" in stopped.stderr
     monkeypatch.setattr(command, "kept_numbers", kept_numbers)
     with undrawn():
-        assert json.loads(cpfls(*words, "-o", tmp_path / "trend", "--json").stdout)["new"] == 3
+        assert cpfls.told(*words, "-o", tmp_path / "trend")["new"] == 3
 
 
 @pytest.mark.parametrize(
@@ -185,9 +185,3 @@ def test_what_is_refused(cpfls, logs, told, tmp_path, words, message):  # noqa: 
     result = cpfls("trend", logs / "study.yaml", *given, "-o", tmp_path / "trend")
     assert result.exit_code == 2
     assert message in result.stderr
-
-
-def test_a_folder_of_others_is_not_filled(refuse, logs, tmp_path):
-    (tmp_path / "own.txt").write_text("mine")
-    (message,) = refuse("trend", logs / "study.yaml", logs / "logs" / "log1.csv", "-o", tmp_path)
-    assert "exists already and is not empty" in message

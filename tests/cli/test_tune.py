@@ -35,10 +35,9 @@ def gains(cpfls, folder):
     """What the command says and writes for each autopilot."""
     told = {}
     for name in AUTOPILOTS:
-        result = cpfls(
+        result = cpfls.done(
             "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", name, "-o", folder / f"{name}.h5"
         )
-        assert result.exit_code == 0, result.stderr
         told[name] = result
     return told
 
@@ -98,8 +97,7 @@ def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
 
 def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert gains["px4"].exit_code == 0
-    result = cpfls("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")
     page = (folder / "px4.html").read_text()
     for figure in ("tune-1-bode-roll", "tune-1-nichols-yaw", "tune-1-step"):
         assert figure in page
@@ -189,11 +187,10 @@ def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
     rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
     today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "ATC_ANG_RLL_P": 6.0, "MOT_THST_HOVER": 0.22}
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows, today))
-    result = cpfls(
+    result = cpfls.done(
         *("tune", tmp_path / "study.yaml", tmp_path / "vehicle.h5", "--autopilot", "ardupilot"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
-    assert result.exit_code == 0, result.stderr
     found = read(tmp_path / "gains.h5")
     assert list(found.sets) == ["proposed", "today"]
     assert found.parameters["ATC_RAT_RLL_P"].today == pytest.approx(0.2)
@@ -210,11 +207,10 @@ def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path)
     (tmp_path / "log.bin").write_bytes(
         dataflash({"IMU": ("Qf", "TimeUS,GyrX")}, [("IMU", (1_000_000, 0.1))], {"ATC_RAT_RLL_P": 0.2})
     )
-    result = cpfls(
+    cpfls.done(
         *("tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", "ardupilot"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
-    assert result.exit_code == 0, result.stderr
     found = read(tmp_path / "gains.h5")
     assert (found.before, found.noise) == ("today", None)
     assert any("the config has no import.signals.body_rate" in words for words in found.warnings)
@@ -224,11 +220,10 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls
     (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
     rows = [("IMU", (1_000_000 + 2500 * step, 0.1 * step, 0.2, 0.3)) for step in range(20)]
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows))
-    result = cpfls(
+    result = cpfls.done(
         *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "--json"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
-    assert result.exit_code == 0, result.stderr
     found = read(tmp_path / "gains.h5")
     assert any("no log holds 256 samples" in words for words in found.warnings)
     told = json.loads(result.stdout)
@@ -244,13 +239,11 @@ def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
     rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
     today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "INS_HNTCH_ENABLE": 0.0}
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows, today))
-    result = cpfls("import", tmp_path / "study.yaml", tmp_path / "log.bin", "-o", tmp_path / "flight.h5")
-    assert result.exit_code == 0, result.stderr
-    result = cpfls(
+    cpfls.done("import", tmp_path / "study.yaml", tmp_path / "log.bin", "-o", tmp_path / "flight.h5")
+    cpfls.done(
         *("tune", tmp_path / "study.yaml", tmp_path / "vehicle.h5", "--autopilot", "ardupilot"),
         *("--flight", tmp_path / "flight.h5", "-o", tmp_path / "gains.h5"),
     )
-    assert result.exit_code == 0, result.stderr
     found = read(tmp_path / "gains.h5")
     assert (found.before, found.noise) == ("today", None)
     assert found.parameters["ATC_RAT_RLL_P"].today == pytest.approx(0.2)
@@ -290,9 +283,7 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, looked):
         for name, hz in (("IMU_GYRO_NF0_FRQ", 81.0), ("another", 60.0))
     )
     log = looked(changes=(notch, other))
-    answered = cpfls("tune", log, "-o", folder / "looked", "--json")
-    assert answered.exit_code == 0
-    told = json.loads(answered.stdout)
+    told = cpfls.told("tune", log, "-o", folder / "looked")
     changed = written(folder, "px4", "looked")
     gains = {row["parameter"]: row["proposed"] for row in told["changes"]}
     # What has no known range is said, and left to the pilot.
@@ -309,8 +300,7 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, looked):
 
 
 def test_nothing_is_written_of_a_log_whose_gains_stay(cpfls, tmp_path, looked):
-    said = cpfls("tune", looked(system="ArduPlane 4.3"), "-o", tmp_path / "none")
-    assert said.exit_code == 0
+    said = cpfls.done("tune", looked(system="ArduPlane 4.3"), "-o", tmp_path / "none")
     assert "not written, nothing changes" in said.stdout
     assert list(tmp_path.iterdir()) == []
 

@@ -65,9 +65,7 @@ def logged(tmp_path_factory):
 @pytest.fixture(scope="module")
 def twin(cpfls, logged):
     output = logged / "twin.h5"
-    result = cpfls("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), output
+    return cpfls.told("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", output), output
 
 
 def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
@@ -88,11 +86,10 @@ def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
 
 
 def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
-    result = cpfls(
+    result = cpfls.done(
         *("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / "weak.h5"),
         *("--set", "simulation.closed_loop.autopilot_parameters={MC_ROLLRATE_P: 0.04}"),
     )
-    assert result.exit_code == 0, result.stderr
     assert result.stdout.startswith("TWIN: The vehicle of the config parts from log.ulg in roll rate")
     assert "Hz" in result.stdout
     assert "cpfls gap" in result.stdout
@@ -103,7 +100,7 @@ def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
 
 def test_an_imported_flight_is_flown_with_the_gains_of_its_log_and_by_another_law_with_usual_ones(cpfls, logged):
     flight = logged / "flight.h5"
-    assert cpfls("import", logged / "study.yaml", logged / "log.ulg", "-o", flight).exit_code == 0
+    cpfls.done("import", logged / "study.yaml", logged / "log.ulg", "-o", flight)
     words = ("simulate", logged / "study.yaml", flight, "--json", "--force", "-o", logged / "usual.h5")
     said = json.loads(cpfls(*words, "--autopilot", "px4").stdout)
     assert said["gains"]["source"] == "log"
@@ -134,8 +131,7 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, mo
     def flown(name, *options):
         words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
         short = ("--set", "import.crop_s=[0.0, 2.0]")
-        result = cpfls(*words, "--model", logged / "vehicle.h5", *short, *options)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(*words, "--model", logged / "vehicle.h5", *short, *options)
         return result.stdout
 
     calm = flown("calm.h5")
@@ -162,7 +158,7 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, mo
 
 def test_it_is_looked_at_in_other_programs(cpfls, twin, tmp_path):
     _, output = twin
-    assert cpfls("export", output, "-o", tmp_path / "twin.csv").exit_code == 0
+    cpfls.done("export", output, "-o", tmp_path / "twin.csv")
     header, first = (tmp_path / "twin.csv").read_text().splitlines()[:2]
     cells = dict(zip(header.split(","), first.split(","), strict=True))
     assert float(cells["__time"]) == pytest.approx(1e-6 * ulogs.BEGIN)
@@ -194,11 +190,8 @@ def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
         ("simulate", tmp_path / "study.yaml", path, "--autopilot", "crazyflie", "-o", flight),
     )
     for words in steps:
-        result = cpfls(*words)
-        assert result.exit_code == 0, result.stderr
-    result = cpfls("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    said = json.loads(result.stdout)
+        cpfls.done(*words)
+    said = cpfls.told("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5")
     assert (said["autopilot"], said["gains"]["source"], said["thrust_from"]) == ("crazyflie", "simulation", "setpoint")
     assert not said["vehicles"]["vehicle"]["channels"]["roll rate"]["parts"]
 

@@ -8,8 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.config.load import load_study
-from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders import ulogs
 from tests.builders.studies import VEHICLE
@@ -85,8 +83,7 @@ def write(tmp_path):
 def flown(cpfls, config, write, tmp_path):
     def call(content, *words):
         flight = tmp_path / "flight.h5"
-        result = cpfls("import", config, write(content), "-o", flight, "--json", "-v", *words)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("import", config, write(content), "-o", flight, "--json", "-v", *words)
         with h5py.File(flight) as file:
             signals = {name: file[name][()] for name in ("time", "attitude", "body_rate", "body_torque")}
         return json.loads(result.stdout), signals, result.stderr
@@ -241,8 +238,7 @@ def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_pa
         sent.append((stamp, 2, control))
     log, flight = write(ulog(sorted(sent, key=lambda row: row[:2]), fields)), tmp_path / "flight.h5"
     words = ["--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
-    result = cpfls("import", EXAMPLE, log, "-o", flight, *words)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("import", EXAMPLE, log, "-o", flight, *words)
     with h5py.File(flight) as file:
         torque = file["body_torque"][()]
         assert "position" not in file
@@ -251,12 +247,6 @@ def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_pa
     for axis, (own, sign) in enumerate(zip(middle, (1, -1, -1), strict=True)):
         assert sign * own[axis] > 0
         np.testing.assert_allclose(np.delete(own, axis), 0.0, atol=1e-9)
-
-
-def test_the_gap_workflow_takes_it_as_well(config, write):
-    flights = read_flights([write(ulog())], load_study(config))
-    assert [recording.name for recording in flights.recordings] == ["log.ulg"]
-    assert len(flights.recordings[0].signals.time) == pytest.approx(500, abs=10)
 
 
 def of_version(version, removed=()):
@@ -315,8 +305,7 @@ VERSIONS = {
 def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version):
     flight = tmp_path / "flight.h5"
     words = ["-v", "--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
-    result = cpfls("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
     told = " ".join(result.stderr.split())
     for signal, column in zip(("body_rate", "rotor_command"), VERSIONS[version], strict=True):
         assert (f"{signal} is taken from {column}" in told) == (column is not None)

@@ -48,9 +48,8 @@ def flights(cpfls, config):
 def found(cpfls, config, flights):
     """What is printed for machines, and the file."""
     output = config.parent / "vehicle.h5"
-    result = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
-    return SimpleNamespace(output=output, told=json.loads(result.stdout), record=found_vehicle(output))
+    told = cpfls.told("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
+    return SimpleNamespace(output=output, told=told, record=found_vehicle(output))
 
 
 def test_it_finds_what_was_put_in(found):
@@ -87,15 +86,14 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
 
 
 def test_the_file_keeps_to_its_format_and_says_the_same(cpfls, found):
-    assert cpfls("check", found.output).exit_code == 0
+    cpfls.done("check", found.output)
     assert plain(found.record) == found.told
     assert "GOOD FOR SIMULATION AND CONTROL" in cpfls("info", found.output).stdout
 
 
 def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path):
     output = tmp_path / "vehicle.h5"
-    result = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
     assert output.read_bytes() == found.output.read_bytes()
     first, *lines = result.stdout.splitlines()
     assert first.startswith("GOOD FOR SIMULATION AND CONTROL: vehicle.h5: predicts motion ")
@@ -109,15 +107,13 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
 
 def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_path):
     words = ("--set", f"playback.leave_out={json.dumps(left_out(TRIED[:2]))}", "--json")
-    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
     told = json.loads(result.stdout)
     assert (told["verdict"], told["held_out"]) == ("not-judged", None)
 
 
 def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
-    replayed = cpfls("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
-    assert replayed.exit_code == 0, replayed.stderr
+    replayed = cpfls.done("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
     model = json.loads(replayed.stdout)["models"]["model"]
     assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
     worth = cpfls("export", found.output, "-o", tmp_path / "worth.json").stdout.splitlines()[-3:]
@@ -127,17 +123,13 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert worth[1].startswith(f"On held-out flights it ends {rate:.3g} rad/s, ")
     assert worth[1].endswith(f" m off the measured motion after {last:.3g} s, on average.")
     assert worth[2] == "JSON holds all of it."
-    predicted = cpfls("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5", "--json")
-    assert predicted.exit_code == 0, predicted.stderr
-    assert json.loads(predicted.stdout)["held_against"] == "motion"
-    compared = cpfls("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5", "--json")
-    assert compared.exit_code == 0, compared.stderr
-    assert max(json.loads(compared.stdout)["gap"]["floors"]) < 1.5
+    predicted = cpfls.told("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5")
+    assert predicted["held_against"] == "motion"
+    compared = cpfls.told("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5")
+    assert max(compared["gap"]["floors"]) < 1.5
     alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")
-    flown = cpfls("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
-    assert flown.exit_code == 0, flown.stderr
-    exported = cpfls("export", found.output, "-o", tmp_path / "vehicle.json")
-    assert exported.exit_code == 0, exported.stderr
+    cpfls.done("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
+    cpfls.done("export", found.output, "-o", tmp_path / "vehicle.json")
     with undrawn():
         page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
     told = json.loads(page.stdout)
@@ -152,16 +144,10 @@ def test_a_replay_is_shown_also_of_the_flight_held_out(cpfls, config, flights, f
     replayed = tmp_path / "replay.h5"
     cpfls("replay", config, found.output, flights[along], "-o", replayed)
     with undrawn():
-        assert cpfls("report", config, found.output, replayed, "-o", tmp_path / "page.md").exit_code == 0
+        cpfls.done("report", config, found.output, replayed, "-o", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert text.count("; sum over all horizons") == text.count("Body rate: better than") == 2
     assert "The windows in which the body rate is farthest off" in text
-
-
-def test_dry_run_writes_nothing(cpfls, config, flights, tmp_path):
-    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--dry-run")
-    assert result.exit_code == 0
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.fixture
@@ -204,11 +190,10 @@ def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, int
     assert (
         f"cpfls: note: {tmp_path / 'v.h5'}: is incomplete, because the search was interrupted; {RESUME}"
     ) in result.stderr.splitlines()
-    assert cpfls("check", tmp_path / "v.h5.checkpoint").exit_code == 0
+    cpfls.done("check", tmp_path / "v.h5.checkpoint")
     told = json.loads(result.stdout)
     assert (told["complete"], told["evaluated"]) == (False, 4)
-    shown = cpfls("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
-    assert shown.exit_code == 0
+    cpfls.done("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
     assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
 
 
@@ -233,8 +218,7 @@ def test_an_interrupted_search_goes_on_to_the_same_end(
     assert cpfls(*words).exit_code == 130
     monkeypatch.undo()
     after = interrupt_at(None)
-    result = cpfls(*words, "--resume")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words, "--resume")
     assert [*before, *after] == list(range(1, found.told["evaluated"] + 1))
     assert (tmp_path / "vehicle.h5").read_bytes() == found.output.read_bytes()
     assert names(tmp_path) == ["vehicle.h5"]
@@ -258,7 +242,7 @@ def test_a_search_is_killed_and_goes_on(cpfls, config, flights, found, tmp_path,
     assert written == [4]
     assert names(tmp_path) == ["vehicle.h5.checkpoint"]
     monkeypatch.undo()
-    assert cpfls(*words, "--resume").exit_code == 0
+    cpfls.done(*words, "--resume")
     assert (tmp_path / "vehicle.h5").read_bytes() == found.output.read_bytes()
 
 
@@ -278,12 +262,6 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
         (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
         assert message.startswith(f"{output}.checkpoint: belongs to another search: ")
         assert named in message
-    checkpoint = tmp_path / "v.h5.checkpoint"
-    content = bytearray(checkpoint.read_bytes())
-    content[len(content) // 2] ^= 1
-    checkpoint.write_bytes(content)
-    (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
-    assert "damaged: its content does not match the checksum at its end" in message
 
 
 @pytest.fixture
@@ -293,13 +271,6 @@ def refused(refuse, config, tmp_path):
         return message
 
     return call
-
-
-def test_an_existing_file_is_kept(refuse, config, flights, tmp_path):
-    (tmp_path / "v.h5").write_text("mine")
-    assert refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5") == [
-        f"{tmp_path / 'v.h5'}: exists already; --force replaces it"
-    ]
 
 
 def test_an_unknown_block_is_refused(refused, flights):
@@ -374,8 +345,7 @@ def test_a_log_of_stated_torque_is_refused(refused, tmp_path):
 def test_the_copy_of_the_config_has_what_the_command_line_changes(cpfls, config, flights, tmp_path):
     copy = tmp_path / "found.yaml"
     words = ("--set", "playback.horizon_s=0.4", "--seed", 7, "--write-config", copy)
-    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
     written = read_config(copy)
     assert (written["seed"], written["playback"]["horizon_s"]) == (7, 0.4)
 
@@ -410,8 +380,7 @@ def test_a_velocity_in_another_unit_is_said(cpfls, config, flights, tmp_path):
         file["velocity"][:] *= 3.6
     found = ("vehicle", config, flight, "--held-out", flights[1], "--anyway")
     for words in (found, ("replay", config, "vehicle", flight)):
-        result = cpfls(*words, "-o", tmp_path / "out.h5", "--force")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(*words, "-o", tmp_path / "out.h5", "--force")
         said = "The log contradicts itself: kmh.h5: the velocity is in km/h, judged by the position"
         assert said in "".join(result.stdout.splitlines()[:2])
         assert "flight-2.h5:" not in result.stdout + result.stderr

@@ -1,7 +1,5 @@
 """`cpfls vehicle` with constants that nobody knows, and with several configurations, as a user sees it."""
 
-import json
-
 import pytest
 import yaml
 
@@ -36,9 +34,8 @@ def flights(cpfls, folder):
         plan, made[name] = folder / f"{name}-path.h5", folder / f"{name}.h5"
         words = ("--set", "trajectory.path=straight", "--set", f"trajectory.direction={direction}")
         heavy = ("--set", f"vehicle.mass_kg={mass}")
-        assert cpfls("trajectory", config, "-o", plan, *words, *heavy).exit_code == 0
-        result = cpfls("simulate", config, plan, "-o", made[name], *heavy)
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("trajectory", config, "-o", plan, *words, *heavy)
+        cpfls.done("simulate", config, plan, "-o", made[name], *heavy)
     return made
 
 
@@ -123,8 +120,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     config = heavier(flights, folder, open_constants, "logs.yaml")
     copy = folder / "found.yaml"
     words = ("vehicle", config, folder / "flight.csv", "-o", folder / "v.h5", "--write-config", copy)
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     assert f"{copy}: written, the config with these constants" in result.stdout
     parameters = plain(found_vehicle(folder / "v.h5"))["parameters"]
     assert set(parameters) == KEYS
@@ -136,8 +132,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     assert thrust["value"] == pytest.approx(float(stated), rel=0.02)
     assert load_study(copy).vehicle.rotors[0].thrust_factor_n_s2 == pytest.approx(thrust["value"], rel=1e-5)
     assert load_study(copy).import_ == load_study(config).import_
-    shown = cpfls("report", config, folder / "v.h5", "-o", folder / "v.md")
-    assert shown.exit_code == 0, shown.stderr
+    cpfls.done("report", config, folder / "v.h5", "-o", folder / "v.md")
     page = (folder / "v.md").read_text()
     assert "which the thrust lifts, gives all forces their size" in page
     assert "Guesses stand here for what the config leaves open: drag factor, inertia and thrust factor." in page
@@ -146,13 +141,11 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
 @pytest.mark.usefixtures("undrawn")
 def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, folder):
     config = heavier(flights, folder, same_vehicle, "groups.yaml")
-    result = cpfls("vehicle", config, folder / "flight.csv", folder / "loaded.csv", "-o", folder / "g.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    added = json.loads(result.stdout)["differences"]["payload: added mass"]
+    told = cpfls.told("vehicle", config, folder / "flight.csv", folder / "loaded.csv", "-o", folder / "g.h5")
+    added = told["differences"]["payload: added mass"]
     assert added["low"] < 0.04 < added["high"]
     assert added["value"] == pytest.approx(0.04, rel=0.15)
-    shown = cpfls("report", config, folder / "g.h5", "-o", folder / "g.md")
-    assert shown.exit_code == 0, shown.stderr
+    cpfls.done("report", config, folder / "g.h5", "-o", folder / "g.md")
     assert "payload: added mass" in (folder / "g.md").read_text()
 
 

@@ -34,8 +34,7 @@ COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "predict",
 def test_verbose_names_what_is_read_and_written(cpfls, words, study, tmp_path, command):
     inputs, options = words[command]
     output = tmp_path / "out"
-    result = cpfls(command, study, *inputs, "-o", output, "-v", *options)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(command, study, *inputs, "-o", output, "-v", *options)
     said = [line for line in result.stderr.splitlines() if re.match(rf"{command}: (reads|wrote) ", line)]
     sizes = r" \([\d.]+ (bytes|kB|MB)\)"
     patterns = [rf"{command}: reads {re.escape(str(path))}{sizes}" for path in [study, *inputs]]

@@ -52,14 +52,12 @@ def logged(cpfls, tmp_path_factory):
         ("import", "study.yaml", "log.csv", "-o", "flight.h5"),
         ("replay", "study.yaml", "vehicle", "flight.h5", "log.csv", "-o", "replay.h5", "--every", "9"),
     ):
-        result = cpfls(*(folder / word if "." in word else word for word in words))
-        assert result.exit_code == 0, result.stderr
+        cpfls.done(*(folder / word if "." in word else word for word in words))
     return folder
 
 
 def exported(cpfls, artifact, output, *options):
-    result = cpfls("export", artifact, "-o", output, "--force", *options)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", artifact, "-o", output, "--force", *options)
     return result.stdout
 
 

@@ -78,15 +78,14 @@ def vehicle(written):
 
 @pytest.fixture(scope="module")
 def path(cpfls, config, folder):
-    assert cpfls("trajectory", config, "-o", folder / "path.h5").exit_code == 0
+    cpfls.done("trajectory", config, "-o", folder / "path.h5")
     return folder / "path.h5"
 
 
 @pytest.fixture(scope="module")
 def fly(cpfls, config, path, folder):
     def call(name, model, *options):
-        result = cpfls("simulate", config, path, "--model", model, "-o", folder / name, *options)
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("simulate", config, path, "--model", model, "-o", folder / name, *options)
         return folder / name
 
     return call
@@ -109,8 +108,7 @@ def sums(cpfls, config, tmp_path):
 
     def call(model, flown, *options):
         words = ("replay", config, model, flown, "-o", tmp_path / "r.h5", "--every", "5", "--force", "--json", *options)
-        result = cpfls(*words)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done(*words)
         models = json.loads(result.stdout)["models"]
         return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
 
@@ -161,8 +159,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
 def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     top = ("--mode", "closed-loop", "--effect", "torque_bias.M_z=0.01")
     words = ("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     assert "effects, those of the model among them: linear_damping.d_x = " in result.stdout
     assert "torque_bias.M_x = 0, torque_bias.M_y = 0, torque_bias.M_z = 0.01" in result.stdout
     assert "with vehicle.h5" in result.stdout
@@ -201,14 +198,12 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
 
 
 def predicted(cpfls, config, model, flown, output):
-    result = cpfls("predict", config, model, flown, "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), store.read(output, AlongFlight)[0]
+    return cpfls.told("predict", config, model, flown, "-o", output), store.read(output, AlongFlight)[0]
 
 
 def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):
     told, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
-    assert cpfls("check", tmp_path / "p.h5").exit_code == 0
+    cpfls.done("check", tmp_path / "p.h5")
     assert told["held_against"] == "motion"
     assert min(told["r2_body"]) > 0.999
     size = record.measured_force.std(axis=0)
@@ -218,15 +213,13 @@ def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flig
 
 @pytest.mark.usefixtures("undrawn")
 def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
-    result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
     _, first, *_, last = result.stdout.splitlines()
     assert first.endswith(
         "held against what the motion takes with its inertia, noise of the differentiated rates included"
     )
     assert last.startswith("a torque that is right at each sample may still predict nothing; `cpfls replay`")
-    page = cpfls("report", config, tmp_path / "p.h5", vehicle, "-o", tmp_path / "page.md")
-    assert page.exit_code == 0, page.stderr
+    cpfls.done("report", config, tmp_path / "p.h5", vehicle, "-o", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert "Force on the body without weight" in text
     assert "vehicle.h5 along noisy.h5: a flight that it did not learn from" in text
@@ -290,17 +283,14 @@ def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
     log, settings = written_log(body_torque=("N m", record.body_torque))
     settings["torque_source"] = "column"
     options = ("--set", f"import={json.dumps(settings)}")
-    result = cpfls("import", config, log, "-o", tmp_path / "log.h5", *options)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("import", config, log, "-o", tmp_path / "log.h5", *options)
     told, held = predicted(cpfls, config, vehicle, tmp_path / "log.h5", tmp_path / "q.h5")
     assert told["held_against"] == "recorded"
     assert np.abs(held.error[5:-5]).max() < 1e-3 * np.abs(held.torque).max()
 
 
 def gap(cpfls, config, output, *words):
-    result = cpfls("compare", config, *words, "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
-    return np.array(json.loads(result.stdout)["gap"]["floors"])
+    return np.array(cpfls.told("compare", config, *words, "-o", output)["gap"]["floors"])
 
 
 def test_the_true_vehicle_leaves_noise_alone(cpfls, refuse, config, vehicle, flight, noisy, tmp_path):
@@ -330,13 +320,12 @@ def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_
     left_open, log = open_config
     vehicle = tmp_path / "vehicle.h5"
     write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
-    assert cpfls("import", left_open, log, "-o", tmp_path / "f.h5").exit_code == 0
+    cpfls.done("import", left_open, log, "-o", tmp_path / "f.h5")
     told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
     assert min(told["r2_body"]) > 0.999
     assert (gap(cpfls, left_open, tmp_path / "gap.h5", log, "--model", vehicle) < 1).all()
     # An autopilot needs numbers, and the model is of the vehicle that they were left open of.
-    flown = cpfls("simulate", config, path, "--model", vehicle, "-o", tmp_path / "flown.h5")
-    assert flown.exit_code == 0, flown.stderr
+    cpfls.done("simulate", config, path, "--model", vehicle, "-o", tmp_path / "flown.h5")
 
 
 @pytest.mark.parametrize("command", ["compare", "predict", "replay", "response"])
@@ -356,8 +345,7 @@ def gusty(written):
 def test_gusts_of_a_model_are_played_where_they_are_asked_for(cpfls, config, path, folder, gusty, vehicle):
     def flown(name, *options, model=gusty):
         slow = ("--set", "simulation.closed_loop.integration_rate_hz=100")
-        result = cpfls("simulate", config, path, "--model", model, "-o", folder / name, *slow, *options)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("simulate", config, path, "--model", model, "-o", folder / name, *slow, *options)
         return (folder / name).read_bytes(), read(folder / name, Flight)[0].body_rate, result.stdout
 
     once, shaken, said = flown("shaken.h5", "--gusts")
@@ -383,10 +371,10 @@ def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehic
 
 
 def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
-    told = json.loads(cpfls("info", gusty, "--json").stdout)["gusts"]
+    told = cpfls.told("info", gusty)["gusts"]
     assert told["torque_n_m"] == [0.02, 0.03, 0.01]
     assert told["force_memory_s"] == [1.0, 1.0, 1.0]
-    assert cpfls("export", gusty, "-o", folder / "gusty.json").exit_code == 0
+    cpfls.done("export", gusty, "-o", folder / "gusty.json")
     exported = json.loads((folder / "gusty.json").read_text())
     assert told.items() <= exported["gusts"].items()
     assert "x = k x" in exported["gusts"]["how_to_play"]
@@ -395,8 +383,7 @@ def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
 def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
     """The recipe keeps the size, and after its memory 37 % of a gust."""
     for form, file in (("jax", "gusty.py"), ("c", "gusty.c")):
-        result = cpfls("export", gusty, "--format", form, "-o", folder / file, "--force")
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("export", gusty, "--format", form, "-o", folder / file, "--force")
         assert "x = k x + size sqrt(1 - k^2) n" in " ".join((folder / file).read_text().replace("#", "").split())
     assert "_GUST_SIZE {0.02, 0.03, 0.01, 0.2, 0.2, 0.2}" in (folder / "gusty.h").read_text()
     module = on_numpy((folder / "gusty.py").read_text())
@@ -418,9 +405,8 @@ def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     model, told = written("remembers.h5", history=history), []
     for options in ((), ("--history", "0.5")):
         output = tmp_path / f"{len(told)}.h5"
-        result = cpfls("replay", config, model, noisy, "-o", output, "--every", "20", "--json", *options)
-        assert result.exit_code == 0, result.stderr
-        assert cpfls("check", output).exit_code == 0
+        result = cpfls.done("replay", config, model, noisy, "-o", output, "--every", "20", "--json", *options)
+        cpfls.done("check", output)
         told.append(json.loads(result.stdout))
     without, known = told
     assert [each["history_s"] for each in told] == [0.0, 0.5]

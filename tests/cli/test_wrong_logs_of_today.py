@@ -29,8 +29,7 @@ def logs(tmp_path_factory, cpfls):
     folder = tmp_path_factory.mktemp("wrong")
     before = [write_csv(folder / f"before{seed}.csv", flat_log(flight(seed=seed))) for seed in (1, 2, 3, 4)]
     write_csv(folder / "same.csv", flat_log(TODAY))
-    made = cpfls("init", *before, "-o", folder / "study.yaml", "--mass", MASS, "--arm", ARM)
-    assert made.exit_code == 0, made.output
+    cpfls.done("init", *before, "-o", folder / "study.yaml", "--mass", MASS, "--arm", ARM)
     return folder
 
 
@@ -120,8 +119,7 @@ def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, tmp_
     (tmp_path / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
     (tmp_path / "before4.ulg").write_bytes(ulog_of_flight(flight(seed=4), MOT_POLE_COUNT=14, PWM_MIN=1000))
     logs = [tmp_path / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
-    made = cpfls("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
-    assert made.exit_code == 0, made.output
+    cpfls.done("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
     assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in changed(cpfls, tmp_path, "other.ulg").stderr
     words = ("changed", tmp_path / "study.yaml", tmp_path / "scaled.ulg", "--since", *logs, "-o", tmp_path / "out")
     result = cpfls(*words, "--force")
@@ -138,8 +136,7 @@ def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
         (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed)))
     (tmp_path / "other.ulg").write_bytes(ulog_of_flight(TODAY, SYS_AUTOSTART=4601))
     logs = [tmp_path / f"before{seed}.ulg" for seed in (1, 2, 3, 4)]
-    made = cpfls("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
-    assert made.exit_code == 0, made.output
+    cpfls.done("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
     said = "before1.ulg and other.ulg are of different vehicles (SYS_AUTOSTART 4001 and 4601)"
     refused = changed(cpfls, tmp_path, "other.ulg")
     assert refused.exit_code == 2
@@ -151,7 +148,7 @@ def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
     assert f"{said}, and are compared anyway" in " ".join(asked.stderr.split())
     # What `import` makes of a log keeps what it says of its vehicle.
     flown = tmp_path / "other.h5"
-    assert cpfls("import", tmp_path / "study.yaml", tmp_path / "other.ulg", "-o", flown).exit_code == 0
+    cpfls.done("import", tmp_path / "study.yaml", tmp_path / "other.ulg", "-o", flown)
     assert "are of different vehicles" in changed(cpfls, tmp_path, "other.h5").stderr
 
 

@@ -82,11 +82,3 @@ def test_cross_product_is_numpys_to_the_bit(shapes):
     rng = np.random.default_rng(0)
     first, second = (rng.normal(size=shape) for shape in shapes)
     np.testing.assert_array_equal(rotations.cross(first, second), np.cross(first, second))
-
-
-def test_one_instant_is_computed_as_many_are():
-    rng = np.random.default_rng(1)
-    attitude, rate = rng.uniform(-3, 3, (2, 40, 3))
-    for function, given in ((rotations.rotation_matrix, (attitude,)), (rotations.attitude_rate, (attitude, rate))):
-        alone = np.concatenate([function(*(each[i : i + 1] for each in given)) for i in range(40)])
-        np.testing.assert_allclose(alone, function(*given), rtol=1e-14, atol=1e-15)

@@ -32,6 +32,6 @@ EFFECT = Effect(
     source="SkyFlow (motor.py, motor_electrical.py); SkyDreamer (thrust over a discharge)",
     shapes=(Shape("exponent", "1", (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0), "power of the voltage"),),
     apply=_apply,
-    actuation=Actuation(supply=lambda values, voltage: float(voltage ** (values["exponent"] / 2))),
+    actuation=Actuation(supply=lambda values, voltage: voltage ** (values["exponent"] / 2)),
     accounts=a_few_percent,
 )

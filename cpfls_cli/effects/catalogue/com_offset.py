@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, a_few_percent
-from cpfls_cli.effects.signals import Signals
-from cpfls_cli.rotations import cross
-
-_AXES = np.eye(3)[None]
+from cpfls_cli.effects.effect import Coefficient, Effect, a_few_percent
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.values import cross, scaled
 
 
-def _levers(signals: Signals, axes: int) -> Columns:
-    direct = np.zeros((len(signals), 6, axes))
-    direct[:, :3] = -cross(_AXES[:, :axes], signals.force[:, None]).swapaxes(1, 2)
-    return Columns(direct)
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(scaled(-1, cross(tuple(p[f"c_{axis}"] for axis in "xyz"), see.force)))
 
 
 _EFFECT = Effect(
@@ -39,9 +33,9 @@ _EFFECT = Effect(
         "wind": "turn in yaw, and change the thrust",
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
-    columns=lambda signals, _shape: _levers(signals, 2),
     of_all_forces=True,
     accounts=a_few_percent,
+    acts=_acts,
 )
 
 # Height alone is the moment of a flapping disc; beside the other two it is the third number of one cause.
@@ -53,6 +47,6 @@ EFFECT = replace(
     exact=replace(
         _EFFECT,
         coefficients=(*_EFFECT.coefficients, _HEIGHT),
-        columns=lambda signals, _shape: _levers(signals, 3),
+        columns=None,
     ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cpfls_cli.effects.actuation import DelayLine, shifted
+from cpfls_cli.effects.actuation import shifted
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 
@@ -23,6 +23,7 @@ EFFECT = Effect(
     shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),
     apply=shifted,
     actuation=Actuation(
-        link=lambda values, step: DelayLine(values["delay_s"] / step), delay=lambda values: values["delay_s"]
+        link=lambda rotors, values, memory: memory.delayed(rotors, values["delay_s"] / memory.step),
+        delay=lambda values: values["delay_s"],
     ),
 )

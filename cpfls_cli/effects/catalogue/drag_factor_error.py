@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from cpfls_cli.effects.effect import Effect, Shape
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -18,6 +19,10 @@ def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSet
 def _accounts(number: str, values: Mapping[str, float]) -> float:
     """Account for as much of Izz: yaw knows well only the ratio of the two."""
     return abs(values["error"]) if number == "inertia_z" else 0.0
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench((0, 0, -p["error"] * see.functions.total(see.spins * see.rotor_drag)))
 
 
 EFFECT = Effect(
@@ -39,4 +44,5 @@ EFFECT = Effect(
     apply=lambda signals, shape: replace(signals, vehicle=_vehicle(signals.vehicle, shape)),
     in_vehicle=lambda parts, shape, _: parts._replace(vehicle=_vehicle(parts.vehicle, shape)),
     accounts=_accounts,
+    acts=_acts,
 )

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from cpfls_cli import rotations
-from cpfls_cli.effects.effect import Columns, Effect, torque_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.values import subtract
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    assert signals.attitude is not None, "declared among the needs"
-    torque = signals.wrench[:, :3]
-    return torque_column(rotations.body_torque(signals.attitude, torque) - torque)
+def _acts(see: Instant, _p: Numbers) -> Wrench:
+    (sr, sp), (cr, cp) = map(see.functions.sin, see.attitude[:2]), map(see.functions.cos, see.attitude[:2])
+    x, y, z = see.rotor_torque
+    along = (z + sp * x) / cp
+    return Wrench(subtract((x, cr * y + sr * along, cr * along - sr * y), see.rotor_torque))
 
 
 EFFECT = Effect(
@@ -30,5 +29,5 @@ EFFECT = Effect(
         "products_of_inertia": "fly level: the wrong convention vanishes there",
     },
     source="definition of the generalised torque, tau = W^T M",
-    columns=_columns,
+    acts=_acts,
 )

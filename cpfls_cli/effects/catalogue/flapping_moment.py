@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    x, y, _ = np.moveaxis((signals.speed[..., None] * signals.hub_velocity).sum(axis=1), 1, 0)
-    return torque_column(-np.column_stack([y, -x, np.zeros_like(x)]))
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    x, y, _ = (see.functions.total(see.rotor_speed * each) for each in see.hub_velocity)
+    return Wrench((-p["k_f"] * y, p["k_f"] * x, 0))
 
 
 EFFECT = Effect(
@@ -32,5 +28,5 @@ EFFECT = Effect(
         "parasitic_drag": "fly legs at two speeds, one twice the other",
     },
     source="RotorPy multirotor.py (M_flap, nose down); Bauersfeld et al. 2021, NeuroBEM, eq. 17 (nose up)",
-    columns=_columns,
+    acts=_acts,
 )

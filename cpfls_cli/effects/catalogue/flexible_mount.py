@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.effect import Columns, Effect, Shape, of_axes
-from cpfls_cli.effects.hooks import Carrier, Pull
+from cpfls_cli.effects.hooks import Body
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
+from cpfls_cli.vehicle.values import ZERO, Vector, add, plus, scaled, subtract, times
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
@@ -22,30 +21,21 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return Columns(np.zeros_like(momentum), momentum)
 
 
-@dataclass(frozen=True)
-class _Spring:
-    """The sprung part in the closed loop: its angles against the vehicle, and their rates.
+def _pull(_see: Instant, p: Numbers, state: Vector, carrier: Carrier) -> Pull:
+    """Turn the vehicle by what the springs give back.
 
-    ``x'' + 2 zeta w x' + w^2 x = -omega'`` with ``omega' = (a + share (2 zeta w x' + w^2 x)) / (1 - share)``, a being
-    the angular acceleration of the vehicle if it were stiff.
+    ``x'' + 2 zeta w x' + w^2 x = -omega'`` for the angles x of the sprung part against the vehicle, with ``omega' = (a
+    + share (2 zeta w x' + w^2 x)) / (1 - share)``, a being the angular acceleration of the vehicle if it were stiff.
     """
-
-    share: Array
-    natural: float
-    damping: float
-    start: Array = field(default_factory=lambda: np.zeros(6))
-
-    def pull(self, carrier: Carrier, state: Array) -> Pull:
-        """Turn the vehicle by what the springs give back."""
-        angle, rate = state[:3], state[3:]
-        spring = 2 * self.damping * self.natural * rate + self.natural**2 * angle
-        turning = (carrier.turning + self.share * spring) / (1 - self.share)
-        return Pull(np.zeros(3), turning - carrier.turning, np.concatenate([rate, -turning - spring]))
-
-
-def _carried(_vehicle: VehicleSettings, values: Mapping[str, float]) -> _Spring:
-    share = np.array([values.get(f"share_{axis}", 0.0) for axis in "xyz"])
-    return _Spring(share, 2 * np.pi * values["frequency_hz"], values["damping"])
+    angle, rate, natural = state[:3], state[3:], 2 * np.pi * p["frequency_hz"]
+    spring = add(scaled(2 * p["damping"] * natural, rate), scaled(natural**2, angle))
+    shares = [p[f"share_{axis}"] for axis in "xyz"]
+    turning = tuple(
+        plus(stiff, times(share, given)) / (1 - share)
+        for share, stiff, given in zip(shares, carrier.turning, spring, strict=True)
+    )
+    swing = tuple(-plus(*each) for each in zip(turning, spring, strict=True))
+    return Pull(ZERO, subtract(turning, carrier.turning), (*rate, *swing))
 
 
 EFFECT = Effect(
@@ -75,5 +65,5 @@ EFFECT = Effect(
         Shape("damping", "1", (0.02, 0.1, 0.3), "their damping ratio", first=0.1),
     ),
     rate_derivative=True,
-    carried=_carried,
+    carried=Body(_pull, (0.0,) * 6),
 )

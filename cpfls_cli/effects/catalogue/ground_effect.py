@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
-from cpfls_cli.effects.effect import Columns, Effect, Shape, a_few_percent, thrust_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Effect, Shape, a_few_percent
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 # Below this share the formula leaves its range: the thrust at most doubles.
 _SMALLEST_DENOMINATOR = 0.5
 
 
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    height = np.maximum(signals.hub_height, 1e-3 * signals.radii)
-    ratio = (signals.radii / (4 * height)) ** 2
-    gain = 1 / np.maximum(1 - shape["G"] * ratio, _SMALLEST_DENOMINATOR)
-    return thrust_column(signals, signals.rotor_thrust * (gain - 1))
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    height = see.functions.largest(see.hub_height, 1e-3 * see.radii)
+    ratio = (see.radii / (4 * height)) ** 2
+    gain = 1 / see.functions.largest(1 - p["G"] * ratio, _SMALLEST_DENOMINATOR)
+    return Wrench(at_hubs=(0, 0, see.rotor_thrust * (gain - 1)))
 
 
 EFFECT = Effect(
@@ -36,7 +32,7 @@ EFFECT = Effect(
         "parameter_error": "compare the thrust near the ground with that far above it",
     },
     source="Cheeseman and Bennett, R&M 3021 (G = 1); gym-pybullet-drones (G = 11.4 for a Crazyflie)",
-    columns=_columns,
     accounts=a_few_percent,
     shapes=(Shape("G", "1", (0.25, 0.5, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0), "strength; 1 is a single rotor"),),
+    acts=_acts,
 )

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(at_hubs=(0, 0, -p["k_z"] * (see.rotor_speed * see.hub_velocity[2])))
+
 
 EFFECT = Effect(
     name="inflow",
@@ -30,5 +36,5 @@ EFFECT = Effect(
         "vertical_descent": "climb as well as descend: in a climb only inflow acts",
     },
     source="RotorPy multirotor.py (k_z of the rotor drag matrix); PX4 data-driven-dynamics rotor_model.py",
-    columns=lambda signals, _: thrust_column(signals, -signals.speed * signals.hub_velocity[..., 2]),
+    acts=_acts,
 )

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Effect, of_axes, torque_by_axis
+from cpfls_cli.effects.effect import Effect, of_axes
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    return Wrench(tuple(-p[f"d_{axis}"] * rate for axis, rate in zip("xyz", see.body_rate, strict=True)))
+
 
 EFFECT = Effect(
     name="linear_damping",
@@ -24,5 +30,5 @@ EFFECT = Effect(
         "command_delay": "log measured rotor speeds; a delay looks like negative damping",
     },
     source="PX4 sih.cpp (Ma = -KDW omega); simulator of ArduPilot (terminal rotation rate)",
-    columns=lambda signals, _: torque_by_axis(-signals.body_rate),
+    acts=_acts,
 )

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.catalogue.vertical_descent import induced_velocity
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    across = signals.air_velocity[:, :2]
-    speed = np.linalg.norm(across, axis=1)
-    carried = across / np.sqrt(speed**2 + induced_velocity(signals).mean() ** 2)[:, None]
-    share = np.linalg.norm(carried, axis=1)
-    thrust = signals.wrench[:, 5]
-    direct = np.zeros((len(signals), 6, 3))
-    direct[:, 5, 0] = -thrust * share
-    direct[:, :2, 1] = thrust[:, None] * np.column_stack([carried[:, 1], -carried[:, 0]])
-    direct[:, :2, 2] = direct[:, :2, 1] * share[:, None]
-    return Columns(direct)
 
 
 def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
     """Tell whether the lost lift can have the moment: it acts within the arms."""
     largest = scales.arm(vehicle) * max(float((linear + 2 * error)[0]), 0.0)
     return np.array([True, *(np.abs(linear[1:]) - 2 * error[1:] <= largest)])
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    x, y, _ = see.air_velocity
+    square, rotors = x**2 + y**2, len(see.vehicle.rotors)
+    down = see.functions.total(induced_velocity(see)) / rotors
+    whole = see.functions.sqrt(square + down**2)
+    share = see.functions.sqrt(square) / whole
+    moment = (p["c_M"] + p["c_B"] * share) * see.thrust / whole
+    return Wrench((moment * y, -moment * x, 0), (0, 0, -p["c_F"] * see.thrust * share))
 
 
 EFFECT = Effect(
@@ -57,6 +52,6 @@ EFFECT = Effect(
         "rolling_moment": "fly forward and sideways: the wake lifts the side that is ahead",
     },
     source="skewed wake of momentum theory (Leishman, Principles of Helicopter Aerodynamics, section 3.5)",
-    columns=_columns,
     lever=_lever,
+    acts=_acts,
 )

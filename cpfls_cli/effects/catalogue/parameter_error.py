@@ -14,7 +14,9 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, of_axes
 from cpfls_cli.effects.hooks import SensorLog, TrueMotion
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import add, cross
 
 # Places among the coefficients.
 _THRUST_SCALE = 6
@@ -165,6 +167,16 @@ def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, 
     return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in beside.items()}
 
 
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    moments, rate = see.vehicle.inertia_kg_m2[:3], see.body_rate
+    turned = tuple(-p[f"inertia_{axis}"] * own * each for axis, own, each in zip("xyz", moments, rate, strict=True))
+    (x, y, z), (p_x, p_y, p_z) = moments, rate
+    means = 0.5 * (y + z) * p_y * p_z, 0.5 * (z + x) * p_z * p_x, 0.5 * (x + y) * p_x * p_y
+    coupled = tuple(-p[f"coupling_{axis}"] * each for axis, each in zip("xyz", means, strict=True))
+    force = (0, 0, p["thrust_scale"] * see.thrust)
+    return Wrench(add(coupled, cross(rate, turned)), force, momentum=turned)
+
+
 EFFECT = Effect(
     name="parameter_error",
     order=280,
@@ -191,4 +203,5 @@ EFFECT = Effect(
     source="Newton-Euler equations",
     columns=_columns,
     log=SensorLog(change=_log),
+    acts=_acts,
 )

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Columns, Effect, of_axes
-from cpfls_cli.effects.signals import Signals
-from cpfls_cli.rotations import cross
+from cpfls_cli.effects.effect import Effect, of_axes
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    velocity = signals.air_velocity
-    drag = -np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
-    direct = np.zeros((len(signals), 6, 6))
-    direct[:, 3:, :3] = drag[:, :, None] * np.eye(3)
-    direct[:, :3, 3:] = cross(np.eye(3)[None], drag[:, None]).swapaxes(1, 2)
-    return Columns(direct)
-
+from cpfls_cli.vehicle.values import cross, dot, scaled
 
 _FORCE, _TORQUE = scales.drag_at_ten_metres_per_second, scales.arm_drag_at_ten_metres_per_second
 _FORCES = of_axes("c_{}", "N s^2/m^2", 0.0, 0.6, "half of air density times drag area along {}", _FORCE)
@@ -34,6 +22,12 @@ def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
     possible = np.ones(6, dtype=bool)
     possible[3:] = np.abs(linear[3:]) - 2 * error[3:] <= length * max(largest, 0.0)
     return possible
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    drag = scaled(-see.functions.sqrt(dot(see.air_velocity, see.air_velocity)), see.air_velocity)
+    lever = tuple(p[f"cr_{axis}"] for axis in "xyz")
+    return Wrench(cross(lever, drag), tuple(p[f"c_{axis}"] * each for axis, each in zip("xyz", drag, strict=True)))
 
 
 EFFECT = Effect(
@@ -53,6 +47,6 @@ EFFECT = Effect(
         "wind": "fly legs in opposite directions, and at two speeds",
     },
     source="RotorPy multirotor.py (c_Dx, c_Dy, c_Dz); AirSim (drag of each face)",
-    columns=_columns,
     lever=_lever,
+    acts=_acts,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,10 +12,12 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.compiling import compiled, part
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
-from cpfls_cli.effects.hooks import Carrier, Pull
+from cpfls_cli.effects.hooks import Body
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
-from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
+from cpfls_cli.vehicle.values import Vector, add, apply, dot, plus, scaled, subtract, transposed
+from cpfls_cli.vehicle.values import cross as across
 
 # A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
 _STEP_S = 0.04
@@ -360,57 +362,27 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return Columns(stack(*levers, wrench(force=pull)))
 
 
-@dataclass(frozen=True)
-class _Load:
-    """The load in the closed loop, with mass and ``mass times hook`` as lever of its pull ``m_p t n``.
+def _pull(see: Instant, p: Numbers, state: Vector, carrier: Carrier) -> Pull:
+    """Pull at a carrier whose acceleration depends on the pull; both are linear in the tension.
 
     State: direction n of the cable and its rate, ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` with a the
-    acceleration of the hook, and the tension per mass ``t = L |n'|^2 - (a + g z) . n``.
+    acceleration of the hook, and the tension per mass ``t = L |n'|^2 - (a + g z) . n``. Mass times hook is the lever of
+    the pull ``m_p t n``.
     """
-
-    mass: float
-    mass_times_hook: Array
-    depth: float
-    length: float
-    damping: float
-    gravity: float
-    start: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
-
-    def pull(self, carrier: Carrier, state: Array) -> Pull:
-        """Pull at a carrier whose acceleration depends on the pull; both are linear in the tension."""
-        cable, rate = state[:3] / np.linalg.norm(state[:3]), state[3:]
-        hook = np.array([0.0, 0.0, -self.depth])
-        pulled = self.mass / carrier.mass * cable
-        turned = np.asarray(np.linalg.solve(carrier.inertia, cross(self.mass_times_hook, carrier.rotation.T @ cable)))
-        bent = cross(carrier.turning, hook) + cross(carrier.body_rate, cross(carrier.body_rate, hook))
-        felt = carrier.acceleration + carrier.rotation @ bent
-        felt[2] += self.gravity
-        response = pulled + carrier.rotation @ cross(turned, hook)
-        tension = (self.length * rate @ rate - felt @ cable) / (1 + response @ cable)
-        felt = felt + tension * response
-        across = felt - (felt @ cable) * cable
-        swing = -across / self.length - (rate @ rate) * cable - self.damping * rate
-        return Pull(tension * pulled, tension * turned, np.concatenate([rate, swing]))
-
-
-def _carried(vehicle: VehicleSettings, values: Mapping[str, float]) -> _Load:
-    lever = sum((value * np.array(_HOOK[name]) for name, value in values.items() if name in _HOOK), np.zeros(3))
-    return _Load(
-        values["mass"],
-        lever,
-        values.get("depth_m", 0.0),
-        values["length_m"],
-        values["damping_1_s"],
-        vehicle.gravity_m_s2,
-    )
-
-
-# Where the coefficients have the hook.
-_HOOK = {
-    "mass_times_depth": (0.0, 0.0, -1.0),
-    "mass_times_right": (0.0, -1.0, 0.0),
-    "mass_times_behind": (-1.0, 0.0, 0.0),
-}
+    along, rate, rotation = state[:3], state[3:], see.rotation
+    cable = scaled(1 / see.functions.sqrt(dot(along, along)), along)
+    hook, lever = (0, 0, -p["depth_m"]), tuple(-p[f"mass_times_{place}"] for place in ("behind", "right", "depth"))
+    pulled = scaled(p["mass"] / see.vehicle.mass_kg, cable)
+    turned = carrier.turned_by(across(lever, apply(transposed(rotation), cable)))
+    bent = add(across(carrier.turning, hook), across(see.body_rate, across(see.body_rate, hook)))
+    felt = add(carrier.acceleration, apply(rotation, bent), (0, 0, see.vehicle.gravity_m_s2))
+    response = add(pulled, apply(rotation, across(turned, hook)))
+    centripetal = dot(rate, rate)
+    tension = (p["length_m"] * centripetal - dot(felt, cable)) / plus(1, dot(response, cable))
+    felt = add(felt, scaled(tension, response))
+    sideways = subtract(felt, scaled(dot(felt, cable), cable))
+    swing = add(scaled(-1 / p["length_m"], sideways), scaled(-centripetal, cable), scaled(-p["damping_1_s"], rate))
+    return Pull(scaled(tension, pulled), scaled(tension, turned), (*rate, *swing))
 
 
 def _accounts(number: str, _values: Mapping[str, float]) -> float:
@@ -457,6 +429,6 @@ EFFECT = Effect(
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),
-    carried=_carried,
+    carried=Body(_pull, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
     accounts=_accounts,
 )

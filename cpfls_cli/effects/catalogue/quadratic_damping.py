@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Effect, of_axes, torque_by_axis
+from cpfls_cli.effects.effect import Effect, of_axes
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    braked = ((p[f"d_{axis}"], rate) for axis, rate in zip("xyz", see.body_rate, strict=True))
+    return Wrench(tuple(-damping * see.functions.absolute(rate) * rate for damping, rate in braked))
+
 
 EFFECT = Effect(
     name="quadratic_damping",
@@ -22,5 +27,5 @@ EFFECT = Effect(
         "rotor_plane_damping": "repeat the same rate sweep at twice the amplitude",
     },
     source="OS4 dinamica.m (friction torque of the body); flat-plate estimate",
-    columns=lambda signals, _: torque_by_axis(-(np.abs(signals.body_rate) * signals.body_rate)),
+    acts=_acts,
 )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    spinning = (signals.spins * signals.speed)[..., None]
-    return torque_column(-(spinning * signals.hub_velocity).sum(axis=1) * [1.0, 1.0, 0.0])
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    x, y, _ = (see.functions.total(see.spins * see.rotor_speed * each) for each in see.hub_velocity)
+    return Wrench((-p["mu"] * x, -p["mu"] * y, 0))
 
 
 EFFECT = Effect(
@@ -29,5 +27,5 @@ EFFECT = Effect(
         "flapping_moment": "reverse the yaw effort at constant speed: only the rolling moment reverses",
     },
     source="PX4 gazebo_motor_model.cpp (with the sign of the spin; the older RotorS model leaves it out)",
-    columns=_columns,
+    acts=_acts,
 )

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
-from cpfls_cli.effects.signals import Signals
-
-IN_PLANE = np.array([1.0, 1.0, 0.0])
-"""What of a vector lies in the rotor plane, body axes."""
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def drag(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    """Compute the drag of all rotors for a unit of k_d, as a column."""
-    return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * (signals.hub_velocity * IN_PLANE))))
+def drag_at_hubs(see: Instant, p: Numbers) -> Wrench:
+    """Drag the hubs in their plane."""
+    x, y, _ = see.hub_velocity
+    drag = -p["k_d"] * see.rotor_speed
+    return Wrench(at_hubs=(drag * x, drag * y, 0))
 
 
 EFFECT = Effect(
@@ -39,5 +34,5 @@ EFFECT = Effect(
         "wind": "fly legs in opposite directions",
     },
     source="RotorPy multirotor.py; Martin and Salaun 2010; OS4 aero.m (induced and profile parts in one column)",
-    columns=drag,
+    acts=drag_at_hubs,
 )

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    spin = signals.speed @ signals.spins
-    p, q, _ = signals.body_rate.T
-    return torque_column(np.column_stack([-spin * q, spin * p, np.zeros_like(spin)]))
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    spin = p["J_r"] * see.functions.total(see.spins * see.rotor_speed)
+    return Wrench((-spin * see.body_rate[1], spin * see.body_rate[0], 0))
 
 
 EFFECT = Effect(
@@ -33,5 +28,5 @@ EFFECT = Effect(
         "rotor_acceleration": "hold the yaw effort constant while rolling; J_r must be the same in both",
     },
     source="Bouabdallah 2007, OS4 (RgP, PgP)",
-    columns=_columns,
+    acts=_acts,
 )

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench, wrench
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
@@ -99,27 +99,19 @@ def _seeds(vehicle: VehicleSettings) -> Array:
     return seeds
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    drags = signals.speed**2 * [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
-    drag = _about_z(drags.sum(axis=1))
-    modes = gain_modes(signals.vehicle).T
-    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
-    lift = np.zeros((len(signals), 3))
-    lift[:, 2] = signals.rotor_thrust @ signals.spins
-    # A propeller that pulls less drags less.
-    levers = (
-        thrust_wrench(signals.hubs, signals.rotor_thrust * mode) + wrench(_about_z(-drags @ (signals.spins * mode)))
-        for mode in modes
-    )
-    return Columns(stack(*levers, wrench(drag), wrench(force=lift)))
-
-
-def _about_z(torque: Array) -> Array:
-    return np.column_stack([np.zeros((len(torque), 2)), torque])
-
-
 def _accounts(_number: str, values: Mapping[str, float]) -> float:
     return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    functions, drag = see.functions, see.rotor_drag
+    first, second = (functions.rotors(mode) for mode in gain_modes(see.vehicle).T.tolist())
+    gain = first * p["difference_1"] + second * p["difference_2"]
+    # A propeller that pulls less drags less.
+    yaw = functions.total(drag * (p["drag_imbalance"] - see.spins * gain))
+    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force shows it.
+    lift = p["lift_imbalance"] * functions.total(see.spins * see.rotor_thrust)
+    return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
 
 
 EFFECT = Effect(
@@ -157,7 +149,7 @@ EFFECT = Effect(
         "parameter_error": "apply yaw effort at constant roll and pitch",
     },
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
-    columns=_columns,
     describe=_describe,
     accounts=_accounts,
+    acts=_acts,
 )

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    total = signals.speed.sum(axis=1, keepdims=True)
-    damping = -total * signals.body_rate * [1.0, 1.0, 0.0]
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    rate_x, rate_y, _ = see.body_rate
+    x, y, _ = (see.functions.total(see.rotor_speed * hub) for hub in see.hubs)
+    total = see.functions.total(see.rotor_speed)
     # Thrust that leans with the disc; its lever about roll and pitch is part of the damping already.
-    p, q = signals.body_rate[:, 0], signals.body_rate[:, 1]
-    lean = np.column_stack([-q, p, np.zeros(len(signals))])
-    arms = signals.speed @ signals.hubs
-    yaw = np.zeros((len(signals), 3))
-    yaw[:, 2] = arms[:, 0] * p + arms[:, 1] * q
-    return Columns(stack(wrench(damping), wrench(yaw, total * lean)))
+    torque = (-p["k_w"] * total * rate_x, -p["k_w"] * total * rate_y, p["k_F"] * (x * rate_x + y * rate_y))
+    return Wrench(torque, force=(-p["k_F"] * total * rate_y, p["k_F"] * total * rate_x, 0))
 
 
 EFFECT = Effect(
@@ -51,5 +44,5 @@ EFFECT = Effect(
         "inflow": "climb and descend at constant attitude: only inflow changes the thrust",
     },
     source="Corke, Robotics Toolbox quadrotor_dynamics.m (a1s -= 16/(gamma |w|) q); NASA TP-1285",
-    columns=_columns,
+    acts=_acts,
 )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Columns, Effect, of_axes
+from cpfls_cli.effects.effect import Effect, of_axes
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(_see: Instant, p: Numbers) -> Wrench:
+    return Wrench(tuple(p[f"M_{axis}"] for axis in "xyz"))
+
 
 EFFECT = Effect(
     name="torque_bias",
@@ -24,5 +28,5 @@ EFFECT = Effect(
         "euler_axis_torque": "tilt: the wrong convention vanishes in level flight",
     },
     source="SkyFlow (thrust axis misalignment)",
-    columns=lambda signals, _: Columns(np.tile(np.eye(6)[:, :3], (len(signals), 1, 1))),
+    acts=_acts,
 )

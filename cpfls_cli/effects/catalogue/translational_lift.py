@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    x, y, _ = see.hub_velocity
+    return Wrench(at_hubs=(0, 0, p["k_h"] * (x**2 + y**2)))
+
 
 EFFECT = Effect(
     name="translational_lift",
@@ -24,5 +31,5 @@ EFFECT = Effect(
         "inflow": "fly level and fast, without climbing",
     },
     source="RotorPy multirotor.py (k_h)",
-    columns=lambda signals, _: thrust_column(signals, (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)),
+    acts=_acts,
 )

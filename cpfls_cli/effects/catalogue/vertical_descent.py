@@ -8,50 +8,29 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, a_few_percent, thrust_wrench
+from cpfls_cli.effects.effect import Coefficient, Effect, Shape, a_few_percent
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import Value
 
 # kg/m^3, at sea level and 15 degrees.
 _AIR_DENSITY = 1.225
-# Ratios of descent: the end of the data, knots where their curves bend, where thrust shakes, and ends of the states.
-_LARGEST_RATIO = 2.5
+# Ratios of descent: knots where their curves bend, where thrust shakes, and ends of the states.
 _KNOTS = (0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5)
 _SHAKING = (0.5, 1.7)
 _STATES = ((0.5, "normal working state"), (1.6, "vortex ring"), (2.0, "turbulent wake"), (np.inf, "windmill brake"))
 
 
-def induced_velocity(signals: Signals) -> Array:
-    """Compute the velocity that each rotor gives the air in hover, ``v_h = sqrt(T_h / (2 rho pi R^2))``.
-
-    Parameters
-    ----------
-    signals : Signals
-        With radii of the rotors.
-
-    Returns
-    -------
-    array, shape (rotor,), m/s
+def induced_velocity(see: Instant) -> Value:
+    """Compute the velocity that each rotor gives the air in hover, ``v_h = sqrt(T_h / (2 rho pi R^2))``, m/s.
 
     References
     ----------
     Leishman, Principles of Helicopter Aerodynamics: momentum theory of the hovering rotor.
     """
-    factors = np.array([rotor.thrust_factor_n_s2 for rotor in signals.vehicle.rotors])
-    thrust = factors * scales.hover_speed(signals.vehicle) ** 2
-    return np.asarray(np.sqrt(thrust / (2 * _AIR_DENSITY * np.pi * signals.radii**2)))
-
-
-def descent_ratio(signals: Signals) -> Array:
-    """Compute the speed of descent of each hub over its induced velocity, ``x_i = max(-u_iz / v_h, 0)``.
-
-    Returns
-    -------
-    array, shape (time, rotor)
-        At most 2.5: no data of the sources reaches further.
-    """
-    ratio = -signals.hub_velocity[..., 2] / induced_velocity(signals)
-    return np.asarray(np.clip(ratio, 0.0, _LARGEST_RATIO))
+    thrust = scales.hover_speed(see.vehicle) ** 2 * see.thrust_factors
+    return see.functions.sqrt(thrust / (2 * _AIR_DENSITY * np.pi * see.radii**2))
 
 
 def descent_state(ratio: float) -> str:
@@ -59,37 +38,33 @@ def descent_state(ratio: float) -> str:
     return next(state for limit, state in _STATES if ratio <= limit)
 
 
-def thrust_basis(ratio: Array) -> Array:
-    """Evaluate a hat function for each knot: 1 there, 0 at its neighbours and beyond, and 0 without descent.
+def _ratios(see: Instant, p: Numbers) -> tuple[Value, Value]:
+    """Compute speed of descent over induced velocity, by rotor, and the share that sideways speed leaves of the effect.
 
-    Hats are local, so that a ratio that no flight has reached says nothing about the others.
-
-    Parameters
-    ----------
-    ratio : array, shape (...)
-
-    Returns
-    -------
-    array, shape (..., 6)
+    Forward flight leaves the wake behind: how fast is enough, no two sources agree on.
     """
-    hats = [np.interp(ratio, _KNOTS, unit) for unit in np.eye(len(_KNOTS))[1:]]
-    return np.stack(hats, axis=-1)
+    still = 1 / induced_velocity(see)
+    x, y, z = (each * still for each in see.hub_velocity)
+    return -z, see.functions.exp(-(p["sideways"] ** -2) * (x**2 + y**2))
 
 
-def _gated_thrust(signals: Signals, shape: Mapping[str, float]) -> Array:
-    # Forward flight leaves the wake behind: how fast is enough, no two sources agree on.
-    sideways = np.linalg.norm(signals.hub_velocity[..., :2], axis=-1) / induced_velocity(signals)
-    return np.asarray(signals.rotor_thrust * np.exp(-((sideways / shape["sideways"]) ** 2)))
-
-
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    change = _gated_thrust(signals, shape)[..., None] * thrust_basis(descent_ratio(signals))
-    return Columns(np.stack([thrust_wrench(signals.hubs, change[..., n]) for n in range(change.shape[2])], axis=2))
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    ratio, gate = _ratios(see, p)
+    gains = [0, *(p[_name(knot)] for knot in _KNOTS[1:])]
+    # No data of the sources reaches further than the last knot.
+    gain = gains[-1]
+    for first in range(len(_KNOTS) - 2, -1, -1):
+        slope = (gains[first + 1] - gains[first]) / (_KNOTS[first + 1] - _KNOTS[first])
+        line = gains[first] + slope * (ratio - _KNOTS[first])
+        gain = see.functions.where(ratio < _KNOTS[first + 1], line, gain)
+    gain = see.functions.where(ratio > 0.0, gain, 0.0)
+    return Wrench(at_hubs=(0, 0, see.rotor_thrust * gate * gain))
 
 
 def _scatter(signals: Signals, shape: Mapping[str, float]) -> Array:
-    ratio = descent_ratio(signals)
-    shaken = _gated_thrust(signals, shape) * ((ratio > _SHAKING[0]) & (ratio < _SHAKING[1]))
+    see = signals.instants
+    ratio, gate = _ratios(see, Numbers(shape))
+    shaken = (see.rotor_thrust * gate * ((ratio > _SHAKING[0]) & (ratio < _SHAKING[1]))).T
     levers = np.column_stack([signals.hubs[:, 1], -signals.hubs[:, 0], np.zeros(len(signals.hubs))])
     per_thrust = np.concatenate([levers, np.tile([0.0, 0.0, 1.0], (len(levers), 1))], axis=1)
     return np.asarray(shaken**2 @ per_thrust**2)
@@ -127,9 +102,9 @@ EFFECT = Effect(
         "rotor_mismatch": "repeat the descent with forward speed: the mismatch stays",
     },
     source="Bauersfeld et al. 2021, NeuroBEM, eq. 19; Bangura and Mahony (0.5 < x < 2); the sources disagree in sign",
-    columns=_columns,
     accounts=a_few_percent,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
     describe=_describe,
+    acts=_acts,
 )

@@ -9,8 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.catalogue.rotor_drag import EFFECT as ROTOR_DRAG
-from cpfls_cli.effects.catalogue.rotor_drag import IN_PLANE, drag
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, hub_wrench, stack
+from cpfls_cli.effects.catalogue.rotor_drag import drag_at_hubs
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, columns_of, hub_wrench, stack
 from cpfls_cli.effects.hooks import PhysicalNumbers, VehicleParts
 from cpfls_cli.effects.signals import Signals
 
@@ -20,9 +20,14 @@ _STRONGEST = 15.0
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     still = signals if signals.wind is None else replace(signals, wind=None)
-    pushed = [signals.speed[..., None] * (signals.rotation[:, axis] * IN_PLANE)[:, None] for axis in (0, 1)]
+    in_plane = np.array([1.0, 1.0, 0.0])
+    pushed = [signals.speed[..., None] * (signals.rotation[:, axis] * in_plane)[:, None] for axis in (0, 1)]
     blown = stack(*(hub_wrench(signals.hubs, force) for force in pushed))
-    return Columns(np.concatenate([drag(still, shape).direct, blown], axis=2))
+    return Columns(np.concatenate([_drag(still, shape).direct, blown], axis=2))
+
+
+_drag = columns_of(drag_at_hubs, ["k_d"])
+"""Drag of all rotors for a unit of k_d."""
 
 
 def _physical(linear: Array) -> Array:
@@ -76,8 +81,10 @@ _EXACT = replace(
     _EFFECT,
     coefficients=(_DRAG,),
     shapes=tuple(Shape(each.name, each.unit, (each.low, 0.0, each.high), each.meaning) for each in _WIND),
-    columns=lambda signals, shape: drag(_blowing(signals, shape), shape),
+    columns=lambda signals, shape: _drag(_blowing(signals, shape), shape),
     physical=None,
+    acts=drag_at_hubs,
+    air=lambda values: (values["W_x"], values["W_y"], 0.0),
     apply=_blowing,
     in_vehicle=_in_vehicle,
 )

@@ -1,6 +1,5 @@
 """Flights with the centre of mass off, and what `cpfls gap` finds in them."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,9 +35,7 @@ def shifted(tmp_path_factory):
 def offset_answer(cpfls, gap_config, shifted, tmp_path_factory):
     """The folder that `cpfls gap` fills from these flights, and its summary; nobody writes into it."""
     folder = tmp_path_factory.mktemp("found") / "gap"
-    result = cpfls("gap", gap_config, *shifted, "-o", folder, "--json")
-    assert result.exit_code == 0, result.stderr
-    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
+    return SimpleNamespace(folder=folder, summary=cpfls.told("gap", gap_config, *shifted, "-o", folder))
 
 
 @pytest.fixture(scope="session")

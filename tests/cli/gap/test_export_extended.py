@@ -30,8 +30,7 @@ def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
 
 def test_it_is_exported(cpfls, extended, tmp_path):
     output = tmp_path / "quad.py"
-    result = cpfls("export", extended, "--format", "jax", "-o", output)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", extended, "--format", "jax", "-o", output)
     assert "Effects: " in result.stdout
     assert "On held-out flights its largest gap is " in result.stdout
     names = on_numpy(output.read_text())
@@ -68,7 +67,7 @@ def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path
     with_fields(extended, path, model=replace(record.model, fuzzy=identified.functions))
     said = cpfls("export", path, "--format", "casadi", "-o", tmp_path / "over_casadi.py").stdout
     assert said.splitlines()[-1] == "CasADi holds all of it."
-    assert cpfls("export", path, "-o", tmp_path / "over.json").exit_code == 0
+    cpfls.done("export", path, "-o", tmp_path / "over.json")
     document = json.loads((tmp_path / "over.json").read_text())
     assert document["inertia_kg_m2"] is None
     assert document["structure"] is not None
@@ -93,7 +92,7 @@ def test_an_identified_model_holds_the_stated_vehicle(pipeline):
 
 
 def test_the_json_of_an_extended_model_says_what_it_is_worth(cpfls, extended, tmp_path):
-    assert cpfls("export", extended, "-o", tmp_path / "m.json").exit_code == 0
+    cpfls.done("export", extended, "-o", tmp_path / "m.json")
     document = json.loads((tmp_path / "m.json").read_text())
     assert any(line.startswith("On held-out flights its largest gap is ") for line in document["worth"])
     assert "com_offset" in document["effects"]

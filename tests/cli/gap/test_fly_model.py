@@ -13,8 +13,7 @@ CLOSED = ("--mode", "closed-loop", "--set", "simulation.closed_loop.integration_
 @pytest.fixture(scope="module")
 def path(cpfls, gap_config, tmp_path_factory):
     target = tmp_path_factory.mktemp("path") / "trajectory.h5"
-    result = cpfls("trajectory", gap_config, "--set", f"trajectory={json.dumps(PATH)}", "-o", target)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("trajectory", gap_config, "--set", f"trajectory={json.dumps(PATH)}", "-o", target)
     return target
 
 
@@ -22,8 +21,7 @@ def path(cpfls, gap_config, tmp_path_factory):
 def fly(cpfls, gap_config, path, tmp_path):
     def call(name, *options):
         target = tmp_path / name
-        result = cpfls("simulate", gap_config, path, *CLOSED, *options, "-o", target, "--json")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("simulate", gap_config, path, *CLOSED, *options, "-o", target, "--json")
         with h5py.File(target) as file:
             return file["rotor_speed"][()], json.loads(result.stdout)["effects"]
 
@@ -58,11 +56,10 @@ def test_an_effect_that_the_model_has_is_refused(refuse, gap_config, path, exten
 def test_identified_model_is_flown(cpfls, fly, gap_config, path, tmp_path):
     """A rigid body under a fuzzy part without weight flies as the vehicle whose inertia it found."""
     flight, model = tmp_path / "flight.h5", tmp_path / "model.h5"
-    assert cpfls("simulate", gap_config, path, "-o", flight).exit_code == 0
+    cpfls.done("simulate", gap_config, path, "-o", flight)
     off = "local_search: {enabled: false}, validation: {enabled: false}"
     words = ("--set", f"identification={{base: rigid-body, population: 10, generations: 1, {off}}}")
-    result = cpfls("identify", gap_config, flight, *words, "-o", model)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("identify", gap_config, flight, *words, "-o", model)
     identified, effects = fly("identified.h5", "--model", model)
     plain, _ = fly("plain.h5")
     assert effects == {}

@@ -32,8 +32,7 @@ def test_offset_is_found_beside_the_model(answer):
 
 def test_later_stages_need_no_model_again(cpfls, brief_config, answer, tmp_path):
     folder, _ = answer
-    said = cpfls("diagnose", brief_config, folder / "disagreement.h5", "-o", tmp_path / "d.h5")
-    assert said.exit_code == 0, said.stderr
+    cpfls.done("diagnose", brief_config, folder / "disagreement.h5", "-o", tmp_path / "d.h5")
     assert (tmp_path / "d.h5").read_bytes() == (folder / "diagnosis.h5").read_bytes()
 
 
@@ -45,14 +44,11 @@ def test_a_flight_without_attitude_is_refused(refuse, brief_config, pipeline, sh
 def test_extended_model_predicts_and_is_compared(cpfls, brief_config, answer, with_attitude, tmp_path):
     folder, summary = answer
     assert summary["extension"]["written"]
-    assert cpfls("import", brief_config, with_attitude[1], "-o", tmp_path / "f.h5").exit_code == 0
+    cpfls.done("import", brief_config, with_attitude[1], "-o", tmp_path / "f.h5")
     extended = folder / "extended.h5"
-    result = cpfls("predict", brief_config, extended, tmp_path / "f.h5", "-o", tmp_path / "p.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["samples"] == 2400
+    assert cpfls.told("predict", brief_config, extended, tmp_path / "f.h5", "-o", tmp_path / "p.h5")["samples"] == 2400
     words = ("compare", brief_config, with_attitude[1], "--model", extended, "-o", tmp_path / "d.h5", "--json")
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     # What was held out for the diagnosis, seen again through the extended model.
     gap = json.loads(result.stdout)["gap"]["torque_n_m"]
     assert gap == pytest.approx(summary["gap_after"]["torque_n_m"], rel=1e-6)

@@ -1,7 +1,5 @@
 """From an ambiguous diagnosis to the flight that settles it, and a diagnosis that leaves nothing to settle."""
 
-import json
-
 import pytest
 
 from tests.builders.studies import VEHICLE
@@ -37,9 +35,7 @@ def folder(cpfls, tmp_path_factory):
 
 
 def run(cpfls, folder, command, *options):
-    result = cpfls(command, folder / "study.yaml", *options, "--json")
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout)
+    return cpfls.told(command, folder / "study.yaml", *options)
 
 
 def diagnosed(cpfls, folder, name, *training):

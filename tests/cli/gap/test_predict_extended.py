@@ -1,6 +1,5 @@
 """Prediction of a model with effects: what is left is the gap that remains."""
 
-import json
 from dataclasses import replace
 
 import h5py
@@ -29,13 +28,13 @@ def flown(cpfls, gap_config, shifted, tmp_path_factory):
     ).T
     table = np.column_stack([data[:, :1], smooth, data[:, 4:], np.zeros((len(data), 3))])
     np.savetxt(folder / "log.csv", table, delimiter=",", header=COLUMNS, comments="", fmt="%.12g")
-    assert cpfls("import", gap_config, folder / "log.csv", "-o", folder / "flight.h5").exit_code == 0
+    cpfls.done("import", gap_config, folder / "log.csv", "-o", folder / "flight.h5")
     return folder / "flight.h5"
 
 
 def test_error_is_the_gap_that_remains(cpfls, gap_config, extended, flown, tmp_path):
-    assert cpfls("predict", gap_config, extended, flown, "-o", tmp_path / "p.h5").exit_code == 0
-    assert cpfls("check", tmp_path / "p.h5").exit_code == 0
+    cpfls.done("predict", gap_config, extended, flown, "-o", tmp_path / "p.h5")
+    cpfls.done("check", tmp_path / "p.h5")
     with h5py.File(tmp_path / "p.h5") as file:
         error, measured = file["error"][50:-50], file["measured_torque"][50:-50]
         inertia = file["inertia"][0]
@@ -52,7 +51,7 @@ def test_error_is_the_gap_that_remains(cpfls, gap_config, extended, flown, tmp_p
 
 def test_a_flight_without_attitude_is_refused(cpfls, refuse, gap_config, extended, shifted, tmp_path):
     flight = tmp_path / "flight.h5"
-    assert cpfls("import", gap_config, shifted[0], "-o", flight).exit_code == 0
+    cpfls.done("import", gap_config, shifted[0], "-o", flight)
     (message,) = refuse("predict", gap_config, extended, flight, "-o", tmp_path / "x.h5")
     assert "lacks the attitude" in message
 
@@ -66,9 +65,8 @@ def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, fl
 
     def predicted(name):
         output = tmp_path / name
-        result = cpfls("predict", gap_config, extended, tmp_path / "long.h5", "-o", output, "--json")
-        assert result.exit_code == 0
-        return store.flat(output), json.loads(result.stdout)["samples"], output.read_bytes()
+        told = cpfls.told("predict", gap_config, extended, tmp_path / "long.h5", "-o", output)
+        return store.flat(output), told["samples"], output.read_bytes()
 
     whole, samples, _ = predicted("whole.h5")
     monkeypatch.setattr(flight_source, "STRETCH", PART)

@@ -38,7 +38,6 @@ def words(search, pipeline):
 def whole(cpfls, words, tmp_path_factory):
     """The model of a search that nobody stopped."""
     output = tmp_path_factory.mktemp("whole") / "model.h5"
-    result = cpfls(*words, "-o", output)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words, "-o", output)
     assert [path.name for path in output.parent.iterdir()] == ["model.h5"]
     return output

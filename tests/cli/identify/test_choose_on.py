@@ -17,7 +17,7 @@ def others(cpfls, study, tmp_path_factory):
         path, flight = (folder / f"{name}-{displacement}.h5" for name in ("trajectory", "flight"))
         turned = ("--set", f"trajectory.displacement_m={displacement}.0")
         for words in (("trajectory", study, *turned, "-o", path), ("simulate", study, path, "-o", flight)):
-            assert cpfls(*words).exit_code == 0
+            cpfls.done(*words)
         flights.append(flight)
     return flights
 
@@ -25,9 +25,7 @@ def others(cpfls, study, tmp_path_factory):
 def test_a_model_is_chosen_on_a_flight_and_judged_on_another(cpfls, study, pipeline, others, tmp_path):
     model, (kept, judged) = tmp_path / "model.h5", others
     words = ("--choose-on", kept, "--validate", judged, *HELD_OUT, *SEARCH)
-    result = cpfls("identify", study, pipeline.flight, *words, "-o", model, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
+    summary = cpfls.told("identify", study, pipeline.flight, *words, "-o", model)
     assert list(summary["held_out"]) == [judged.name]
     again = cpfls("identify", study, pipeline.flight, "--validate", kept, *SEARCH, "-o", tmp_path / "b.h5", "--json")
     # The same search, chosen by its objectives: never better on the flight that the other was chosen on.
@@ -41,9 +39,7 @@ def test_a_sweep_takes_it_for_the_settings_that_ask_for_it(cpfls, study, pipelin
     settings = [{"name": "plain"}, {"name": "held out", "set": {"identification.choice": "held-out"}}]
     config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': settings})}\n")
     words = ("sweep", config, pipeline.flight, "--validate", judged, "-o", tmp_path / "sweep.h5")
-    result = cpfls(*words, "--choose-on", kept, "--json")
-    assert result.exit_code == 0, result.stderr
-    assert [setting["runs"] for setting in json.loads(result.stdout)["settings"]] == [1, 1]
+    assert [setting["runs"] for setting in cpfls.told(*words, "--choose-on", kept)["settings"]] == [1, 1]
 
 
 @pytest.mark.parametrize("command", ["identify", "sweep"])
@@ -85,13 +81,12 @@ def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tm
     heavy, config = tmp_path / "heavy.h5", study
     path = others[0].with_name(others[0].name.replace("flight", "trajectory"))
     inertia = ("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
-    assert cpfls("simulate", study, path, *inertia, "-o", heavy).exit_code == 0
+    cpfls.done("simulate", study, path, *inertia, "-o", heavy)
     if command == "sweep":
         config = tmp_path / "sweep.yaml"
         config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': [{'name': 'plain'}]})}\n")
     words = (command, config, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
-    result = cpfls(*words, "-o", tmp_path / "out.h5")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words, "-o", tmp_path / "out.h5")
     said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
     assert len(said) == 1
     assert f"{heavy.name}: was made with another vehicle; these differ: vehicle.inertia_kg_m2" in said[0]
@@ -99,7 +94,6 @@ def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tm
 
 def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
     words = ("predict", study, pipeline.model, pipeline.flight, "--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
-    result = cpfls(*words, "-o", tmp_path / "prediction.h5")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words, "-o", tmp_path / "prediction.h5")
     said = f"{pipeline.model.name}: models a vehicle other than the config's; these differ: vehicle.inertia_kg_m2"
     assert said in result.stderr

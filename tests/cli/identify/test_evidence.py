@@ -48,13 +48,12 @@ def test_every_dataset_is_there_and_good(validated, cpfls):
         assert missing == {"period/parts", "period/mse", "period/max_error"}
         assert file["judged/vaf"].shape == file["judged/r2"].shape
         assert file["steps/part"][()] == file["residuals/part"][()] == b"held-out rest"
-    assert cpfls("check", validated[0]).exit_code == 0
+    cpfls.done("check", validated[0])
 
 
 def test_one_period_away_where_inputs_go_all_the_way_round(cpfls, study, pipeline, tmp_path):
     output = tmp_path / "model.h5"
-    result = cpfls("identify", study, pipeline.flight, "--set", "identification.input_map=full-circle", "-o", output)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("identify", study, pipeline.flight, "--set", "identification.input_map=full-circle", "-o", output)
     with h5py.File(output) as file:
         here = file["judged/mse"][list(file["judged/models"]).index(b"model"), 0]
         np.testing.assert_allclose(file["period/mse"][0], here, rtol=1e-6)
@@ -74,7 +73,7 @@ def test_the_verdict_is_printed_with_its_reasons(validated):
 def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
     model, text, _ = validated
     page = tmp_path / "report.json"
-    assert cpfls("report", study, model, "-o", page).exit_code == 0
+    cpfls.done("report", study, model, "-o", page)
     sections = json.loads(page.read_text(encoding="utf-8"))["sections"]
     blocks = {block.get("name", block["kind"]): block for section in sections for block in section["blocks"]}
     lines = [" ".join(line.split()) for line in text.splitlines()]
@@ -89,14 +88,14 @@ def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls,
 
 def test_bands_go_with_a_prediction_and_hold_the_model(validated, cpfls, study, pipeline, tmp_path):
     output = tmp_path / "prediction.h5"
-    assert cpfls("predict", study, validated[0], pipeline.flight, "-o", output).exit_code == 0
+    cpfls.done("predict", study, validated[0], pipeline.flight, "-o", output)
     with h5py.File(output) as file:
         for name in ("inertia", "torque"):
             low, value, high = (file[f"{name}{end}"][()] for end in ("_low", "", "_high"))
             assert np.all(low <= value)
             assert np.all(value <= high)
             assert np.any(low < high)
-    assert cpfls("check", output).exit_code == 0
+    cpfls.done("check", output)
 
 
 def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
@@ -110,7 +109,7 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
         assert not any(path in plain for path in VALIDATION)
         for name in ("model/fuzzy/coefficients", "weights", "judged/mse", "history/best"):
             np.testing.assert_array_equal(plain[name][()], whole[name][()])
-    assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
+    cpfls.done("predict", study, model, pipeline.flight, "-o", prediction)
     with h5py.File(prediction) as file:
         assert "inertia_low" not in file
 
@@ -118,9 +117,9 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
 def test_equal_seeds_draw_equal_evidence_and_others_do_not(validated, cpfls, study, pipeline, tmp_path):
     again, other = tmp_path / "again.h5", tmp_path / "other.h5"
     words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o")
-    assert cpfls(*words, again).exit_code == 0
+    cpfls.done(*words, again)
     assert again.read_bytes() == validated[0].read_bytes()
-    assert cpfls(*words, other, "--seed", 2).exit_code == 0
+    cpfls.done(*words, other, "--seed", 2)
     with h5py.File(other) as theirs, h5py.File(again) as ours:
         assert not np.array_equal(theirs["uncertainty/best_rigid_body"][()], ours["uncertainty/best_rigid_body"][()])
 
@@ -144,7 +143,7 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
         np.testing.assert_array_equal(plain["model/fuzzy/coefficients"][()], whole["model/fuzzy/coefficients"][()])
     monkeypatch.undo()
     assert "the same command with --resume judges it\n" in result.stderr
-    assert cpfls(*words, "--resume").exit_code == 0
+    cpfls.done(*words, "--resume")
     assert output.read_bytes() == validated[0].read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
 

@@ -44,8 +44,7 @@ def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
     )
     assert read(output, IdentifiedModel)[0].stopped == "interrupted"
     monkeypatch.undo()
-    result = cpfls(*words, "-o", output, "--resume")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["model.h5"]
 
@@ -53,18 +52,17 @@ def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
 def test_incomplete_model_predicts(cpfls, words, search, pipeline, tmp_path, interrupt_at):
     interrupt_at(40)
     assert cpfls(*words, "-o", tmp_path / "model.h5").exit_code == 130
-    result = cpfls("predict", search, tmp_path / "model.h5", pipeline.flight, "-o", tmp_path / "prediction.h5")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("predict", search, tmp_path / "model.h5", pipeline.flight, "-o", tmp_path / "prediction.h5")
 
 
 def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, whole, tmp_path, interrupt_at):
     output, option, runs = tmp_path / "model.h5", (), []
     while not runs or runs[-1].exit_code == 130:
         # The first runs do not even finish the initial population.
-        interrupt_at(5)
+        interrupt_at(7)
         runs.append(cpfls(*words, "-o", output, *option))
         option = ("--resume",)
-        assert stored(output, "history/evaluations")[-1] == min(5 * len(runs), stored(whole, "history/evaluations")[-1])
+        assert stored(output, "history/evaluations")[-1] == min(7 * len(runs), stored(whole, "history/evaluations")[-1])
     assert runs[-1].exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["model.h5"]
@@ -76,7 +74,7 @@ def test_interrupted_in_the_last_evaluation_it_is_judged_when_it_goes_on(cpfls, 
     assert result.exit_code == 130
     assert f"{tmp_path / 'model.h5'}: was found but not judged, because of the interrupt" in result.stderr
     assert names(tmp_path) == ["model.h5", "model.h5.checkpoint"]
-    assert cpfls(*words, "-o", tmp_path / "model.h5", "--resume").exit_code == 0
+    cpfls.done(*words, "-o", tmp_path / "model.h5", "--resume")
     assert names(tmp_path) == ["model.h5"]
     assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
 
@@ -125,8 +123,7 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     clock = [100.0]
     monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
-    result = cpfls(*words, "-o", output, "--time-limit", "10m")
-    assert result.exit_code == 0
+    result = cpfls.done(*words, "-o", output, "--time-limit", "10m")
     assert stored(output, "stop_reason") == b"time-limit"
     assert stored(output, "history/evaluations")[-1] == 40
     assert result.stderr.splitlines()[-1] == (
@@ -136,7 +133,7 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     go_on = "its search was stopped (time limit), go on with `cpfls identify ... --resume`"
     assert cpfls("check", output).stdout.startswith(f"{output}: keeps to its format (cpfls/model), but {go_on}\n")
     assert go_on.removeprefix("its search was ") in cpfls("info", output).stdout
-    assert cpfls(*words, "-o", output, "--resume", "--time-limit", "2h").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume", "--time-limit", "2h")
     assert cpfls("check", output).stdout.startswith(f"{output}: good (cpfls/model)\n")
     assert output.read_bytes() == whole.read_bytes()
 
@@ -154,7 +151,7 @@ def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, 
 
     monkeypatch.setattr("cpfls_cli.stages.identify.Watch", Seeing)
     quick = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
-    assert cpfls(*words, "-o", tmp_path / "model.h5", *quick, "--time-limit", text).exit_code == 0
+    cpfls.done(*words, "-o", tmp_path / "model.h5", *quick, "--time-limit", text)
     assert seen == [limit]
 
 
@@ -169,9 +166,7 @@ def test_time_limit_that_is_none(cpfls, words, tmp_path, text):
 
 def test_stalled_search_ends_converged(cpfls, words, tmp_path):
     stall = ("--set", "identification.stall_generations=1", "--set", "identification.stall_improvement=0.9")
-    result = cpfls(*words, "-o", tmp_path / "model.h5", *stall, "--json")
-    assert result.exit_code == 0
-    summary = json.loads(result.stdout)
+    summary = cpfls.told(*words, "-o", tmp_path / "model.h5", *stall)
     assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
     assert names(tmp_path) == ["model.h5"]
     lines = cpfls(*words, "-o", tmp_path / "told.h5", *stall, "-v").stdout.splitlines()

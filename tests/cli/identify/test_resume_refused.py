@@ -52,12 +52,12 @@ def test_checkpoint_of_which_nothing_is_said(refuse, words, stopped, option):
 @pytest.mark.parametrize("option", ["--resume", "--force"])
 def test_dry_run_changes_nothing(cpfls, words, stopped, option):
     before = {path: path.read_bytes() for path in stopped.parent.iterdir()}
-    assert cpfls(*words, "-o", stopped, option, "--dry-run").exit_code == 0
+    cpfls.done(*words, "-o", stopped, option, "--dry-run")
     assert {path: path.read_bytes() for path in stopped.parent.iterdir()} == before
 
 
 def test_force_starts_again(cpfls, words, stopped, whole):
-    assert cpfls(*words, "-o", stopped, "--force").exit_code == 0
+    cpfls.done(*words, "-o", stopped, "--force")
     assert stopped.read_bytes() == whole.read_bytes()
     assert [path.name for path in stopped.parent.iterdir()] == ["model.h5"]
 
@@ -93,7 +93,7 @@ def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopp
     assert "none here" in line
     other = tmp_path / "other.h5"
     noise = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", search, pipeline.trajectory, "-o", other, *noise).exit_code == 0
+    cpfls.done("simulate", search, pipeline.trajectory, "-o", other, *noise)
     (line,) = refuse("identify", search, other, "-o", stopped, "--resume")
     assert "flight = flight.h5 (" in line
     assert "other.h5 (" in line
@@ -101,8 +101,8 @@ def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopp
 
 def test_more_generations(cpfls, words, stopped, tmp_path):
     more = ("--set", "identification.generations=8")
-    assert cpfls(*words, "-o", stopped, "--resume", *more).exit_code == 0
-    assert cpfls(*words, "-o", tmp_path / "straight.h5", *more).exit_code == 0
+    cpfls.done(*words, "-o", stopped, "--resume", *more)
+    cpfls.done(*words, "-o", tmp_path / "straight.h5", *more)
     assert stopped.read_bytes() == (tmp_path / "straight.h5").read_bytes()
 
 
@@ -135,7 +135,7 @@ def test_other_file_in_the_place_of_the_output_is_not_replaced(refuse, words, st
 
 def test_killed_between_the_model_and_the_removal_of_its_checkpoint(cpfls, words, stopped, whole):
     stopped.write_bytes(whole.read_bytes())
-    assert cpfls(*words, "-o", stopped, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", stopped, "--resume")
     assert stopped.read_bytes() == whole.read_bytes()
     assert [path.name for path in stopped.parent.iterdir()] == ["model.h5"]
 

@@ -45,8 +45,7 @@ def notes(cpfls, tmp_path):
         np.savetxt(log, rows, delimiter=",", header="t,roll,pitch,yaw,p,q,r,mx,my,mz", comments="")
         config.write_text(STUDY + VEHICLE)
         for words in (("import", config, log, "-o", flight), ("identify", config, flight, "-o", tmp_path / "m.h5")):
-            result = cpfls(*words, "--force", "-v")
-            assert result.exit_code == 0, result.stderr
+            result = cpfls.done(*words, "--force", "-v")
         return [line for line in result.stderr.splitlines() if "swings" in line]
 
     return call

@@ -23,8 +23,7 @@ def test_two_processes_and_a_cluster_give_the_same_bytes(cpfls, words, tmp_path,
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
     address = request.getfixturevalue("address")
     for name, who in {"one": (), "two": ("--workers", 2), "dask": ("--scheduler", address)}.items():
-        result = cpfls(*words, "-o", tmp_path / name, *options(keys), *who)
-        assert result.exit_code == 0, result.stderr
+        cpfls.done(*words, "-o", tmp_path / name, *options(keys), *who)
     one, two, dask = ((tmp_path / name).read_bytes() for name in ("one", "two", "dask"))
     assert one == two
     assert one == dask
@@ -54,7 +53,7 @@ def test_search_goes_on_with_other_workers_after_one_was_lost(cpfls, words, whol
     assert "killed" in error
     assert note == f"cpfls: note: {output}.checkpoint: is intact; the same command with --resume goes on"
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5.checkpoint"]
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
 
 

@@ -71,21 +71,12 @@ def test_another_dimension_counts_where_it_has_no_numbers_of_its_own(pipeline):
 
 def test_single_values_are_numbers_and_words(pipeline):
     model = cpfls_cli.read(pipeline.model)
-    assert model["model/base"] == "none"
+    assert model["base"] == "none"
     assert isinstance(model["rank"], int)
     assert model.summary["rank"] == model["rank"] == pipeline.summaries["model"]["rank"]
     assert model.config["identification"]["membership_functions"] == 5
     with pytest.raises(KeyError, match="rang"):
         model["rang"]
-
-
-def test_it_prints_what_info_prints(cpfls, pipeline):
-    model = cpfls_cli.read(pipeline.model)
-    said = [" ".join(line.split()) for line in str(model).splitlines()]
-    told = {" ".join(line.split()) for line in cpfls("info", pipeline.model, "-v").stdout.splitlines()}
-    rows = [line for line in said if line.split(" ")[0] in model]
-    assert len(rows) == len(model)
-    assert set(rows) <= told
 
 
 def test_a_result_prints_shape_unit_and_meaning_of_every_dataset(pipeline):

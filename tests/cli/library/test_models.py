@@ -154,7 +154,7 @@ def test_what_is_in_memory_has_no_file_before_it_is_written(pipeline):
 
 def test_commands_run_in_this_process_and_say_what_is_wrong(capsys, pipeline, tmp_path):
     cpfls_cli.run("info", pipeline.model)
-    assert capsys.readouterr().out.startswith("cpfls/model")
+    assert ": model.h5: an identified model" in capsys.readouterr().out
     with pytest.raises(cpfls_cli.CpflsError, match=r"cpfls info .*none\.h5: exit code 2"):
         cpfls_cli.run("info", tmp_path / "none.h5")
     assert "none.h5: no such file" in capsys.readouterr().err

@@ -38,8 +38,8 @@ def sweep(tmp_path_factory):
 def sweep_flight(cpfls, sweep):
     """A flight of the study."""
     trajectory, flight = sweep.with_name("trajectory.h5"), sweep.with_name("flight.h5")
-    assert cpfls("trajectory", sweep, "-o", trajectory).exit_code == 0
-    assert cpfls("simulate", sweep, trajectory, "-o", flight).exit_code == 0
+    cpfls.done("trajectory", sweep, "-o", trajectory)
+    cpfls.done("simulate", sweep, trajectory, "-o", flight)
     return flight
 
 
@@ -53,7 +53,6 @@ def words(sweep, sweep_flight):
 def whole(cpfls, words, tmp_path_factory):
     """A sweep that nobody stopped."""
     output = tmp_path_factory.mktemp("whole") / "sweep.h5"
-    result = cpfls(*words, "-o", output)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words, "-o", output)
     assert [path.name for path in output.parent.iterdir()] == ["sweep.h5"]
     return output

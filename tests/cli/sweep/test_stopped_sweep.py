@@ -69,34 +69,31 @@ def once(words):
 @pytest.fixture(scope="module")
 def whole_once(cpfls, once, tmp_path_factory):
     output = tmp_path_factory.mktemp("once") / "sweep.h5"
-    assert cpfls(*once, "-o", output).exit_code == 0
+    cpfls.done(*once, "-o", output)
     return output
 
 
-@pytest.mark.parametrize("moment", ["before", "after"])
-@pytest.mark.parametrize("call", range(1, 9))
-def test_stopped_dead_at_any_file_it_writes_it_ends_the_same(
-    cpfls, once, whole_once, tmp_path, monkeypatch, call, moment
-):
-    """The first writes: no run yet, three generations, the first run, the next run's generations."""
+@pytest.mark.parametrize("call", range(1, 10))
+def test_stopped_dead_at_any_file_it_writes_it_ends_the_same(cpfls, once, whole_once, tmp_path, monkeypatch, call):
+    """The first writes: no run yet, three generations, the first run, the next run's generations.
+
+    Before one is in its place is after the one before it.
+    """
 
     output, calls, replace = tmp_path / "sweep.h5", [], os.replace
 
     def stopping(*paths):
         calls.append(paths)
-        if len(calls) == call and moment == "before":
-            raise Killed
-        replace(*paths)
         if len(calls) == call:
             raise Killed
+        replace(*paths)
 
     monkeypatch.setattr("os.replace", stopping)
     with pytest.raises(Killed):
         cpfls(*once, "-o", output)
     monkeypatch.undo()
     assert not output.exists()
-    result = cpfls(*once, "-o", output, *(["--resume"] if (tmp_path / PARTIAL).exists() else []))
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*once, "-o", output, *(["--resume"] if (tmp_path / PARTIAL).exists() else []))
     assert output.read_bytes() == whole_once.read_bytes()
     assert names(tmp_path) == ["sweep.h5"]
 
@@ -121,7 +118,7 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on(
     for own, all_runs in zip(incomplete.settings, sweep_in(whole).settings, strict=True):
         assert own.of("mse").tolist() == all_runs.of("mse")[: own.runs].tolist()
     monkeypatch.undo()
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["sweep.h5"]
 
@@ -134,7 +131,7 @@ def test_what_is_finished_or_evaluated_is_not_searched_again(
     assert cpfls(*words, "-o", output).exit_code == 130
     total = int(sum(own.of("evaluations").sum() for own in sweep_in(whole).settings))
     at_evaluation(total - 50, lambda: evaluated.append("last"))
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert evaluated == ["last"]
     assert output.read_bytes() == whole.read_bytes()
 
@@ -143,10 +140,10 @@ def test_time_limit_is_for_all_runs_together(cpfls, words, whole, tmp_path, at_e
     output, clock = tmp_path / "sweep.h5", [100.0]
     monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 200.0))
-    assert cpfls(*words, "-o", output, "--time-limit", "90s").exit_code == 0
+    cpfls.done(*words, "-o", output, "--time-limit", "90s")
     assert not sweep_in(output).complete
     monkeypatch.undo()
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
 
 
@@ -157,7 +154,7 @@ def test_damaged_checkpoint_costs_its_run_only(cpfls, words, whole, tmp_path, in
     monkeypatch.undo()
     checkpoint = tmp_path / CHECKPOINT
     checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()
 
 
@@ -166,5 +163,5 @@ def test_more_seeds_go_on_from_fewer(cpfls, words, whole, tmp_path, interrupt_at
     interrupt_at(40)
     assert cpfls(*words, "-o", output, "--set", "sweep.seeds=1").exit_code == 130
     monkeypatch.undo()
-    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    cpfls.done(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()

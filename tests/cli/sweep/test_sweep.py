@@ -40,11 +40,10 @@ def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
     selection, model = tmp_path / "selection.h5", tmp_path / "model.h5"
     options = []
     if "reduction.size=null" not in texts:
-        assert cpfls("reduce", sweep, sweep_flight, "-o", selection, *overrides).exit_code == 0
+        cpfls.done("reduce", sweep, sweep_flight, "-o", selection, *overrides)
         options = ["--selection", selection]
-    result = cpfls("identify", sweep, sweep_flight, *options, "-o", model, *overrides, "--seed", seed, "--json")
-    assert result.exit_code == 0, result.stderr
-    run, found = own.replicates[seed - 5], json.loads(result.stdout)
+    found = cpfls.told("identify", sweep, sweep_flight, *options, "-o", model, *overrides, "--seed", seed)
+    run = own.replicates[seed - 5]
     with h5py.File(model) as file:
         assert list(run.chromosome) == file["weights"][()].tolist()
     for name in ("mse", "max_error", "relative_error"):
@@ -73,7 +72,7 @@ def test_printed_means_and_variances_are_those_of_the_runs(cpfls, words, whole, 
 def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
     output = tmp_path / "sweep.h5"
     options = ("--set", "sweep.settings=[]", "--set", "sweep.seeds=1", "--seed", 9)
-    assert cpfls(*words, "-o", output, *options).exit_code == 0
+    cpfls.done(*words, "-o", output, *options)
     (own,) = sweep_in(output).settings
     assert (own.name, own.seeds.tolist(), own.population) == ("as configured", [9], 8)
 
@@ -81,10 +80,10 @@ def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
 def test_held_out_parts_and_other_flights_are_judged(cpfls, words, sweep, sweep_flight, tmp_path):
     other, output = tmp_path / "other.h5", tmp_path / "sweep.h5"
     noise = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", sweep, sweep_flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
+    cpfls.done("simulate", sweep, sweep_flight.with_name("trajectory.h5"), "-o", other, *noise)
     settings = "[{name: split, set: {identification.training_share: 0.7}}, {name: whole}]"
     options = ("--set", f"sweep.settings={settings}", "--set", "sweep.seeds=1", "--validate", other)
-    assert cpfls(*words, "-o", output, *options).exit_code == 0
+    cpfls.done(*words, "-o", output, *options)
     sweep = sweep_in(output)
     assert sweep.parts == ("training", "held-out rest", "other.h5")
     known = [np.isfinite(own.replicates[0].mse).tolist() for own in sweep.settings]
@@ -99,8 +98,7 @@ def test_workers_find_the_same(cpfls, words, tmp_path):
         "sweep.settings=[{name: more}, {name: fewer, set: {reduction.size: 40}}]",
     )
     for count in (1, 2):
-        result = cpfls(*words, "-o", tmp_path / f"{count}.h5", *least, "--workers", count)
-        assert result.exit_code == 0, result.stderr
+        cpfls.done(*words, "-o", tmp_path / f"{count}.h5", *least, "--workers", count)
     assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
 
 
@@ -117,17 +115,10 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
         return identify(*arguments)
 
     monkeypatch.setattr(sweep_runs, "identify", sometimes)
-    result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--json")
-    assert result.exit_code == 0
+    result = cpfls.done(*words, "-o", tmp_path / "sweep.h5", "--json")
     assert result.stderr == "cpfls: note: 1 of 6 runs found no finite model; all means leave them out\n"
     first = json.loads(result.stdout)["settings"][0]
     assert first["runs"] == 2
     assert first["mse"]["mean"] == first["mse"]["smallest"]
     assert first["mse"]["variance"] is None
     assert sweep_in(tmp_path / "sweep.h5").without_model == 1
-
-
-def test_dry_run_writes_nothing(cpfls, words, tmp_path):
-    result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--dry-run")
-    assert result.exit_code == 0
-    assert list(tmp_path.iterdir()) == []

@@ -29,30 +29,11 @@ def test_nothing_to_resume(refuse, words, tmp_path):
     assert line == f"{tmp_path / 'sweep.h5'}.partial: no such file, so nothing to resume; start without --resume"
 
 
-@pytest.mark.parametrize("suffix", ["partial", "checkpoint"])
-def test_a_file_of_the_user_with_the_name_of_what_a_sweep_leaves_is_kept(refuse, words, tmp_path, suffix):
-    notes = tmp_path / f"sweep.h5.{suffix}"
-    notes.write_text("my notes\n")
-    (line,) = refuse(*words, "-o", tmp_path / "sweep.h5", "--force")
-    assert line.startswith(f"{notes}: has the name of what a stopped ")
-    assert notes.read_text() == "my notes\n"
-
-
-def test_finished_sweep_has_nothing_to_resume(refuse, words, whole):
-    assert refuse(*words, "-o", whole, "--resume") == [f"{whole}: is complete; nothing to resume"]
-
-
 def test_finished_runs_of_which_nothing_is_said(refuse, words, stopped):
     (line,) = refuse(*words, "-o", stopped)
     assert line == (
         f"{stopped}.partial: a sweep for {stopped} was stopped here; --resume continues it, --force starts again"
     )
-
-
-def test_force_starts_again(cpfls, words, stopped, whole):
-    assert cpfls(*words, "-o", stopped, "--force").exit_code == 0
-    assert stopped.read_bytes() == whole.read_bytes()
-    assert [path.name for path in stopped.parent.iterdir()] == ["sweep.h5"]
 
 
 @pytest.mark.parametrize(
@@ -77,33 +58,6 @@ def test_fewer_seeds_than_are_finished(cpfls, refuse, words, tmp_path, interrupt
     assert cpfls(*words, "-o", output).exit_code == 130
     (line,) = refuse(*words, "-o", output, "--resume", "--set", "sweep.seeds=1")
     assert "sweep.seeds = 1, but " in line
-
-
-def test_other_flight(cpfls, refuse, sweep, sweep_flight, stopped, tmp_path):
-    other = tmp_path / "other.h5"
-    noise = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", sweep, sweep_flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
-    (line,) = refuse("sweep", sweep, other, "-o", stopped, "--resume")
-    assert "flight = flight.h5 (" in line
-    assert "other.h5 (" in line
-
-
-def test_damaged_runs(refuse, words, stopped):
-    partial = stopped.with_name("sweep.h5.partial")
-    partial.write_bytes(partial.read_bytes()[:2000])
-    (line,) = refuse(*words, "-o", stopped, "--resume")
-    assert line.startswith(f"{partial}: ")
-    assert line.endswith("--force without --resume starts again")
-
-
-def test_other_file_in_the_place_of_the_output_is_not_replaced(refuse, words, stopped):
-    stopped.write_bytes(b"precious")
-    assert refuse(*words, "-o", stopped, "--resume") == [f"{stopped}: exists already; --force replaces it"]
-
-
-def test_workers_and_scheduler_exclude_each_other(refuse, words, tmp_path):
-    (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
-    assert line == "--scheduler: brings its own workers; leave out --workers"
 
 
 def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path):
@@ -131,5 +85,4 @@ def test_a_setting_that_does_not_fit_stops_only_what_sweeps(cpfls, refuse, words
         ("identify", sweep, sweep_flight, "--selection", selection, "-o", model),
         ("predict", sweep, model, sweep_flight, "-o", tmp_path / "prediction.h5"),
     ):
-        result = cpfls(*command, *MISFIT)
-        assert result.exit_code == 0, result.stderr
+        cpfls.done(*command, *MISFIT)

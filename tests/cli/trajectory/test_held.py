@@ -33,31 +33,28 @@ def study(tmp_path):
 
 
 def test_a_held_vehicle_has_no_position(cpfls, tmp_path, study):
-    planned = cpfls("trajectory", study(), "-o", tmp_path / "t.h5", "--plot")
-    assert planned.exit_code == 0, planned.output
+    planned = cpfls.done("trajectory", study(), "-o", tmp_path / "t.h5", "--plot")
     assert "held at its centre of mass" in planned.stdout
     assert ">yaw</" in (tmp_path / "t-rotation.svg").read_text()
     with h5py.File(tmp_path / "t.h5") as file:
         assert "position" not in file
         turned = np.ptp(file["attitude"][:], axis=0)
     assert turned.min() > np.pi
-    assert cpfls("check", tmp_path / "t.h5").exit_code == 0
-    assert cpfls("report", study(), tmp_path / "t.h5", "-o", tmp_path / "r.html").exit_code == 0
+    cpfls.done("check", tmp_path / "t.h5")
+    cpfls.done("report", study(), tmp_path / "t.h5", "-o", tmp_path / "r.html")
 
 
 def test_another_seed_turns_otherwise(cpfls, tmp_path, study):
     paths = []
     for seed in (1, 2):
-        assert cpfls("trajectory", study(seed=seed), "-o", tmp_path / f"{seed}.h5").exit_code == 0
+        cpfls.done("trajectory", study(seed=seed), "-o", tmp_path / f"{seed}.h5")
         with h5py.File(tmp_path / f"{seed}.h5") as file:
             paths.append(file["attitude"][:])
     assert np.abs(paths[0] - paths[1]).max() > 1
 
 
 def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
-    result = cpfls("trajectory", study("optimised"), "-o", tmp_path / "t.h5", "--json")
-    assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
+    told = cpfls.told("trajectory", study("optimised"), "-o", tmp_path / "t.h5")
     assert told["condition_number"] <= told["random"]["best"] <= told["random"]["median"]
     assert told["evaluations"] == 5
 
@@ -66,20 +63,18 @@ def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
 def test_a_model_learned_on_full_rotations_holds_on_another_one(cpfls, tmp_path, study):
     for seed in (1, 2):
         t, f = tmp_path / f"t{seed}.h5", tmp_path / f"f{seed}.h5"
-        assert cpfls("trajectory", study(seed=seed), "-o", t).exit_code == 0
-        assert cpfls("simulate", study(seed=seed), t, "-o", f).exit_code == 0
-    found = cpfls(
+        cpfls.done("trajectory", study(seed=seed), "-o", t)
+        cpfls.done("simulate", study(seed=seed), t, "-o", f)
+    found = cpfls.done(
         *("identify", study(), tmp_path / "f1.h5", "--validate", tmp_path / "f2.h5", "-o", tmp_path / "m.h5", "--json")
     )
-    assert found.exit_code == 0, found.output
     assert json.loads(found.stdout)["held_out"]["f2.h5"]["relative_error"] < 1e-8
-    report = cpfls("report", study(), tmp_path / "f1.h5", "-o", tmp_path / "r.html")
-    assert report.exit_code == 0, report.output
+    cpfls.done("report", study(), tmp_path / "f1.h5", "-o", tmp_path / "r.html")
     assert "Attitude and Euler rates of f1.h5" in (tmp_path / "r.html").read_text()
 
 
 def test_what_a_held_vehicle_lacks_has_no_noise(cpfls, refuse, tmp_path, study):
-    assert cpfls("trajectory", study(), "-o", tmp_path / "t.h5").exit_code == 0
+    cpfls.done("trajectory", study(), "-o", tmp_path / "t.h5")
     noise = ("--set", "simulation.noise={position: 0.5}")
     (message,) = refuse("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", *noise)
     assert "simulation.noise" in message
@@ -87,7 +82,7 @@ def test_what_a_held_vehicle_lacks_has_no_noise(cpfls, refuse, tmp_path, study):
 
 
 def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):
-    assert cpfls("trajectory", study(), "-o", tmp_path / "t.h5").exit_code == 0
+    cpfls.done("trajectory", study(), "-o", tmp_path / "t.h5")
     command = ("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", "--mode", "closed-loop")
     (message,) = refuse(*command)
     assert "turns a vehicle that is held at its centre of mass" in message

@@ -29,9 +29,7 @@ def config(tmp_path_factory):
 @pytest.fixture(scope="module")
 def mission(cpfls, config, tmp_path_factory):
     output = tmp_path_factory.mktemp("planned") / "mission.h5"
-    result = cpfls("trajectory", config, *HOVER, "-o", output, "--json")
-    assert result.exit_code == 0, result.output
-    return output, json.loads(result.stdout)
+    return output, cpfls.told("trajectory", config, *HOVER, "-o", output)
 
 
 def test_the_summary_tells_runs_and_excitation(mission):
@@ -47,8 +45,7 @@ def test_the_summary_tells_runs_and_excitation(mission):
 
 def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_path):
     flight = tmp_path / "flight.h5"
-    result = cpfls("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
-    assert result.exit_code == 0, result.output
+    cpfls.done("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
     planned, flown = read(mission[0], PlannedPath)[0], read(flight, Flight)[0]
     firsts = [round(run.begin / planned.time[1]) for run in planned.runs]
     length = round(planned.runs[0].end / planned.time[1]) + 1
@@ -62,18 +59,15 @@ def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_p
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_repeated_path_says_how_long_it_takes_and_why(cpfls, config, tmp_path):
-    result = cpfls("trajectory", config, "--repeat", "3", "-o", tmp_path / "m.h5", "-v")
-    assert result.exit_code == 0, result.output
+    result = cpfls.done("trajectory", config, "--repeat", "3", "-o", tmp_path / "m.h5", "-v")
     assert "The path is flown 3 times, each run the same from rest to rest: 54.86 s each" in result.stdout
     assert "each is an instrument for the others" in result.stdout
-    report = cpfls("report", config, tmp_path / "m.h5", "-o", tmp_path / "m.md")
-    assert report.exit_code == 0, report.output
+    cpfls.done("report", config, tmp_path / "m.h5", "-o", tmp_path / "m.md")
     assert "The path is flown 3 times" in (tmp_path / "m.md").read_text()
 
 
 def test_an_excitation_is_made_smaller_with_the_limit_that_it_reaches(cpfls, config, tmp_path):
-    result = cpfls("trajectory", config, *HOVER, "--size", "20", "-o", tmp_path / "m.h5")
-    assert result.exit_code == 0, result.output
+    result = cpfls.done("trajectory", config, *HOVER, "--size", "20", "-o", tmp_path / "m.h5")
     assert (
         "roll and pitch: excited less than asked for, because more would pass the limit on rotor speed ("
         in result.stderr
@@ -82,12 +76,10 @@ def test_an_excitation_is_made_smaller_with_the_limit_that_it_reaches(cpfls, con
 
 def test_files_for_autopilots_stand_beside_the_path(cpfls, config, tmp_path):
     home = ("--format", "px4", "--format", "csv", "--home", "47.3977,8.5456,10")
-    result = cpfls("trajectory", config, "--repeat", "2", *home, "-o", tmp_path / "m.h5", "--json")
-    assert result.exit_code == 0, result.output
+    cpfls.done("trajectory", config, "--repeat", "2", *home, "-o", tmp_path / "m.h5", "--json")
     items = json.loads((tmp_path / "m.plan").read_text())["mission"]["items"]
     assert [item["command"] for item in items].count(16) == 8
-    swept = cpfls("trajectory", config, *HOVER, "--format", "ardupilot", "-o", tmp_path / "s.h5", "--json")
-    assert swept.exit_code == 0, swept.output
+    cpfls.done("trajectory", config, *HOVER, "--format", "ardupilot", "-o", tmp_path / "s.h5", "--json")
     files = sorted(path.name for path in tmp_path.iterdir())
     assert files == ["m-waypoints.csv", "m.h5", "m.plan", "s-sid-pitch.param", "s-sid-roll.param", "s.h5"]
     again = cpfls("trajectory", config, *HOVER, "--format", "ardupilot", "-o", tmp_path / "s.h5")
@@ -100,8 +92,7 @@ def test_files_for_autopilots_stand_beside_the_path(cpfls, config, tmp_path):
 def test_a_next_flight_is_repeated_too(cpfls, config, tmp_path):
     few = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=1")
     words = ("--to-tell", "com_offset,torque_bias", "--duration", "10", "--box", "5,4,3", "--height", "3", *few)
-    result = cpfls("trajectory", config, *words, "--repeat", "2", "-o", tmp_path / "n.h5")
-    assert result.exit_code == 0, result.output
+    cpfls.done("trajectory", config, *words, "--repeat", "2", "-o", tmp_path / "n.h5")
     record = read(tmp_path / "n.h5", PlannedPath)[0]
     np.testing.assert_allclose([run.begin for run in record.runs], [0.0, 14.0])
     length = round(10.0 / 0.02) + 1

@@ -1,7 +1,6 @@
 """The flight that tells rivals apart: planned, written with waypoints, the same by seed; what makes no sense."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
@@ -32,9 +31,7 @@ def config(tmp_path_factory):
 @pytest.fixture(scope="module")
 def planned(cpfls, config, tmp_path_factory):
     output = tmp_path_factory.mktemp("planned") / "next.h5"
-    result = cpfls("trajectory", config, *PAIR, *SMALL, *FEW, "-o", output, "--json")
-    assert result.exit_code == 0, result.output
-    return output, json.loads(result.stdout)
+    return output, cpfls.told("trajectory", config, *PAIR, *SMALL, *FEW, "-o", output)
 
 
 def test_the_flight_keeps_to_the_box_and_starts_and_ends_at_rest(planned):
@@ -72,25 +69,23 @@ def test_waypoints_are_the_path(planned):
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(cpfls, config, planned, tmp_path):
     for seed, same in ((4, True), (5, False)):
         output = tmp_path / "next.h5"
-        assert cpfls("trajectory", config, *PAIR, *SMALL, *FEW, "-o", output, "--force", "--seed", seed).exit_code == 0
+        cpfls.done("trajectory", config, *PAIR, *SMALL, *FEW, "-o", output, "--force", "--seed", seed)
         assert (output.read_bytes() == planned[0].read_bytes()) is same
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, config, planned, tmp_path):
-    flown = cpfls("simulate", config, planned[0], "-o", tmp_path / "flight.h5")
-    assert flown.exit_code == 0, flown.output
-    page = cpfls("report", config, planned[0], "-o", tmp_path / "page.md")
-    assert page.exit_code == 0, page.output
+    cpfls.done("simulate", config, planned[0], "-o", tmp_path / "flight.h5")
+    cpfls.done("report", config, planned[0], "-o", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text().replace("\\_", "_")
     assert "This flight separates offset of the centre of mass from constant torque" in text
     assert "If the diagnosis then names com_offset alone, it is com_offset and not torque_bias" in text
 
 
 def test_a_single_effect_is_shown(cpfls, config, tmp_path):
-    result = cpfls("trajectory", config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5", "--json")
-    assert result.exit_code == 0, result.output
-    (row,) = json.loads(result.stdout)["questions"]
+    (row,) = cpfls.told("trajectory", config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5")[
+        "questions"
+    ]
     assert (row["true"], row["rival"]) == ("rotor_drag", "")
 
 

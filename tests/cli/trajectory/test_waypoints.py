@@ -33,9 +33,9 @@ def position(path):
 
 
 def test_every_waypoint_is_reached_at_rest(cpfls, tmp_path, config, points):
-    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, "--json")
-    assert result.exit_code == 0, result.output
-    first, second = json.loads(result.stdout)["legs"]
+    first, second = cpfls.told("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE)[
+        "legs"
+    ]
     time, place, yaw = position(tmp_path / "t.h5")
     np.testing.assert_allclose(place[0], [1, 2, 3])
     # The pause of the first point comes before the first leg, that of the last one after the last leg.
@@ -49,8 +49,7 @@ def test_every_waypoint_is_reached_at_rest(cpfls, tmp_path, config, points):
 
 
 def test_limits_hold_and_are_named(cpfls, tmp_path, config, points):
-    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", "-v", *LIMITED, *FREE)
-    assert result.exit_code == 0, result.output
+    result = cpfls.done("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", "-v", *LIMITED, *FREE)
     assert re.search(r"^1 +9 +[\d.]+ +10 +.*pop", result.stdout, re.MULTILINE)
     with h5py.File(tmp_path / "t.h5") as file:
         assert "pop" in [each.decode() for each in file["legs/limited_by/values"]]
@@ -80,11 +79,10 @@ def test_each_axis_goes_where_it_is_to_go_forwards_or_backwards(cpfls, tmp_path,
         "--set",
         "trajectory.limits={velocity_m_s: [4, 3, 2], acceleration_m_s2: 3, snap_m_s4: 20, pop_m_s6: 300}",
     )
-    result = cpfls(
+    result = cpfls.done(
         *("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5", *uneven, *FREE, *asked, "--json"),
         *("--set", "trajectory.pause_s=1"),
     )
-    assert result.exit_code == 0, result.output
     time, place, _ = position(tmp_path / "t.h5")
     for leg, end in zip(json.loads(result.stdout)["legs"], places[1:], strict=True):
         resting = (time > leg["begin_s"] + leg["duration_s"]) & (time < leg["begin_s"] + leg["duration_s"] + 0.9)
@@ -99,8 +97,7 @@ def test_each_axis_goes_where_it_is_to_go_forwards_or_backwards(cpfls, tmp_path,
 
 def test_each_axis_takes_the_time_of_the_slowest(cpfls, tmp_path, config, points):
     asked = ("--set", "trajectory.coordination=each-axis", "--set", "trajectory.displacement_measure=per-axis")
-    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *asked)
-    assert result.exit_code == 0, result.output
+    cpfls.done("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *asked)
     with h5py.File(tmp_path / "t.h5") as file:
         velocity = np.abs(file["velocity"][:])
         np.testing.assert_allclose(file["position"][-1], [11, 12, 8], atol=1e-12)
@@ -176,8 +173,7 @@ def test_tilt_beyond_its_limit_is_refused_or_reported(cpfls, refuse, tmp_path, c
     steep = ("trajectory", config, "-o", tmp_path / "t.h5", "--set", "trajectory.tilt_max_rad=0.1")
     messages = refuse(*steep, code=1)
     assert messages[0].startswith("tilt of up to 0.18")
-    told = cpfls(*steep, "--set", "trajectory.infeasible=report")
-    assert told.exit_code == 0
+    told = cpfls.done(*steep, "--set", "trajectory.infeasible=report")
     assert "tilt of up to 0.18" in told.stderr
 
 
@@ -223,8 +219,7 @@ def test_waypoints_that_numbers_cannot_hold_are_refused(refuse, tmp_path, config
 
 def test_a_file_replaces_a_path_that_could_not_be_planned(cpfls, tmp_path, config, points):
     replaced = ("--set", "trajectory.path=optimised")
-    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *replaced)
-    assert result.exit_code == 0, result.output
+    cpfls.done("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *replaced)
 
 
 def test_a_dry_run_finds_what_the_plan_would(refuse, tmp_path, config):
@@ -244,7 +239,7 @@ def test_a_given_period_that_decides_alone_is_named(cpfls, tmp_path, config):
 
 
 def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):
-    assert cpfls("trajectory", config, "-o", tmp_path / "t.h5", "--plot").exit_code == 0
+    cpfls.done("trajectory", config, "-o", tmp_path / "t.h5", "--plot")
     for name, words in (("derivatives", ["pop", "crackle", "displacement"]), ("attitude", ["roll", "pitch"])):
         drawn = (tmp_path / f"t-{name}.svg").read_text()
         assert all(f">{word}</" in drawn for word in words)

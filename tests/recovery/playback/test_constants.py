@@ -71,7 +71,7 @@ def test_what_instruments_do_not_tell_is_not_determined(constants):
 
 @cache
 def _of_three_paths(truth):
-    return list(gusty_flights([Flight(truth, GUSTS, path, 100 + path, reach=3.0) for path in range(3)], 30.0))
+    return list(gusty_flights([Flight(truth, GUSTS, path, 100 + path, reach=3.0) for path in range(3)], 20.0))
 
 
 def _by_what_was_before(truth, leave_out=()):

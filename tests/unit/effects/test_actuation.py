@@ -5,11 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.actuation import DelayLine, second_order
-from cpfls_cli.effects.hooks import RotorMotion
+from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.stepping import Machine, RotorMotion
+from cpfls_cli.vehicle.values import Each
+
+
+def step_by_step(link, speed, period):
+    """Speeds and accelerations of rotors behind a link, for speeds that are given step by step."""
+    rotors = speed.shape[1]
+
+    def build(memory, given):
+        passed = link(RotorMotion(Each(given), Each([0.0] * rotors)), memory)
+        return *passed.speed, *passed.acceleration
+
+    machine = Machine.of(build, rotors, period)
+    return np.split(np.array([machine.advance(tuple(row)) for row in speed.tolist()]), 2, axis=1)
 
 
 @pytest.mark.parametrize(
@@ -47,10 +60,10 @@ def test_filter_answers_a_wave_as_its_formula_says(upper, frequency):
 @pytest.mark.parametrize(("name", "breadth"), [("notch_filter", "width"), ("low_pass_filter", "damping")])
 def test_a_filter_passes_rotors_step_by_step_as_along_a_flight(commanded, name, breadth):
     known, shape = CATALOGUE[name], {"frequency_hz": 4.0, breadth: 0.7}
-    link = known.actuation.link(shape, commanded.period)
-    passed = [link(RotorMotion(speed, 0 * speed)) for speed in commanded.speed]
-    np.testing.assert_allclose([one.speed for one in passed], known.apply(commanded, shape).speed, rtol=1e-12)
-    assert not np.any([one.acceleration for one in passed])
+    link = known.actuation.link
+    speed, acceleration = step_by_step(lambda one, memory: link(one, shape, memory), commanded.speed, commanded.period)
+    np.testing.assert_allclose(speed, known.apply(commanded, shape).speed, rtol=1e-12)
+    assert not acceleration.any()
 
 
 def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
@@ -85,8 +98,18 @@ def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, f
         np.testing.assert_allclose(columns(entry.name, known, **shape).direct[..., 0], change, atol=1e-12)
 
 
-@pytest.mark.parametrize("steps", [0.0, 2.0, 2.3])
+@pytest.mark.parametrize("steps", [0.0, 0.4, 1.0, 2.0, 2.3])
 def test_a_delay_taken_step_by_step_is_that_along_a_flight(commanded, steps):
-    line, still = DelayLine(steps), np.zeros_like(commanded.speed[0])
-    passed = [line(RotorMotion(speed, still)) for speed in commanded.speed]
-    np.testing.assert_allclose([one.speed for one in passed], delayed(commanded.speed, steps, "linear"), rtol=1e-12)
+    speed, _ = step_by_step(lambda one, memory: memory.delayed(one, steps), commanded.speed, 1.0)
+    np.testing.assert_allclose(speed, delayed(commanded.speed, steps, "linear"), rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 3.0])
+def test_a_lag_taken_step_by_step_is_that_of_what_stays_the_same_during_each_step(commanded, ratio):
+    speed = commanded.speed
+    middle, _ = step_by_step(
+        lambda one, memory: one._replace(speed=memory.lagged(one.speed, ratio, speed[0])), speed, 1.0
+    )
+    along = lagged(speed, ratio, "previous")
+    expected = speed + (along.start - speed) * (np.exp(-0.5 / ratio) if ratio else 0.0)
+    np.testing.assert_allclose(middle, expected, rtol=1e-12)

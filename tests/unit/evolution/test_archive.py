@@ -36,13 +36,6 @@ def test_a_known_chromosome_recalls_its_refinement_and_so_does_the_refined_one()
     assert again.objectives.tolist() == [[30.0, -30.0]] * 2
 
 
-def test_an_evaluator_is_not_called_for_nothing():
-    archive, recorder = Archive(), Recorder()
-    archive.evaluate(np.array([[10]]), recorder)
-    archive.evaluate(np.array([[10]]), recorder)
-    assert len(recorder.calls) == 1
-
-
 def test_objectives_that_are_not_finite_are_kept_as_worst():
     archive = Archive()
     archive.store(np.array([[1], [2]]), Evaluation(np.array([[1], [2]]), np.array([[np.nan, -np.inf], [1, 2]])))
@@ -59,16 +52,6 @@ def test_the_front_grows_and_forgets_the_dominated():
         archive.store(genes[[row]], Evaluation(genes[[row]], objectives[[row]]))
         fronts.append(archive.front.genes[:, 0].tolist())
     assert fronts == [[0], [0, 1], [1, 2], [1, 2], [1, 2, 4]]
-
-
-def test_an_archive_is_restored_from_its_records():
-    archive, recorder = Archive(), Recorder()
-    archive.evaluate(np.array([[13], [2], [31]]), recorder)
-    restored = Archive()
-    restored.store(archive.submitted, archive.results)
-    recalled = restored.evaluate(np.array([[40], [2], [13]]), recorder)
-    assert len(recorder.calls) == 1
-    assert recalled.genes.tolist() == [[40], [10], [20]]
 
 
 @pytest.mark.parametrize(

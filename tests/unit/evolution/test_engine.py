@@ -63,10 +63,6 @@ def run(evaluate, seed=1, settings=SETTINGS, gene_count=6, **options):
     return list(evolve(evaluate, gene_count, settings, np.random.default_rng(seed), **options))
 
 
-def test_hypervolume_of_the_test_is_that_of_three_steps():
-    assert hypervolume([(1, 3), (2, 2), (3, 1), (3, 3)], (4, 4)) == 1 * 1 + 2 * 1 + 3 * 1
-
-
 @pytest.mark.parametrize(
     "operators",
     [PAPER, replace(PAPER, reinsertion="fitness"), EvolutionSettings()],

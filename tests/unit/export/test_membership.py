@@ -18,12 +18,14 @@ from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.table import Remainder
+from cpfls_cli.playback.table import Remainder, learned_wrench
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
+from cpfls_cli.vehicle.motion import Instant, Numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import Each
 from tests.builders.compiled_c import evaluate, require_gcc, written
 from tests.builders.exported_models import Case, model_of, sheet_of
 from tests.builders.exported_vehicles import FORMS, on_numpy
@@ -134,6 +136,13 @@ def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(len(still), axis=0)
     vehicle = model.table if form == "library" else FORMS[form](tmp_path, model)
     torque = vehicle.wrench(airflow.air, still, rotor)[:, 0]
+    np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
+
+
+def test_the_learned_part_of_a_vehicle_that_is_simulated(airflow):
+    acts, rotors = learned_wrench(airflow.model.remainder), Each([0.0] * airflow.model.rotors)
+    seen = (Instant(VehicleSettings(), rotors, air_velocity=tuple(air)) for air in airflow.air.tolist())
+    torque = [acts(one, Numbers()).torque[0] for one in seen]
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""Sums over samples against the rows written out: with and without a rigid body, scaled by axis, by label."""
+"""Compiled sums over samples against the rows written out: of all structures, scaled by axis, by label."""
 
 import pickle
 from dataclasses import replace
@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 
+from cpfls_cli.compiling import compiled
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
@@ -19,7 +20,7 @@ from cpfls_cli.identification.settings import IdentificationSettings, RidgeSetti
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
-from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.flights import no_torque, random_flight
 from tests.builders.torque_sensitivity import torque_sensitivity
 
@@ -34,23 +35,50 @@ def flight_of_noise(samples=SAMPLES):
     return random_flight(no_torque, 46, samples, noise=1.0)
 
 
-@pytest.fixture(params=[False, True], ids=["none", "rigid-body"])
+SEESAW = {"consequents": "seesaw", "products": "additive"}
+UNEQUAL = (1, 2, 3, 4, 5, 2)
+STRUCTURES = {
+    "paper-data-range": {**SEESAW, "membership_functions": 5, "input_map": "data-range"},
+    "paper": {**SEESAW, "membership_functions": 5},
+    "classic": {**SEESAW, "membership_functions": 5, "structure": "fls"},
+    "classic-data-range": {**SEESAW, "membership_functions": 4, "structure": "fls", "input_map": "data-range"},
+    "classic-tensor": {**SEESAW, "products": "tensor", "membership_functions": UNEQUAL, "structure": "fls"},
+    "unequal": {**SEESAW, "membership_functions": UNEQUAL},
+    "most": {**SEESAW, "membership_functions": 15},
+    "harmonic-tensor": {"products": "tensor", "membership_functions": UNEQUAL},
+    "harmonic-additive": {"products": "additive", "membership_functions": 4, "harmonic_order": 3},
+    "harmonic-alone": {"products": "tensor", "membership_functions": 1},
+}
+ZERO_WIDTH = ("paper-data-range", "classic", "classic-data-range", "unequal", "harmonic-tensor")
+CASES = [(name, False) for name in STRUCTURES] + [(name, True) for name in ZERO_WIDTH]
+
+
+@pytest.fixture(params=CASES, ids=lambda case: case[0] + ("-zero-width" if case[1] else ""))
 def case(request, monkeypatch):
-    """Samples in several chunks, and the rows that they stand for."""
+    """Samples in several chunks on both sides of their training range, and the rows that they stand for.
+
+    Every other structure stands over a rigid body, and has its labels in no order.
+    """
     monkeypatch.setattr(data, "CHUNK", 64)
-    source, rng = flight_of_noise(), np.random.default_rng(47)
-    motion = source.motion
-    ranges = data_ranges(STRUCTURE, motion.attitude)
-    label = rng.integers(0, LABELS, SAMPLES)
-    samples = replace(
-        Samples.of(Ready(source, request.param), STRUCTURE, ranges), scale=SCALE, label=label, labels=LABELS
-    )
-    partitions = decode(STRUCTURE, rng.uniform(0.2, 1.0, STRUCTURE.genes))
-    regressor = Regressor(STRUCTURE, motion, ranges)
-    columns = [rigid_columns(motion)] if request.param else []
+    (name, zero_width), rng = request.param, np.random.default_rng(47)
+    rigid = list(STRUCTURES).index(name) % 2 == 1
+    structure = model_structure(StructureSettings(**STRUCTURES[name]))
+    motion = Motion(rng.uniform(-3.5, 3.5, (SAMPLES, 3)), *rng.standard_normal((2, SAMPLES, 3)))
+    source = TorqueData(0.01 * np.arange(SAMPLES), motion, rng.standard_normal((SAMPLES, 3)))
+    training = 0.2 * motion.attitude if structure.settings.input_map == "data-range" else motion.attitude
+    ranges, label = data_ranges(structure, training), rng.integers(0, LABELS, SAMPLES)
+    label = label if rigid else np.sort(label)
+    weights = rng.uniform(0.2, 1.0, structure.genes)
+    if zero_width:
+        for part in structure.weight_slices():
+            weights[part][::2] = 0.0 if len(weights[part]) > 1 else 1.0
+    partitions = decode(structure, weights)
+    assert zero_width == any(np.any(np.diff(part) == 0) for part in partitions)
+    samples = replace(Samples.of(Ready(source, rigid), structure, ranges), scale=SCALE, label=label, labels=LABELS)
+    regressor = Regressor(structure, motion, ranges)
+    columns = [rigid_columns(motion)] if rigid else []
     A = np.concatenate([*columns, regressor.matrix(partitions)], axis=2) * SCALE[:, None]
     parameters = rng.standard_normal(A.shape[2])
-    rigid = A.shape[2] - STRUCTURE.parameters
     return SimpleNamespace(
         samples=samples,
         partitions=partitions,
@@ -59,14 +87,14 @@ def case(request, monkeypatch):
         rows=A,
         torque=source.torque * SCALE,
         parameters=parameters,
-        coefficients=parameters[rigid:],
+        coefficients=parameters[-structure.parameters :],
         rigid_body=parameters[:RIGID] if rigid else np.zeros(RIGID),
         rng=rng,
     )
 
 
 def assert_close(actual, expected):
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12 * np.abs(expected).max(initial=1.0))
 
 
 def test_products(case):
@@ -89,8 +117,9 @@ def test_errors(case):
     assert_close(largest, np.array([np.abs(residual[case.label == own]).max() for own in range(LABELS)]))
 
 
-def test_projected(case):
-    directions = case.rng.standard_normal((len(case.parameters), 3))
+@pytest.mark.parametrize("count", [0, 3, 4])
+def test_projected(case, count):
+    directions = case.rng.standard_normal((len(case.parameters), count))
     square, back = case.samples.projected(case.partitions, case.parameters, directions)
     A, y = case.rows.reshape(-1, len(case.parameters)), case.torque.ravel()
     assert_close(square, (A @ directions).T @ (A @ directions))
@@ -109,20 +138,41 @@ def test_moved(case):
     assert found.square == pytest.approx(residual @ residual)
 
 
-def test_the_loops_are_compiled_for_one_layout_of_arrays(case, monkeypatch):
+def test_neighbours_that_fire_other_rules_are_told_apart():
+    """Pairs of samples whose intervals of roll and pitch differ by +1 and by -1 to -13, of 14."""
+    structure = model_structure(StructureSettings(**SEESAW, membership_functions=(1, 15, 1, 15, 1, 1)))
+    interval = np.array([place for down in range(1, 14) for place in ((0, down, 0), (1, 0, 0))])
+    motion = Motion(2 * np.pi * (interval + 0.4) / 14, *np.random.default_rng(49).standard_normal((2, 26, 3)))
+    ranges, partitions = data_ranges(structure, motion.attitude), uniform_breakpoints(structure)
+    flight = TorqueData(np.arange(26.0), motion, np.zeros((26, 3)))
+    found = Samples.of(Ready(flight, rigid=False), structure, ranges).products(partitions)
+    Q = Regressor(structure, motion, ranges).matrix(partitions).reshape(78, -1)
+    assert_close(found.gram[0], Q.T @ Q)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_the_loops_are_compiled_for_one_layout_of_arrays(rigid, monkeypatch):
     """Compiling them takes ten seconds, for each layout anew."""
-    layouts = set()
+    layouts, partitions = set(), uniform_breakpoints(STRUCTURE)
     monkeypatch.setattr(kernels, "_add_up", lambda *arguments: layouts.add(numba.typeof(arguments)))
     for attitude in (np.zeros((1, 3)), np.zeros((20, 3)), np.zeros((3, 20)).T):
         zeros = np.zeros_like(attitude)
         flight = TorqueData(np.arange(float(len(zeros))), Motion(attitude, zeros, zeros), zeros)
-        samples = Samples.of(Ready(flight, case.samples.ready.rigid), STRUCTURE, case.samples.ranges)
-        samples.products(case.partitions)
-        samples.errors(case.partitions, case.coefficients, case.rigid_body)
-        samples.moved(case.partitions, case.coefficients, case.rigid_body)
-        for directions in (np.zeros((len(case.parameters), 3)), np.zeros((3, len(case.parameters))).T):
-            samples.projected(case.partitions, case.parameters, directions)
+        samples = Samples.of(Ready(flight, rigid), STRUCTURE, data_ranges(STRUCTURE, attitude))
+        columns, coefficients = STRUCTURE.parameters + RIGID * rigid, np.zeros(STRUCTURE.parameters)
+        samples.products(partitions)
+        samples.errors(partitions, coefficients, np.zeros(RIGID))
+        samples.moved(partitions, coefficients, np.zeros(RIGID))
+        for directions in (np.zeros((columns, 3)), np.zeros((3, columns)).T):
+            samples.projected(partitions, np.zeros(columns), directions)
     assert len(layouts) == 1
+
+
+def test_where_nothing_can_be_kept_a_loop_is_compiled_each_time():
+    """A function without a file has no folder for its compiled code: the same error as folders that are read-only."""
+    space = {}
+    exec("def twice(x):\n    return 2 * x", space)
+    assert compiled(space["twice"])(21) == 42
 
 
 @pytest.mark.parametrize("every", [1, 2])

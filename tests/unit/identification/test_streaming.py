@@ -114,14 +114,6 @@ def test_many_chunks_give_the_model_of_one(monkeypatch, base):
     assert_same_model(whole, identified(streamed_flight(), base, streamed_flight(50, 44)))
 
 
-@pytest.mark.parametrize("chunk", CHUNKS)
-@pytest.mark.parametrize("base", BASES)
-def test_objectives_do_not_depend_on_chunks(monkeypatch, base, chunk):
-    whole = evaluated(streamed_flight(), base)
-    monkeypatch.setattr(data, "CHUNK", chunk)
-    np.testing.assert_allclose(evaluated(streamed_flight(), base), whole, rtol=1e-9)
-
-
 @pytest.mark.parametrize("base", BASES)
 def test_samples_too_many_to_keep_give_the_very_same(monkeypatch, base):
     monkeypatch.setattr(data, "CHUNK", 64)

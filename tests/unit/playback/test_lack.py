@@ -81,7 +81,8 @@ def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     size = np.sqrt(
         lack.rest[:3] ** 2 + sum((own * part[:3]) ** 2 for own, part in zip(share[:3].T, parts, strict=True))
     )
-    given = drawn.at(7, velocity, speed)
+    turning = {name: (tuple(part[:3]), tuple(part[3:])) for name, part in zip(lack.part, parts, strict=True)}
+    given = np.array(drawn.at(tuple(drawn.unit[7]), turning))
     assert given[:3] == pytest.approx(size * drawn.unit[7, :3], rel=1e-9)
     assert size[1] > 1.02 * lack.rest[1]
     assert not given[3:].any()

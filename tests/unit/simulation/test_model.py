@@ -11,7 +11,7 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import mixer
-from cpfls_cli.simulation.closed_loop import upright
+from cpfls_cli.simulation.autopilot import upright
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle.rotors import body_wrench
@@ -77,22 +77,29 @@ def test_inverse_dynamics_has_no_effects_and_no_gyro():
     SimulationSettings(mode="closed-loop", noise={"body_rate": 0.1})
 
 
+def mixed(wrench):
+    speed, demand = mixer(VEHICLE).mixed(tuple(np.asarray(wrench).tolist()))
+    return np.array([*speed]), np.array([*demand])
+
+
 def test_mixer_gives_the_wrench_that_was_asked_for():
     wrench = np.array([58.0, 1.0, -2.0, 0.4])
-    given = body_wrench(VEHICLE, mixer(VEHICLE).command(wrench)[None])
+    speed, demand = mixed(wrench)
+    given = body_wrench(VEHICLE, speed[None])
     np.testing.assert_allclose([given.thrust[0], *given.body_torque[0]], wrench, rtol=1e-12)
+    np.testing.assert_allclose(demand, speed**2, rtol=1e-12)
 
 
 @pytest.mark.parametrize("yaw", [5.0, -5.0])
 def test_yaw_gives_way_before_roll_and_pitch(yaw):
-    given = body_wrench(VEHICLE, mixer(VEHICLE).command(np.array([58.0, 1.0, -2.0, yaw]))[None])
+    given = body_wrench(VEHICLE, mixed([58.0, 1.0, -2.0, yaw])[0][None])
     np.testing.assert_allclose([given.thrust[0], *given.body_torque[0, :2]], [58.0, 1.0, -2.0], rtol=1e-12)
     assert 0 < given.body_torque[0, 2] / yaw < 0.5
 
 
 def test_commands_stay_within_what_a_rotor_can_do():
     for wrench in np.random.default_rng(1).normal(size=(50, 4)) * [2000.0, 200.0, 200.0, 20.0]:
-        speed = mixer(VEHICLE).command(wrench)
+        speed, _ = mixed(wrench)
         assert (speed >= 0).all()
         assert (speed <= VEHICLE.rotor_speed_max_rad_s).all()
 
@@ -100,7 +107,8 @@ def test_commands_stay_within_what_a_rotor_can_do():
 def test_upright_body_has_the_yaw_and_the_thrust_of_the_plan():
     attitude = np.array([[0.3, -0.2, 2.5], [-0.5, 0.1, -1.0]])
     for planned, rotation in zip(attitude, rotations.rotation_matrix(attitude), strict=True):
-        np.testing.assert_allclose(upright(7.0 * rotation[:, 2], planned[2]), rotation, atol=1e-12)
+        axes = upright(tuple((7.0 * rotation[:, 2]).tolist()), float(planned[2]))
+        np.testing.assert_allclose(np.array(axes).T, rotation, atol=1e-12)
 
 
 def test_errors_of_the_numbers_add_up_and_other_effects_are_flown_once():

@@ -4,12 +4,14 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+import pytest
 
 from cpfls_cli.consistency import audit as audit_module
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
-from cpfls_cli.effects.hooks import Actuation, FaultFit, ReadingError, RotorMotion, SensorLog, SensorTest
+from cpfls_cli.effects.hooks import Actuation, FaultFit, ReadingError, SensorLog, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.simulation import model
+from cpfls_cli.vehicle.motion import Wrench
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
 
@@ -55,8 +57,8 @@ ACCELEROMETER = new_effect(
 )
 
 
-def slowest(values, _step):
-    return lambda rotors: RotorMotion(np.minimum(rotors.speed, values["limit"]), rotors.acceleration)
+def slowest(rotors, values, memory):
+    return rotors._replace(speed=memory.functions.smallest(rotors.speed, values["limit"]))
 
 
 LIMITED = new_effect(
@@ -67,8 +69,16 @@ LIMITED = new_effect(
 )
 
 
+PULLED_UP = new_effect(
+    name="pulled_up",
+    kind="wrench",
+    coefficients=(Coefficient("f", "N", 0.0, 10.0, "force along body z, where the vehicle is above a metre"),),
+    acts=lambda see, p: Wrench(force=(0, 0, see.functions.where(see.height > 1.0, p["f"], 0.0))),
+)
+
+
 def flown_with(monkeypatch, **effects):
-    entries = {effect.name: effect for effect in (ACCELEROMETER, LIMITED)}
+    entries = {effect.name: effect for effect in (ACCELEROMETER, LIMITED, PULLED_UP)}
     monkeypatch.setattr(model, "find", entries.__getitem__)
     return flown(effects=effects)
 
@@ -94,3 +104,11 @@ def test_a_new_actuator_effect_is_a_link_of_the_chain(monkeypatch):
     np.testing.assert_array_equal(flight.signals["position"], free.signals["position"])
     slow = flown_with(monkeypatch, limited_rotors=(345.0,))
     assert slow.position_error[-1, 2] < free.position_error[-1, 2] - 0.01
+
+
+def test_a_new_effect_on_the_vehicle_is_one_function(monkeypatch):
+    free, pulled = flown_with(monkeypatch), flown_with(monkeypatch, pulled_up=(3.0,))
+    thrust = [121.5e-6 * (each.signals["rotor_speed"][-1] ** 2).sum() for each in (free, pulled)]
+    assert thrust[0] - thrust[1] == pytest.approx(3.0, rel=0.3)
+    high = flown_with(monkeypatch, pulled_up=(0.0,))
+    np.testing.assert_array_equal(high.signals["position"], free.signals["position"])

@@ -67,13 +67,6 @@ def test_ljung_box_by_its_formula():
     assert found.band == pytest.approx(1.96 / np.sqrt(300))
 
 
-def test_errors_that_remember_are_not_white():
-    noise = np.random.default_rng(44).standard_normal((2000, AXES))
-    found = examined(flight_of_errors(noise + np.roll(noise, 1, axis=0)))
-    assert np.all(found.ljung_box < 1e-6)
-    np.testing.assert_allclose(found.autocorrelation[0], 0.5, atol=0.05)
-
-
 def test_nothing_is_correlated_across_the_pause_between_flights():
     """The second flight is the first again: across the pause the correlation at its length would be one."""
     errors = np.random.default_rng(45).standard_normal((60, AXES))

@@ -1,0 +1,212 @@
+"""The autopilot that knows the vehicle: it tracks a planned motion, without knowledge of the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.simulation.actuators import Mixer
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.motion import ATTITUDE, rotation_rows
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.stepping import Flat
+from cpfls_cli.vehicle.tracing import SYMBOLS
+from cpfls_cli.vehicle.values import (
+    Functions,
+    Value,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    minus,
+    scaled,
+    subtract,
+    times,
+    transposed,
+)
+
+PLANNED = 16
+"""Numbers of a `Planned`."""
+
+
+class Planned(NamedTuple):
+    """A planned motion at an instant, SI; the first three in the world frame, rates in the body frame."""
+
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
+    body_rate: Vector
+    body_acceleration: Vector
+    yaw: Value
+
+    @classmethod
+    def of(cls, numbers: Vector) -> Planned:
+        """Arrange `PLANNED` numbers."""
+        return cls(numbers[0:3], numbers[3:6], numbers[6:9], numbers[9:12], numbers[12:15], numbers[15])
+
+
+def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
+    """Interpolate a planned motion by cubic splines, as `Planned` arranges it.
+
+    Parameters
+    ----------
+    planned : mapping of str to array
+        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
+        (time, 3) each.
+    time : array, shape (time,), s
+    at : array, shape (step,), s
+        Times asked for.
+    """
+    from scipy.interpolate import CubicSpline
+
+    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
+    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
+    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
+    rates = rotations.body_rate(q, qd), rotations.body_acceleration(q, qd, qdd)
+    return list(map(tuple, np.column_stack([position, velocity, acceleration, *rates, q[:, 2]]).tolist()))
+
+
+class Autopilot:
+    """Thrust and torque that a planned motion asks for.
+
+    References
+    ----------
+    Lee, Leok and McClamroch 2010, Geometric tracking control of a quadrotor UAV on SE(3).
+    """
+
+    def __init__(self, vehicle: VehicleSettings, settings: ClosedLoopSettings, functions: Functions = SYMBOLS) -> None:
+        position = 2 * pi * settings.position_frequency_hz
+        attitude = [2 * pi * each for each in (*[settings.attitude_frequency_hz] * 2, settings.yaw_frequency_hz)]
+        self._position_gain, self._velocity_gain = position**2, 2 * settings.position_damping * position
+        self._attitude_gain = tuple(each**2 for each in attitude)
+        self._rate_gain = tuple(2 * settings.attitude_damping * each for each in attitude)
+        self._inertia = tuple(map(tuple, symmetric(vehicle.inertia_kg_m2).tolist()))
+        self._vehicle, self._functions = vehicle, functions
+
+    def wrench(self, planned: Planned, state: Vector, rotation: tuple[Vector, ...]) -> Vector:
+        """Compute thrust in N along body z and torque in N m.
+
+        Parameters
+        ----------
+        state : vector
+            Of the vehicle.
+        rotation : rows of a matrix
+            Body to world.
+        """
+        pull = self._pull(planned, state)
+        # The body as the target sees it.
+        axes, columns = upright(pull, planned.yaw, self._functions), transposed(rotation)
+        turned = transposed([apply(axes, column) for column in columns])
+        thrust = self._vehicle.mass_kg * dot(pull, columns[2])
+        return (thrust, *self._torque(planned, turned, state[9:12]))
+
+    def target(self, planned: Planned, state: Vector) -> tuple[Vector, ...]:
+        """Orient the body as the path asks for: rows of a matrix, body to world."""
+        return transposed(upright(self._pull(planned, state), planned.yaw, self._functions))
+
+    def _pull(self, planned: Planned, state: Vector) -> Vector:
+        """Compute what the thrust has to pull with, m/s^2, world frame."""
+        position, velocity = state[:3], state[3:6]
+        return add(
+            (0, 0, self._vehicle.gravity_m_s2),
+            planned.acceleration,
+            scaled(self._position_gain, subtract(planned.position, position)),
+            scaled(self._velocity_gain, subtract(planned.velocity, velocity)),
+        )
+
+    def _torque(self, planned: Planned, turned: tuple[Vector, ...], body_rate: Vector) -> Vector:
+        """Compute the torque that turns the body to its target attitude."""
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = turned
+        error = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
+        back = transposed(turned)
+        rate_error = subtract(body_rate, apply(back, planned.body_rate))
+        wanted = apply(back, planned.body_acceleration)
+        wanted = subtract(wanted, map(times, self._attitude_gain, error))
+        wanted = subtract(wanted, map(times, self._rate_gain, rate_error))
+        return add(apply(self._inertia, wanted), cross(body_rate, apply(self._inertia, body_rate)))
+
+
+def upright(pull: Vector, yaw: Value, functions: Functions = SYMBOLS) -> tuple[Vector, ...]:
+    """Orient a body whose z axis points along the pull, with a given yaw, rad.
+
+    Returns
+    -------
+    tuple of vector
+        Its x, y and z axes, world frame.
+    """
+    up = scaled(1 / functions.sqrt(dot(pull, pull)), pull)
+    # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
+    forward = cross((minus(0, functions.sin(yaw)), functions.cos(yaw), 0), up)
+    forward = scaled(1 / functions.sqrt(dot(forward, forward)), forward)
+    return forward, cross(up, forward), up
+
+
+@dataclass(frozen=True)
+class PlanPilot:
+    """The autopilot that knows the vehicle, with its mixer; it answers at once, in the middle of each step.
+
+    Attributes
+    ----------
+    plan : list of tuple of float
+        At the start, then in the middle of each step.
+    """
+
+    autopilot: Autopilot
+    mixer: Mixer
+    plan: list[Flat]
+
+    def size(self, _rotors: int) -> int:
+        """Count the numbers of a planned motion."""
+        return PLANNED
+
+    def given(self, number: int, _start: Flat) -> Flat:
+        """Give the planned motion."""
+        return self.plan[number + 1]
+
+    def commanded(self, given: Vector, middle: Vector) -> tuple[Value, Value]:
+        """Command the rotors."""
+        rotation = rotation_rows(middle[ATTITUDE], SYMBOLS)
+        return self.mixer.mixed(self.autopilot.wrench(Planned.of(given), middle, rotation))
+
+
+def asked(
+    time: Array,
+    planned: Mapping[str, Array],
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    state: Array,
+) -> dict[str, Array]:
+    """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
+
+    Parameters
+    ----------
+    time, planned
+        As `fly` takes them.
+    state : array, shape (time, state)
+        Of the flight, at the samples of the plan.
+
+    Returns
+    -------
+    dict of str to array, shape (time, 3), m, m/s, rad
+        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
+        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
+    """
+    autopilot = Autopilot(vehicle, settings)
+    plan = [Planned.of(row) for row in plan_of(planned, time, time)]
+    flew = list(zip(plan, map(tuple, state.tolist()), strict=True))
+    targets = [autopilot.target(own, at) for own, at in flew]
+    flown = state[:, ATTITUDE]
+    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
+    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
+    if settings.law is not None:
+        thrust = (autopilot.wrench(own, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0] for own, at in flew)
+        found["thrust"] = np.array(list(thrust))
+    return found
