@@ -164,16 +164,17 @@ def _left_out(command: str, hints: Mapping[str, Any]) -> tuple[str, ...]:
     return ("numbers",) if own else ()
 
 
-def refuse_overrides(common: Common) -> None:
-    """Refuse what overrides a config where none is read."""
+def refuse_overrides(common: Common, *, given: bool = True) -> None:
+    """Refuse what overrides a config where none is read, or where the one that could be is not given."""
     from cpfls_cli.cli.terminal import messages_for_errors
     from cpfls_cli.errors import InputError
 
-    given = {"--set": next(iter(common.overrides or ()), None), "--seed": common.seed}
+    overrides = {"--set": next(iter(common.overrides or ()), None), "--seed": common.seed}
     with messages_for_errors():
-        for option, value in given.items():
+        for option, value in overrides.items():
             if value is not None:
-                raise InputError(f"{option} {value}: this command reads no config; leave {option} out")
+                why = f"this command reads no config; leave {option} out" if given else "needs a CONFIG"
+                raise InputError(f"{option} {value}: {why}")
 
 
 def check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:

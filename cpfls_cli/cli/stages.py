@@ -173,7 +173,7 @@ def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Calla
     def command(**given: Any) -> None:
         common = Common(**{each.name: given.pop(each.name) for each in shared})
         if "config" not in hints or (declared and given["config"] is None):
-            refuse_overrides(common)
+            refuse_overrides(common, given=not declared)
         check_order(name, {own: given[own] for own in arguments}, given.get("output"))
         with messages_for_errors():
             _run(load(), common, given, declared=declared)

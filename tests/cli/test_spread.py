@@ -106,9 +106,10 @@ def test_guesses_are_held_and_named(cpfls, tmp_path):
     path = tmp_path / "vehicle.h5"
     write_vehicle(path, found_record(guessed=("drag_factor",), disturbance=None, gusts=False))
     result, output = written(cpfls, path, "json")
-    assert "Not drawn, because it is a guess and no flight tells it: drag factor." in result.stderr
+    assert "Not drawn, because it is a guess and no flight identifies it: drag factor." in result.stderr
     assert (
-        "No gusts about roll, pitch and yaw and along x, y and z: the flights do not tell their size" in result.stderr
+        "No gusts about roll, pitch and yaw and along x, y and z: the flights do not identify their size"
+        in result.stderr
     )
     document = json.loads(output.read_text())
     assert document["held_at_guesses"] == ["drag_factor"]
