@@ -11,7 +11,7 @@ from cpfls_cli.consistency.gyroscope import LONGEST_DELAY_S
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.flightlog.alignment import estimate_delay
+from cpfls_cli.flightlog.importing import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import permutations, product
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -32,11 +31,11 @@ _CLEARLY, _TIMES_BETTER = 0.6, 2.0
 _STILL = 1e-3
 _MOVES_RAD_S = 0.03  # Rate below which noise and drift of an attitude are as large as its motion.
 
-
 Order = tuple[int, ...]
 Sign = tuple[float, ...]
 # Order and signs of three axes that are what they are called.
 AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
+_SIGNED_AXES: Final = tuple(product(permutations((0, 1, 2)), product((1.0, -1.0), repeat=3)))
 
 
 def handed(order: Sequence[int], sign: Sequence[float]) -> float:
@@ -44,19 +43,18 @@ def handed(order: Sequence[int], sign: Sequence[float]) -> float:
     return float(np.round(np.linalg.det(np.eye(3)[list(order)])) * np.prod(sign))
 
 
-@dataclass(frozen=True)
-class AxisFit:
+class AxisFit(NamedTuple):
     """How the axes of a measured vector lie to those of a reference."""
 
-    order: tuple[int, int, int]  # Which measured column is x, y and z of the reference.
-    sign: tuple[float, float, float]  # Of those columns, in that order.
+    order: Order  # Which measured column is x, y and z of the reference.
+    sign: Sign  # Of those columns, in that order.
     gain: float  # Measured over reference.
     explained: float  # Share of the measured vector's square that the reference explains.
     runner_up: float  # The same of the next best axes.
     as_named: float  # The same of the axes in their order, with a plus.
     # Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
     # two does not move.
-    along: tuple[float, float, float]
+    along: Sequence[float]
 
     @property
     def is_as_named(self) -> bool:
@@ -69,52 +67,35 @@ class AxisFit:
         return float(np.sqrt(max(1 - self.runner_up, 1e-9) / max(1 - self.explained, 1e-9)))
 
 
-_SIGNED_AXES: Final = tuple(
-    (order, sign) for order in permutations((0, 1, 2)) for sign in product((1.0, -1.0), repeat=3)
-)
-
-
 def fit_axes(reference: Array, measured: Array) -> AxisFit:
     """Find the order and the signs of axes with which one vector follows another, both shape (time, 3), filtered alike.
 
     They are as named where that is as good as the best, within 0.02 of explained share, or where an axis does not move:
     with one or two axes, a turn and a mirrored column look alike.
     """
-    reference = reference - reference.mean(axis=0)
-    measured = measured - measured.mean(axis=0)
+    reference, measured = reference - reference.mean(axis=0), measured - measured.mean(axis=0)
     cross = measured.T @ reference
-    power = float((reference**2).sum())
-    total = float((measured**2).sum())
+    power, total = float((reference**2).sum()), float((measured**2).sum())
     if power == 0.0 or total == 0.0:
-        return AxisFit((0, 1, 2), (1.0, 1.0, 1.0), float("nan"), 0.0, 0.0, 0.0, (float("nan"),) * 3)
+        return AxisFit(*AS_NAMED, float("nan"), 0.0, 0.0, 0.0, (float("nan"),) * 3)
     together = {
         (order, sign): sum(sign[axis] * cross[order[axis], axis] for axis in range(3)) for order, sign in _SIGNED_AXES
     }
-    explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
-    named = AS_NAMED
+    explained = {axes: float(max(value, 0.0) ** 2 / (power * total)) for axes, value in together.items()}
     # An axis that does not move fits as well with either sign.
     best = largest(explained, lambda axes: explained[axes])
-    runner_up = max(value for axes, value in explained.items() if axes != best)
     # Other axes than the names say have to be clearly better.
-    clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[named]) / _TIMES_BETTER
+    clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[AS_NAMED]) / _TIMES_BETTER
     moving = _all_move(reference) and _all_move(measured)
-    if not (moving and clearly) or explained[named] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
-        best = named
-        runner_up = max(value for axes, value in explained.items() if axes != best)
+    if not (moving and clearly) or explained[AS_NAMED] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
+        best = AS_NAMED
+    runner_up = max(value for axes, value in explained.items() if axes != best)
     # Noise in the reference makes the regression's gain small, that of the spreads does not.
-    gain = float(np.sqrt(total / power)) if explained[best] > 0.2 else together[best] / power
+    gain = float(np.sqrt(total / power)) if explained[best] > 0.2 else float(together[best] / power)
     order, sign = best
     sizes = np.sqrt((reference**2).sum(axis=0) * (measured**2).sum(axis=0)[list(order)])
     along = [float(sign[i] * cross[order[i], i] / sizes[i]) if sizes[i] > 0 else float("nan") for i in range(3)]
-    return AxisFit(
-        (order[0], order[1], order[2]),
-        (sign[0], sign[1], sign[2]),
-        float(gain),
-        float(explained[best]),
-        float(runner_up),
-        float(explained[named]),
-        (along[0], along[1], along[2]),
-    )
+    return AxisFit(order, sign, gain, explained[best], runner_up, explained[AS_NAMED], along)
 
 
 def _all_move(vectors: Array) -> bool:
@@ -124,8 +105,7 @@ def _all_move(vectors: Array) -> bool:
 
 def slow(values: Array, rate_hz: float, cutoff_hz: float = SLOW_HZ) -> Array:
     """Low-pass both ways, and leave the ends out."""
-    cutoff_hz = min(cutoff_hz, rate_hz / 5)
-    filtered = low_pass(values, rate_hz, cutoff_hz, _FILTER_ORDER)
+    filtered = low_pass(values, rate_hz, min(cutoff_hz, rate_hz / 5), _FILTER_ORDER)
     edge = min(round(_EDGE_S * rate_hz), len(filtered) // 5)
     return filtered[edge : len(filtered) - edge]
 
@@ -134,18 +114,14 @@ def rotations_of(quaternion: Array, order: str, inverse: bool = False) -> Rotati
     """Make rotations of quaternions, of body to world; `inverse` where the log has them from world to body."""
     from scipy.spatial.transform import Rotation
 
-    scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
-    rotation = Rotation.from_quat(scalar_last)
+    rotation = Rotation.from_quat(np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion)
     return rotation.inv() if inverse else rotation
 
 
 def on_clock(rotation: Rotation, time: Array, clock: Array) -> Rotation:
     """Interpolate rotations to a clock, near enough for the comparison of slow motion."""
-    from scipy.spatial.transform import Rotation
-
     quaternion = align_quaternion_signs(np.asarray(rotation.as_quat()))
-    columns = np.column_stack([np.interp(clock, time, column) for column in quaternion.T])
-    return Rotation.from_quat(columns)
+    return type(rotation).from_quat(np.column_stack([np.interp(clock, time, column) for column in quaternion.T]))
 
 
 def body_rate_from(rotation: Rotation, rate_hz: float) -> Array:
@@ -160,14 +136,13 @@ def turning_of(rotation: Rotation, rate_hz: float) -> Array | None:
     return None if float(np.sqrt((derived.var(axis=0)).sum())) < _MOVES_RAD_S else derived
 
 
-@dataclass(frozen=True)
-class LeanFit:
+class LeanFit(NamedTuple):
     """How the acceleration over ground follows the lean of a body."""
 
     # By (order, sign); Share of the acceleration that the lean explains, if these columns of the position with these
     # signs are the first two axes of the attitude's world, and the thrust points along the body's third axis.
     shares: Mapping[tuple[tuple[int, int], tuple[float, float]], float]
-    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
+    # 1 where the position's third column grows with the lift, -1 where it falls, 0 where that is not clear.
     rises: float
     gain: float  # Acceleration over what the lean makes of gravity, 1 where the units agree.
 
@@ -197,18 +172,15 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
     along one axis alone, such as an airplane in a plane, explains nothing. The lift, if known, grows with the thrust.
     """
     axis = rotation.as_matrix()[:, :, 2]
-    upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
-    lean = slow(STANDARD_GRAVITY * axis[:, :2] / np.abs(upright), rate_hz, _TILT_HZ)
+    lean = slow(STANDARD_GRAVITY * axis[:, :2] / np.maximum(np.abs(axis[:, 2:]), 0.2), rate_hz, _TILT_HZ)
     lean, ground = lean - lean.mean(axis=0), moving.horizontal - moving.horizontal.mean(axis=0)
     power, total = float((lean**2).sum()), float((ground**2).sum())
-    cross = ground.T @ lean
-    told = _all_move(lean) and _all_move(ground)
-    shares = {}
+    cross, moves = ground.T @ lean, _all_move(lean) and _all_move(ground)
+    shares: dict[tuple[tuple[int, int], tuple[float, float]], float] = {}
     for order in ((0, 1), (1, 0)):
         for first, second in product((1.0, -1.0), repeat=2):
-            together = first * cross[order[0], 0] + second * cross[order[1], 1]
-            share = max(float(together), 0.0) ** 2 / (power * total) if told else 0.0
-            shares[(order, (first, second))] = share
+            together = float(first * cross[order[0], 0] + second * cross[order[1], 1])
+            shares[(order, (first, second))] = max(together, 0.0) ** 2 / (power * total) if moves else 0.0
     rises = 0.0
     if lift is not None:
         other = slow((lift * np.abs(axis[:, 2]))[:, None], rate_hz)[:, 0]

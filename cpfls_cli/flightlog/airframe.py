@@ -1,9 +1,9 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import permutations
+from itertools import permutations, product
 from math import hypot
 from typing import Final, NamedTuple
 
@@ -40,11 +40,10 @@ _LEAST_OF_MEAN = 0.2
 _PREFER_X = 1.3  # Few vehicles are a plus: one has to explain that much more than an X.
 
 
-@dataclass(frozen=True)
-class RotorPlace:
+class RotorPlace(NamedTuple):
     """Where a rotor is and how it turns."""
 
-    name: str  # Such as ``front left``; empty where it is told by its numbers alone.
+    name: str  # Such as ``front left``; empty where its numbers alone are known.
     direction: tuple[float, float]  # x forward and y left, of length 1 where only the direction is known.
     spin: int  # 1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
     height_m: float = 0.0  # Of the hub above the point that the parameters count from.
@@ -82,8 +81,9 @@ class Airframe:
         """Give the same rotors at a distance from the middle; the mean distance where they differ."""
         factor = arm_m / self.arm_m
         rotors = tuple(
-            RotorPlace(
-                r.name, (factor * r.direction[0], factor * r.direction[1]), r.spin, factor * r.height_m * self.in_metres
+            r._replace(
+                direction=(factor * r.direction[0], factor * r.direction[1]),
+                height_m=factor * r.height_m * self.in_metres,
             )
             for r in self.rotors
         )
@@ -93,12 +93,8 @@ class Airframe:
 def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:
     """Read the rotors that the parameters of an autopilot state; None where they state none.
 
-    Rotors that cannot turn the vehicle about all of its axes are refused.
-
-    Parameters
-    ----------
-    rotors : int
-        That the log's columns show; 0 where they show none.
+    Rotors that cannot turn the vehicle about all of its axes are refused. The log's columns show so many rotors; 0
+    where they show none.
     """
     found, frame = _of_px4(parameters), stated_frame(parameters, rotors)
     if found is None and frame is not None:
@@ -156,44 +152,35 @@ def _require_control(airframe: Airframe) -> None:
             )
 
 
-class _RotorLayout(NamedTuple):
-    rotors: tuple[RotorPlace, ...]
-    form: str
-
-    def weights(self) -> Array:
-        """Give what each rotor does about roll, pitch and yaw, array, shape (axis, rotor)."""
-        places = np.array([rotor.direction for rotor in self.rotors])
-        return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in self.rotors]])
-
-
 _Explained = tuple[float, float, float]  # Shares of the angular acceleration about roll, pitch and yaw.
 
 
+class _RotorLayout(NamedTuple):
+    rotors: tuple[RotorPlace, ...]
+    form: str
+    weights: Array  # What each rotor does about roll, pitch and yaw, shape (axis, rotor).
+
+
 @cache
-def _layouts() -> tuple[tuple[_RotorLayout, Array], ...]:
-    """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way; with weights."""
+def _layouts() -> tuple[_RotorLayout, ...]:
+    """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way."""
     found = []
     for form, places in (("X", _CORNERS), ("plus", _ENDS)):
-        for order in permutations(places):
-            for first in (1, -1):
-                turning = {name: first if index % 2 == 0 else -first for index, name in enumerate(places)}
-                length = hypot(*next(iter(places.values())))
-                rotors = tuple(
-                    RotorPlace(name, (places[name][0] / length, places[name][1] / length), turning[name])
-                    for name in order
-                )
-                layout = _RotorLayout(rotors, form)
-                found.append((layout, layout.weights()))
+        length = hypot(*next(iter(places.values())))
+        named = [(name, (x / length, y / length), (-1) ** index) for index, (name, (x, y)) in enumerate(places.items())]
+        for order, first in product(permutations(named), (1, -1)):
+            rotors = tuple(RotorPlace(name, direction, first * spin) for name, direction, spin in order)
+            (x, y), spins = np.array([own.direction for own in rotors]).T, [-float(own.spin) for own in rotors]
+            found.append(_RotorLayout(rotors, form, np.array([y, -x, spins])))
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class MovedBy:
-    """Four rotors told by the motion, and how clearly."""
+class MovedBy(NamedTuple):
+    """Four rotors as the motion shows them, and how clearly."""
 
     airframe: Airframe
     # Share of the angular acceleration about roll, pitch and yaw that they explain.
-    explained: tuple[float, float, float]
+    explained: _Explained
     by_axes: bool  # Whether every axis says it.
     clear: bool  # Whether every rotor by itself says it too.
 
@@ -214,7 +201,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
 
     The angular acceleration about each axis is regressed on the rotors' torque in every numbering of an X and of a
     plus; the one that explains most is taken. Where that is not clear, slow gusts and the answer to them may hide it:
-    then what is fast alone may say it, as a guess.
+    then what is fast alone may say it, as a guess. None for another number of rotors, or where nothing is explained.
 
     Parameters
     ----------
@@ -223,11 +210,6 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
         In any unit that is a share of the speed.
     is_command : bool
         Whether the motors follow later.
-
-    Returns
-    -------
-    MovedBy or None
-        None for another number of rotors, or where nothing is explained.
     """
     if speed.shape[1] != 4 or len(speed) < 5 * rate_hz or not speed.any():
         return None
@@ -236,11 +218,11 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     layout, explained, by_axes = _chosen(shares, ("X", "plus"))
     if not by_axes:
         layout, explained, by_axes = _chosen(shares, ("X",))
-    # Columns that are of other moments than those beside them, or of something else than these rotors, may explain a
+    # Columns that are of other moments than those next to them, or of something else than these rotors, may explain a
     # part of the motion in some layout; but then single ones push the wrong way.
-    alike = layout.weights() * weights
+    alike = layout.weights * weights
     least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)
-    clear = by_axes and bool((alike > least)[layout.weights() != 0].all())
+    clear = by_axes and bool((alike > least)[layout.weights != 0].all())
     band = ""
     if not by_axes and rate_hz / 5 > 2 * _FAST_HZ[0]:
         fast = [_shares(*each)[0] for each in _driven(body_rate, speed, rate_hz, is_command, *_FAST_HZ)]
@@ -258,7 +240,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
 
 
 def _chosen(
-    shares: list[tuple[_RotorLayout, _Explained]], forms: tuple[str, ...]
+    shares: Sequence[tuple[_RotorLayout, _Explained]], forms: tuple[str, ...]
 ) -> tuple[_RotorLayout, _Explained, bool]:
     """Choose the layout that explains most, and tell whether another numbering comes near."""
     own = [found for found in shares if found[0].form in forms]
@@ -272,12 +254,7 @@ def _chosen(
 def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> float:
     """Give the share of the angular acceleration that rotors explain, wherever they are, the mean of the three axes.
 
-    Parameters
-    ----------
-    body_rate : array, shape (time, 3)
-        In any unit and axes.
-    speed, is_command
-        See `airframe_from_motion`.
+    Body rates are in any unit and axes, the rest is as in `airframe_from_motion`.
     """
     if not speed.any():
         return 0.0
@@ -290,15 +267,10 @@ def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_comma
 
 
 def _driven(
-    body_rate: Array,
-    speed: Array,
-    rate_hz: float,
-    is_command: bool,
-    lowest_hz: float = 0.0,
-    highest_hz: float = _ACCELERATION_HZ,
+    body_rate: Array, speed: Array, rate_hz: float, is_command: bool, lowest_hz: float = 0.0, highest_hz: float = 0.0
 ) -> Iterator[tuple[Array, Array]]:
     """Give a band of the angular acceleration and of what drives it, with every lag and shift of rotors."""
-    cutoff = min(highest_hz, rate_hz / 5)
+    cutoff = min(highest_hz or _ACCELERATION_HZ, rate_hz / 5)
 
     def in_band(values: Array) -> Array:
         return values - low_pass(values, rate_hz, lowest_hz, 2) if lowest_hz else values
@@ -324,10 +296,10 @@ def _driven(
 
 
 def _shares(wanted: Array, rotors: Array) -> tuple[list[tuple[_RotorLayout, _Explained]], Array]:
-    """Tell what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
+    """Give what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
-    weights = np.array([weight for _, weight in _layouts()])
+    weights = np.array([layout.weights for layout in _layouts()])
     along, power = np.einsum("lar,ra->la", weights, together), np.einsum("lar,rs,las->la", weights, own, weights)
     shares = np.where(along > 0, along, 0.0) ** 2 / np.where(power * total > 0, power * total, np.inf)
-    results = [(layout, (x, y, z)) for (layout, _), (x, y, z) in zip(_layouts(), shares.tolist(), strict=True)]
+    results = [(layout, (x, y, z)) for layout, (x, y, z) in zip(_layouts(), shares.tolist(), strict=True)]
     return results, np.asarray(np.linalg.lstsq(own, together, rcond=None)[0].T, dtype=float)

@@ -1,11 +1,9 @@
 """How fast a signal of a log really is: updates that come slower than the clock, and a filter before the log."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
@@ -35,7 +33,6 @@ _LEAST_OCTAVES_BEYOND = 0.3  # That have to be known for a fall to be a cliff.
 _LONGEST_SEGMENT = 2048
 _SEGMENTS = 4
 _FEWEST_IN_SEGMENT = 64  # Lines of a spectrum, below which bands hold none.
-_BLACKMAN_HARRIS = np.array([0.35875, -0.48829, 0.14128, -0.01168])  # The window by its waves.
 _LINES_OF_WINDOW = 8  # Over which the Blackman-Harris window smears a line.
 _HALVED_DB = 6.0
 # The trend that the cut-off is read against, clear of the fall itself.
@@ -43,8 +40,7 @@ _TREND_OCTAVES, _CLEAR_OCTAVES = 2.0, 0.5
 _SMALLEST_POWER = 1e-300
 
 
-@dataclass(frozen=True)
-class SlowSignal:
+class SlowSignal(NamedTuple):
     """A signal that is updated slower than the clock of its log."""
 
     name: str
@@ -58,11 +54,8 @@ def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = No
     Between updates the rows repeat the last value, or lie on a straight line. What a coarse resolution repeats is
     none: its steps are irregular.
 
-    Parameters
-    ----------
-    stamped_hz : mapping from str to float, optional
-        How often a second signals were logged, of those with stamps of their own: of these the stamps decide, unless
-        their values come slower still.
+    Of those that were logged with stamps of their own, so often a second, the stamps decide, unless their values come
+    slower still.
     """
     rate = 1 / float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
     found = {name: _slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED}
@@ -79,22 +72,18 @@ def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:
     time, values = time[known], values[known]
     if len(time) < _FEWEST_UPDATES:
         return None
-    steps = np.diff(values, axis=0)
+    steps, step = np.diff(values, axis=0), float(np.median(np.diff(time)))
     updates = np.flatnonzero((steps != 0).any(axis=1))
     if _regular(updates, fewest=2):
-        return SlowSignal(name, _rate(time, updates), "repeated")
+        return SlowSignal(name, float(1 / (step * np.diff(updates).mean())), "repeated")
     bends = np.abs(np.diff(steps / np.diff(time)[:, None], axis=0))
     straight = np.all(bends <= _STRAIGHT * np.quantile(bends, 0.95, axis=0), axis=1)
     knots = np.flatnonzero(~straight & np.concatenate([[True], straight[:-1]]))
     if _regular(knots, fewest=_ROWS_OF_KNOT + 1):
         usual = float(np.median(np.diff(knots)))
         if straight.mean() >= _REGULAR_SHARE * (usual - _ROWS_OF_KNOT) / usual:
-            return SlowSignal(name, _rate(time, knots), "interpolated")
+            return SlowSignal(name, float(1 / (step * np.diff(knots).mean())), "interpolated")
     return None
-
-
-def _rate(time: Array, updates: IntArray) -> float:
-    return float(1 / (np.median(np.diff(time)) * np.diff(updates).mean()))
 
 
 def _regular(updates: IntArray, fewest: int) -> bool:
@@ -109,13 +98,10 @@ def _regular(updates: IntArray, fewest: int) -> bool:
 
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
     """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
-    for signal in slow:
-        if signal.rate_hz >= _FAST_HZ:
-            continue
-        between, cost = {
-            "repeated": ("repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"),
-            "interpolated": ("lie on a straight line between two updates", "knows"),
-        }[signal.between]
+    for signal in (own for own in slow if own.rate_hz < _FAST_HZ):
+        between, cost = "lie on a straight line between two updates", "knows"
+        if signal.between == "repeated":
+            between, cost = "repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"
         yield (
             f"{signal.name} is updated {signal.rate_hz:.3g} times a second, but the log has {rate_hz:.4g} rows a second"
             f": the rows between {between}: it {cost} nothing of motion above {signal.rate_hz / 2:.3g} Hz; log it"
@@ -127,9 +113,9 @@ def cut_offs(signals: Mapping[str, Array], rate_hz: float, slow: tuple[SlowSigna
     """Find the cut-off, Hz, of the low-pass filter that a signal, uniform in time, went through before it was logged.
 
     Its spectrum falls off a cliff there: within an octave by 30 dB more than its trend of the octave before. A filter
-    of low order falls too gently to be told from motion, and one below 8 Hz from motion that ends there. It is where
-    the amplitude is halved, median over the columns that show it; left out are signals where most columns do not, and
-    `slow` ones: straight lines between updates have a spectrum of their own.
+    of low order falls too gently to be distinguished from motion, and one below 8 Hz looks like motion that ends. The
+    cut-off is where the amplitude is halved, median over the columns that show it; left out are signals where most
+    columns do not, and `slow` ones: straight lines between updates have a spectrum of their own.
     """
     left_out = _NOT_JUDGED | {signal.name for signal in slow}
     found = {}
@@ -149,10 +135,9 @@ def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:
     length = min(len(values) // _SEGMENTS, _LONGEST_SEGMENT)
     if length < _FEWEST_IN_SEGMENT or np.ptp(values) == 0:
         return np.empty(0), np.empty(0)
-    segments = sliding_window_view(values, length)[:: length - length // 2]
-    window = _BLACKMAN_HARRIS @ np.cos(np.outer(np.arange(4), np.linspace(0, 2 * np.pi, length, endpoint=False)))
-    lines = np.abs(np.fft.rfft((segments - segments.mean(axis=1, keepdims=True)) * window)) ** 2
-    frequency, power = np.fft.rfftfreq(length, 1 / rate_hz), 2 * lines.mean(axis=0) / (rate_hz * (window**2).sum())
+    from scipy.signal import welch
+
+    frequency, power = welch(values, rate_hz, "blackmanharris", length, length // 2)
     # The window smears what is slower over its first lines.
     known = (frequency >= _LINES_OF_WINDOW * frequency[1]) & (frequency <= _HIGHEST_SHARE * rate_hz)
     octave, power = np.log2(frequency[known]), power[known]
@@ -166,10 +151,9 @@ def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:
 def _cliff(octave: Array, level: Array, at: float) -> float:
     """Measure how far a spectrum falls within an octave below its trend of the octave before, dB; 0 where no cliff."""
     before, beyond = (octave >= at - 1) & (octave <= at), octave >= min(at + 1, octave[-1])
-    if before.sum() < _FEWEST_BANDS or octave[-1] - at < _LEAST_OCTAVES_BEYOND:
-        return 0.0
+    known = before.sum() >= _FEWEST_BANDS and octave[-1] - at >= _LEAST_OCTAVES_BEYOND
     # Most spectra have no cliff, and need no trend for that to be seen.
-    if level[before].min() - level[beyond].max() < _CLEARANCE_DB:
+    if not known or level[before].min() - level[beyond].max() < _CLEARANCE_DB:
         return 0.0
     slope, offset = np.polyfit(octave[before], level[before], 1)
     if slope < -_STEEPEST_BEFORE_DB:

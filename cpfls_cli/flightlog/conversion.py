@@ -109,7 +109,7 @@ def as_mapped(values: Array, columns: ColumnMap) -> Array:
     """Give columns of a log as a map makes them: shape (sample, column) to (sample, axis or rotor), in its unit."""
     sign = np.ones(len(columns.columns)) if columns.sign is None else np.array(columns.sign)
     with np.errstate(over="ignore"):
-        # What overflows is told as a value that no flight has.
+        # What overflows is reported as a value that no flight has.
         scaled: Array = sign * (columns.scale * values + columns.offset)
     if columns.mixer is None:
         return scaled
@@ -121,20 +121,13 @@ def as_mapped(values: Array, columns: ColumnMap) -> Array:
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:
     if not settings.signals:
         raise InputError("import.signals: no signal is mapped to columns of the log")
-    wanted = [("import.time_column", str(settings.time_column))]
-    wanted += [
-        (f"import.signals.{name}.columns", column)
-        for name, signal in settings.signals.items()
-        for column in signal.columns
-    ]
-    tried = {
-        f"import.signals.{name}.columns": ", nor all columns of any entry of otherwise"
-        for name, signal in settings.signals.items()
-        if signal.otherwise
-    }
-    hints = [(key, name, _hint(name, columns)) for key, name in wanted if name not in columns]
-    missing = [f"{key}: the log has no column {name!r}{tried.get(key, '')}{hint}" for key, name, hint in hints]
-    if not all(hint for _, _, hint in hints):
+    wanted = [("import.time_column", str(settings.time_column), "")]
+    for name, signal in settings.signals.items():
+        tried = ", nor all columns of any entry of otherwise" if signal.otherwise else ""
+        wanted += [(f"import.signals.{name}.columns", column, tried) for column in signal.columns]
+    absent = [(key, name, tried, _hint(name, columns)) for key, name, tried in wanted if name not in columns]
+    missing = [f"{key}: the log has no column {name!r}{tried}{hint}" for key, name, tried, hint in absent]
+    if not all(hint for *_, hint in absent):
         missing.append(f"import.signals: {columns_in_words(columns)}")
     if missing:
         raise InputError("\n".join(missing))
@@ -173,18 +166,25 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
 
     Those are roll, pitch, yaw, body vectors in FLU and world vectors in ENU.
     """
-    in_body = _as_body_vectors(signals, settings)
+    # Quaternion, Euler rates and Euler torque are attitude and body vectors too, in the log's own frames.
+    in_body: dict[str, Array] = {name: signals[name] for name in ("attitude", *_BODY_SIGNALS) if name in signals}
+    if "quaternion" in signals:
+        in_body["attitude"] = attitude_from_quaternion(signals["quaternion"], settings.quaternion_order)
+    if "attitude_rate" in signals:
+        in_body["body_rate"] = rotations.body_rate(in_body["attitude"], signals["attitude_rate"])
+    if "torque" in signals:
+        in_body["body_torque"] = rotations.body_torque(in_body["attitude"], signals["torque"])
     converted: dict[str, Array] = {name: signals[name] for name in ROTORS if name in signals}
     if "rotor_command" in signals and settings.rotor_command_is == "thrust":
         # Thrust goes with the square of the speed; a share below 0 gives none.
         converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))
     converted |= {name: signals[name][:, 0] for name in _SCALAR_SIGNALS if name in signals}
     converted |= {name: body_to_flu(in_body[name], settings.body_frame) for name in _BODY_SIGNALS if name in in_body}
-    world = [name for name in _WORLD_SIGNALS if name in signals and not _is_specific_force(name, settings)]
-    converted |= {name: world_to_enu(signals[name], settings.world_frame) for name in world}
+    converted |= {name: world_to_enu(signals[name], settings.world_frame) for name in _WORLD_SIGNALS if name in signals}
     if "attitude" in in_body:
         converted["attitude"] = attitude_to_enu_flu(in_body["attitude"], settings.body_frame, settings.world_frame)
-    if "acceleration" in signals and _is_specific_force("acceleration", settings):
+    if "acceleration" in signals and settings.acceleration_frame == "body-specific-force":
+        converted.pop("acceleration")
         sensed = converted["specific_force"] = body_to_flu(signals["acceleration"], settings.body_frame)
         if "attitude" in converted:
             converted["acceleration"] = acceleration_from_specific_force(converted["attitude"], sensed)
@@ -197,67 +197,36 @@ def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSe
     They are named as in `SETPOINTS`: attitude is roll, pitch, yaw, also of a quaternion; thrust and sticks as logged.
     """
     named: dict[str, Array] = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
-    converted = dict(named)
-    converted |= {name: world_to_enu(named[name], settings.world_frame) for name in _WORLD_SIGNALS if name in named}
+    named |= {name: world_to_enu(named[name], settings.world_frame) for name in _WORLD_SIGNALS if name in named}
     if "body_rate" in named:
-        converted["body_rate"] = body_to_flu(named["body_rate"], settings.body_frame)
+        named["body_rate"] = body_to_flu(named["body_rate"], settings.body_frame)
     if "attitude" in named:
-        converted["attitude"] = _attitude_asked(named["attitude"], settings)
-    return converted
-
-
-def _attitude_asked(values: Array, settings: ImportSettings) -> Array:
-    attitude = np.full((len(values), 3), np.nan)
-    known = np.isfinite(values).all(axis=1)
-    if known.any():
-        own = values[known]
-        if settings.signals["setpoint_attitude"].unit == "1":
-            own = attitude_from_quaternion(own, settings.quaternion_order)
-        attitude[known] = continuous_attitude(attitude_to_enu_flu(own, settings.body_frame, settings.world_frame))
-    return attitude
-
-
-def _is_specific_force(name: str, settings: ImportSettings) -> bool:
-    return name == "acceleration" and settings.acceleration_frame == "body-specific-force"
-
-
-def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
-    """Convert quaternion, Euler rates and Euler torque to attitude and body vectors, in the log's own frames."""
-    in_body = {name: signals[name] for name in ("attitude", *_BODY_SIGNALS) if name in signals}
-    if "quaternion" in signals:
-        in_body["attitude"] = attitude_from_quaternion(signals["quaternion"], settings.quaternion_order)
-    if "attitude_rate" in signals:
-        in_body["body_rate"] = rotations.body_rate(in_body["attitude"], signals["attitude_rate"])
-    if "torque" in signals:
-        in_body["body_torque"] = rotations.body_torque(in_body["attitude"], signals["torque"])
-    return in_body
+        attitude = np.full((len(named["attitude"]), 3), np.nan)
+        known = np.isfinite(named["attitude"]).all(axis=1)
+        own = named["attitude"][known]
+        if len(own):
+            if settings.signals["setpoint_attitude"].unit == "1":
+                own = attitude_from_quaternion(own, settings.quaternion_order)
+            attitude[known] = continuous_attitude(attitude_to_enu_flu(own, settings.body_frame, settings.world_frame))
+        named["attitude"] = attitude
+    return named
 
 
 def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
     """Convert body vectors, shape (time, 3), to front, left, up (FLU)."""
-    turned: Array = vectors @ _BODY[frame].T
-    return turned
+    return np.asarray(vectors @ _BODY[frame].T)
 
 
 def world_to_enu(vectors: Array, frame: WorldFrame) -> Array:
     """Convert world vectors, shape (time, 3), to east, north, up (ENU)."""
-    turned: Array = vectors @ _WORLD[frame].T
-    return turned
+    return np.asarray(vectors @ _WORLD[frame].T)
 
 
 def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> Array:
     """Convert roll, pitch, yaw between frames, ``R_enu,flu = R_enu,world R R_body,flu``.
 
-    Parameters
-    ----------
-    attitude : array, shape (time, 3), rad
-        Roll, pitch and yaw (intrinsic ZYX) of the log's body frame in the log's world frame.
-
-    Returns
-    -------
-    array, shape (time, 3), rad
-        Of body FLU in world ENU, roll and yaw without jumps. A vehicle that heads north has yaw 0 in NED and
-        a quarter turn in ENU.
+    Both are of shape (time, 3), rad, intrinsic ZYX, the result without jumps of roll and yaw. A vehicle that heads
+    north has yaw 0 in NED and a quarter turn in ENU.
     """
     if (body, world) == ("FLU", "ENU"):
         return attitude
@@ -275,13 +244,7 @@ def euler_angles(rotation: Array) -> Array:
 
 
 def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> Array:
-    """Convert specific force, m/s^2, body FLU, to acceleration, ``a = R f - g e_z``, shape (time, 3), m/s^2, world ENU.
-
-    Parameters
-    ----------
-    attitude : array, shape (time, 3), rad
-        Of body FLU in world ENU.
-    """
+    """Convert specific force, m/s^2, body FLU, to acceleration, ``a = R f - g e_z``, m/s^2, world ENU."""
     acceleration: Array = rotations.multiply(rotations.rotation_matrix(attitude), specific_force)
     acceleration[:, 2] -= STANDARD_GRAVITY
     return acceleration

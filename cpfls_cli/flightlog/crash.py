@@ -1,8 +1,8 @@
 """How a flight ends before its time: impact, tumble, on its back, rotors that stop in the air."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, binary_opening
@@ -25,7 +25,7 @@ _OVER_S, _OVER = 3.0, 0.2
 # Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 # below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
-# Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
+# Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
 # After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies.
@@ -65,19 +65,21 @@ class Signs:
         return None if self.rotors is None else np.nan_to_num(self.rotors.mean(axis=1))
 
     @cached_property
+    def rate(self) -> Array | None:
+        """Body rate without what it reads at rest, shape (time, 3), rad/s."""
+        return None if self.body_rate is None else self.body_rate - np.median(self.body_rate, axis=0)
+
+    @cached_property
     def turning(self) -> Array | None:
-        """Size of the body rate without what it reads at rest, shape (time,), rad/s."""
-        if self.body_rate is None:
-            return None
-        return np.asarray(np.linalg.norm(self.body_rate - np.median(self.body_rate, axis=0), axis=1))
+        """Size of that rate, shape (time,), rad/s."""
+        return None if self.rate is None else np.asarray(np.linalg.norm(self.rate, axis=1))
 
     @cached_property
     def slow(self) -> Array | None:
-        """Size of what is slow of the body rate, shape (time,), rad/s."""
-        if self.body_rate is None:
+        """Size of what is slow of it, shape (time,), rad/s."""
+        if self.rate is None:
             return None
-        rate = self.body_rate - np.median(self.body_rate, axis=0)
-        return np.asarray(np.linalg.norm(averaged(rate, self.period, SLOW_S), axis=1))
+        return np.asarray(np.linalg.norm(averaged(self.rate, self.period, SLOW_S), axis=1))
 
     @cached_property
     def felt(self) -> Array | None:
@@ -92,8 +94,7 @@ class Signs:
         """Take no more samples a second than are asked for; of each few the first."""
         every = max(1, int(1 / (most_hz * self.period)))
         held = {each.name: getattr(self, each.name) for each in fields(self)}
-        fewer: dict[str, Any] = {name: None if value is None else value[::every] for name, value in held.items()}
-        return Signs(**fewer)
+        return replace(self, **{name: own[::every] for name, own in held.items() if own is not None})
 
 
 class EarlyEnd(NamedTuple):
@@ -149,11 +150,11 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     It also rests where its rotors ask it to turn and it does not.
     """
     nowhere = np.zeros(len(active), dtype=bool)
-    if signs.slow is None or signs.body_rate is None or not active.any():
+    if signs.slow is None or signs.rate is None or not active.any():
         return Resting(nowhere, nowhere)
     lively = active & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else active
-    turned = averaged(signs.body_rate - np.median(signs.body_rate, axis=0), signs.period, _REST_S)
+    turned = averaged(signs.rate, signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
@@ -181,16 +182,14 @@ def turns_over(signs: Signs, active: BoolArray) -> bool:
 
 
 def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:
-    nowhere = np.zeros(len(flies), dtype=bool)
     if signs.felt is not None:
         thrust = np.median(signs.felt[flies], axis=0)
         felt = averaged(signs.felt, signs.period, _REST_S)
         size = np.linalg.norm(felt, axis=1)
         off = felt @ thrust < _OFF_THRUST * size * float(np.linalg.norm(thrust))
         return np.asarray(off & (size > _WEIGHT[0]) & (size < _WEIGHT[1]))
-    if signs.upright is None:
-        return nowhere
-    return np.asarray(averaged(_turned_up(signs.upright, flies), signs.period, _REST_S) < 0)
+    up = np.zeros(len(flies)) if signs.upright is None else _turned_up(signs.upright, flies)
+    return np.asarray(averaged(up, signs.period, _REST_S) < 0)
 
 
 def _turned_up(upright: Array, flies: BoolArray) -> Array:
@@ -220,26 +219,32 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
     first, after = part
     rests_then = bool(rests.carried[after : after + 1].any())
     lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
-    trouble = _beyond_flight(signs, part, lies_then=lies_then)
-    troubled, hits = first + np.flatnonzero(trouble.wild), first + np.flatnonzero(trouble.hard)
+    marked = _beyond_flight(signs, part, lies_then=lies_then)
+    troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
     # What falls since its rotors stopped hits the ground later.
     lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
     # Who flips and lands, or ends the log in a flip, has lost nothing.
     if lost and (len(hits) or lies_then or stops or _ignores_rotors(signs, part, int(troubled[0]))):
-        return _crash(signs, troubled, hits, first + np.flatnonzero(trouble.strained), after)
+        return _crash(signs, troubled, hits, strained, after)
     if rests_then:
-        at = float(signs.time[after])
-        what = f"from {at:.1f} s on it rests on something, with its rotors on"
-        return EarlyEnd(after, what, (("rests with its rotors on", at),))
+        begin = float(signs.time[after])
+        what = f"from {begin:.1f} s on it rests on something, with its rotors on"
+        return EarlyEnd(after, what, (("rests with its rotors on", begin),))
     if stops:
         hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
-        hit = _first_jolt(signs, part) if hit is None else hit
-        onto = "" if hit is None else f", impact at {signs.time[hit]:.1f} s"
-        moments = [("rotors stop in the air", float(signs.time[after]))]
-        moments += [] if hit is None else [("impact", float(signs.time[hit]))]
-        return EarlyEnd(after, f"the rotors stop in the air at {signs.time[after]:.1f} s{onto}", tuple(moments))
+        if hit is None and signs.felt is not None:
+            # By a force that its flight never had.
+            size = np.linalg.norm(signs.felt, axis=1)
+            least = max(_HARD, _BEYOND * float(size[slice(*part)].max()))
+            struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
+            hit = int(struck[0]) if len(struck) else None
+        what, at = f"the rotors stop in the air at {signs.time[after]:.1f} s", [float(signs.time[after])]
+        if hit is not None:
+            what += f", impact at {signs.time[hit]:.1f} s"
+            at.append(float(signs.time[hit]))
+        return EarlyEnd(after, what, tuple(zip(("rotors stop in the air", "impact"), at, strict=False)))
     return None
 
 
@@ -258,10 +263,11 @@ def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray,
     if at_once and origin == begin:
         at = float(signs.time[begin])
         return EarlyEnd(min(begin, after), f"impact at {at:.1f} s", (("impact", at),))
-    what = f"loss of control at {signs.time[origin]:.1f} s"
-    what += f", impact at {signs.time[struck[0]]:.1f} s" if len(struck) else ""
-    struck_at = [("impact", float(signs.time[struck[0]]))] if len(struck) else []
-    return EarlyEnd(min(origin, after), what, (("loss of control", float(signs.time[origin])), *struck_at))
+    what, times = f"loss of control at {signs.time[origin]:.1f} s", [float(signs.time[origin])]
+    if len(struck):
+        what += f", impact at {signs.time[struck[0]]:.1f} s"
+        times.append(float(signs.time[struck[0]]))
+    return EarlyEnd(min(origin, after), what, tuple(zip(("loss of control", "impact"), times, strict=False)))
 
 
 def _last_burst(samples: IntArray, period: float) -> int:
@@ -270,16 +276,8 @@ def _last_burst(samples: IntArray, period: float) -> int:
     return int(samples[apart[-1] + 1 if len(apart) else 0])
 
 
-class _Trouble(NamedTuple):
-    """What the flight before never had: motion, force, and motion with a rotor at its limit."""
-
-    wild: BoolArray
-    hard: BoolArray
-    strained: BoolArray
-
-
-def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> _Trouble:
-    """Mark motion and force near the end of a stretch that the flight before never had."""
+def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Mark near the end of a stretch what flight before never had: motion, force, motion with a rotor at its limit."""
     first, after = part
     last = min(round(_LAST_S / signs.period), (after - first) // 2)
     before = slice(first, after - last)
@@ -287,14 +285,13 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> _
     stop = min(len(signs.time), after + round(_THEN_S / signs.period))
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
-    if signs.turning is None or (before.stop - first) * signs.period < _FEWEST_S:
-        return _Trouble(nothing, nothing, nothing)
+    if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < _FEWEST_S:
+        return nothing, nothing, nothing
 
     def beyond(values: Array, least: float) -> BoolArray:
         most = float(np.max(values[before]))
         return np.asarray(late & (values[first:stop] > max(_BEYOND * most, least)), dtype=bool)
 
-    assert signs.body_rate is not None, "it turns"
     spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
     wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
     if signs.upright is not None:
@@ -302,14 +299,12 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> _
         # What never was upside down, and is.
         wild |= late & (up[first:stop] < 0) & bool((up[before] > 0).all())
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
-    if signs.rotors is None:
-        strained = nothing
-    else:
+    if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
     hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
     # A touchdown jolts too; but then the vehicle stands on its feet.
     wild = wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild
-    return _Trouble(wild, hard, strained)
+    return wild, hard, nothing if signs.rotors is None else strained
 
 
 def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
@@ -341,16 +336,6 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
         light = np.linalg.norm(signs.felt[second], axis=1) < _FALLS
         return any((b - a) * signs.period >= _FALL_S for a, b in runs(light))
     return False
-
-
-def _first_jolt(signs: Signs, part: tuple[int, int]) -> int | None:
-    """Find where a vehicle whose rotors stopped hits, by a force that its flight never had; None where it does not."""
-    if signs.felt is None:
-        return None
-    size, after = np.linalg.norm(signs.felt, axis=1), part[1]
-    least = max(_HARD, _BEYOND * float(size[slice(*part)].max()))
-    struck = np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
-    return after + int(struck[0]) if len(struck) else None
 
 
 def _falls(signs: Signs) -> list[tuple[int, int]]:

@@ -7,19 +7,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog.crash import (
-    ALIVE,
-    LIVELY_RAD_S,
-    SLOW_S,
-    Resting,
-    Signs,
-    averaged,
-    ended_early,
-    resting,
-    smoothed,
-    turns_over,
-    upright_of,
-)
+from cpfls_cli.flightlog import crash
+from cpfls_cli.flightlog.crash import ALIVE, LIVELY_RAD_S, SLOW_S, Resting, Signs, averaged, smoothed
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
@@ -47,7 +36,7 @@ _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
-_FEWEST_ROWS = 10  # Of which it can be told.
+_FEWEST_ROWS = 10  # Of which it can be seen.
 SHORTEST_FLIGHT_S = 2.0  # Below which nothing is a flight.
 
 
@@ -62,7 +51,7 @@ class FlownPart:
 
     # Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
     span_s: tuple[float, float] | None
-    reasons: tuple[str, ...]  # What was cut, where, and how that was told; what else flies and is left out.
+    reasons: tuple[str, ...]  # What was cut, where, and how that is known; what else flies and is left out.
     flies: bool = True  # False where nothing in it flies.
     stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
     ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
@@ -113,8 +102,7 @@ def warn_of_end(table: SignalTable, settings: ImportSettings) -> tuple[str, ...]
 
 def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
     """Find what flies by the signals that a config maps, on the clock of the log."""
-    rows, _ = increasing_rows(table.time)
-    table = table.rows(rows)
+    table = table.rows(increasing_rows(table.time)[0])
     live, ended = live_rows(table, 0.0)
     table = table.rows(live)
     if len(table.time) < _FEWEST_ROWS:
@@ -129,19 +117,16 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
         if name in table.signals and np.isfinite(table.signals[name]).any(axis=0).all()
     }
     name = next((name for name in ROTORS if name in known), None)
-    rotors = None if name is None else rotor_shares(known[name], shares=settings.signals[name].unit == "1")
     up = 1.0 if settings.world_frame == "ENU" else -1.0
-    senses = settings.acceleration_frame == "body-specific-force"
-    flown = find_flown(
-        Signs(
-            time=clock,
-            rotors=rotors,
-            height=up * known["position"][:, 2] if "position" in known else None,
-            body_rate=known.get("body_rate"),
-            upright=upright_of(known.get("attitude"), known.get("quaternion"), settings.quaternion_order),
-            force=known.get("acceleration") if senses else None,
-        )
+    signs = Signs(
+        time=clock,
+        rotors=rotor_shares(known[name], shares=settings.signals[name].unit == "1") if name else None,
+        height=up * known["position"][:, 2] if "position" in known else None,
+        body_rate=known.get("body_rate"),
+        upright=crash.upright_of(known.get("attitude"), known.get("quaternion"), settings.quaternion_order),
+        force=known.get("acceleration") if settings.acceleration_frame == "body-specific-force" else None,
     )
+    flown = find_flown(signs)
     return flown.within(ended, (float(clock[0]), float(clock[-1])))
 
 
@@ -149,25 +134,29 @@ def find_flown(signs: Signs) -> FlownPart:
     """Find the stretches of a log that are flown, and the longest of them."""
     signs = signs.slower(_MOST_CLOCK_HZ)
     signs = replace(signs, body_rate=None) if _dead_rates(signs) else signs
-    active, told = _active(signs)
+    active, how = _active(signs)
     if active is None:
-        return FlownPart(None, (told,), flies=False)
-    if turns_over(signs, active):
+        return FlownPart(None, (how,), flies=False)
+    if crash.turns_over(signs, active):
         why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
-        return FlownPart(None, (f"no flight in it: {why}: it stands, and the attitude is wrong",), flies=False)
-    rests = resting(signs, active)
+        return _no_flight(f"{why}: it stands, and the attitude is wrong")
+    rests = crash.resting(signs, active)
     active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
     if not active.any():
-        return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
+        return _no_flight(f"{how} throughout")
     if _still(signs, active):
-        return FlownPart(None, ("no flight in it: the vehicle neither turns nor moves",), flies=False)
+        return _no_flight("the vehicle neither turns nor moves")
     if held := _held(signs, active):
-        return FlownPart(None, (f"no flight in it: {held}, as on a test stand",), flies=False)
-    return _longest(signs, active, rests, told)
+        return _no_flight(f"{held}, as on a test stand")
+    return _longest(signs, active, rests, how)
+
+
+def _no_flight(why: str) -> FlownPart:
+    return FlownPart(None, (f"no flight in it: {why}",), flies=False)
 
 
 def _active(signs: Signs) -> tuple[BoolArray | None, str]:
-    """Mark the samples in which the vehicle flies, and say how that is told."""
+    """Mark the samples in which the vehicle flies, and say how that is known."""
     level, height, rate, period = signs.level, signs.height, signs.turning, signs.period
     if level is not None:
         largest = float(np.quantile(level, 0.98))
@@ -176,11 +165,11 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
             by_hand = ", and it is turned by hand" if moved else ""
             return None, f"no flight in it: the rotors stand still throughout{by_hand}"
         turning = _carried(signs, largest)
-        told = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
-        told += "" if rate is None else ", with hardly any rotation"
+        how = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
+        how += "" if rate is None else ", with hardly any rotation"
         if height is None or not turning.any() or turning.all():
-            return turning, told
-        return _off_the_ground(turning, height, period), told + ", or it is on the ground"
+            return turning, how
+        return _off_the_ground(turning, height, period), how + ", or it is on the ground"
     if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
         ground = float(np.quantile(height, 0.02))
         above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
@@ -188,10 +177,8 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
         return flies, "it is on the ground"
     if rate is None:
-        return (
-            None,
-            f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
-        )
+        why = "no rotors, no height and no rates are recognised, so flight cannot be told from standing"
+        return None, f"{why}: {BY_HAND}"
     spread = np.sqrt(averaged(rate**2, period, _SHORT_S))
     quiet = spread < max(_STILL_RAD_S, 0.05 * float(np.quantile(spread, 0.9)))
     return np.asarray(~quiet, dtype=bool), "it does not turn at all"
@@ -319,9 +306,9 @@ def _dead_rates(signs: Signs) -> bool:
     return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
-def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
+def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
-    ends = [ended_early(signs, rests, part) for part in stretches]
+    ends = [crash.ended_early(signs, rests, part) for part in stretches]
     cut = []
     for (first, after), early_end in zip(stretches, ends, strict=True):
         # What is close to the ground at either end is left out, but where the log begins or ends in flight.
@@ -337,10 +324,10 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     reasons = []
     early = [(index, each) for index, each in enumerate(ends) if each is not None]
     if first > 0 and not any(index < chosen for index, _ in early):
-        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), told)}")
+        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), how)}")
     if after < len(time) and ends[chosen] is None:
         last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), told)}")
+        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), how)}")
     others = [
         f"{time[a]:.1f} to {time[b - 1] if own is None else time[own.first - 1]:.1f} s"
         for (a, b), own in zip(stretches, ends, strict=True)
@@ -358,10 +345,10 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> Flow
     return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
 
 
-def _how(signs: Signs, part: slice, told: str) -> str:
+def _how(signs: Signs, part: slice, how: str) -> str:
     if signs.level is None:
-        return told
+        return how
     if float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
-        return told
+        return how
     by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
     return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")

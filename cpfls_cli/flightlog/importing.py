@@ -3,51 +3,33 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
-from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
-from cpfls_cli.flightlog.conversion import (
-    drop_absent_signals,
-    first_stamp,
-    select_columns,
-    setpoints_to_program_frames,
-    to_program_frames,
-)
+from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
-from cpfls_cli.flightlog.repair import (
-    SignalTable,
-    crop_and_order,
-    fill,
-    find_signal_spikes,
-    longest_stretch,
-    make_continuous,
-    mask_impossible,
-)
-from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.flightlog.repair import SignalTable
+from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
-from cpfls_cli.flightlog.stretches import (
-    count_values,
-    refuse_steep_pitch,
-    rotors_at_rest,
-    warn_of_angles,
-    warn_of_dead,
-    warn_of_rest,
-    warn_of_values,
-)
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
+from cpfls_cli.inertia import body_torque_columns
+from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.rounding import less, levelled
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3  # Above the 32 kHz at which the fastest gyroscopes are read.
-_FEWEST_SAMPLES = 10  # Of which a flight can be told.
+_FEWEST_SAMPLES = 10  # Of which a flight can be made.
+_COMMANDS = ("body_torque", "thrust", "rotor_command")
+# Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
+_POOR_R2 = 0.5
+_SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 _ALIASING = "the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight"
 
 
@@ -64,7 +46,6 @@ def import_log(
     Parameters
     ----------
     columns : mapping from str to array, shape (sample,)
-        The log.
     rotor_torque : callable, optional
         Body torque, array of shape (time, 3), N m, FLU, from the signals of the rotors; called where
         `torque_source` names the rotors.
@@ -89,52 +70,50 @@ def read_signals(
     The result has the log's median rate, time from 0, neither shifted nor filtered. A torque that the rotors are to
     give is still None.
     """
-    mapped = drop_absent_signals(columns, settings)
+    mapped = conversion.drop_absent_signals(columns, settings)
     # What was asked for may be absent at any time: it decides on no row.
     settings = replace(mapped, signals={name: own for name, own in mapped.signals.items() if name not in SETPOINTS})
-    read, broken = mask_impossible(SignalTable(*select_columns(columns, mapped)), mapped)
+    read, broken = repair.mask_impossible(SignalTable(*conversion.select_columns(columns, mapped)), mapped)
     crop, cut = flown_crop(read, settings) if settings.crop_s == "flown" else (settings.crop_s, ())
     settings = replace(settings, crop_s=crop)
-    table, dropped = crop_and_order(read, settings)
+    table, dropped = repair.crop_and_order(read, settings)
     cut = warn_of_end(table, settings) if mapped.crop_s != "flown" else cut
     asked, table = (
         SignalTable(table.time, {name: own for name, own in table.signals.items() if (name in SETPOINTS) == setpoint})
         for setpoint in (True, False)
     )
-    table = make_continuous(table)
-    spikes = find_signal_spikes(table, settings)
+    table = repair.make_continuous(table)
+    spikes = repair.find_signal_spikes(table, settings)
     masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
     present = np.isfinite(np.hstack(list(repaired.signals.values())))
-    rows, incomplete_ends, beyond_gap = longest_stretch(table.time, present, settings)
+    rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
     table, repaired = table.rows(rows), repaired.rows(rows)
-    resting = rotors_at_rest(table, settings)
-    counts = count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
-    clock, rate_hz = _uniform_clock(table.time)
-    on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
-    refuse_steep_pitch(on_clock)
+    resting = stretches.rotors_at_rest(table, settings)
+    counts = stretches.count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
+    clock, rate_hz, hurried = _uniform_clock(table.time, settings.time_unit)
+    on_clock = {name: repair.fill(table.time, values, clock) for name, values in repaired.signals.items()}
+    stretches.refuse_steep_pitch(on_clock)
     setpoints, unknown = _setpoints(asked, clock, mapped)
-    slow = slow_signals(table, stamped_hz)
-    filtered = cut_offs(on_clock, rate_hz, slow)
+    slow = bandwidth.slow_signals(table, stamped_hz)
+    filtered = bandwidth.cut_offs(on_clock, rate_hz, slow)
+    dead = stretches.warn_of_dead(table, counts["saturated"], settings)
     warnings = (
-        *(*cut, *broken, *warn_of_values(counts), *warn_of_dead(table, tuple(counts["saturated"]), settings)),
-        *(*warn_of_rest(table, resting, settings), *warn_of_slow(slow, rate_hz), *warn_of_cut_offs(filtered, settings)),
+        *(*cut, *broken, *stretches.warn_of_values(counts), *dead, *stretches.warn_of_rest(table, resting, settings)),
+        *(*bandwidth.warn_of_slow(slow, rate_hz), *bandwidth.warn_of_cut_offs(filtered, settings)),
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *(*_warn_of_clock(rate_hz, settings), *warn_of_angles(read.signals), *unknown),
+        *(*hurried, *stretches.warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     report = ImportReport(
         samples_read=len(read.time),
         samples=len(clock),
         dropped={reason: rows for reason, rows in dropped.items() if rows},
-        missing=counts["missing"],
-        spikes=counts["spikes"],
-        suspected_spikes=counts["suspected_spikes"],
-        saturated=counts["saturated"],
+        **counts,
         gaps=int((np.diff(table.time) > 1.5 * np.median(np.diff(table.time))).sum()),
         longest_gap_s=float(np.diff(table.time).max()),
         span_s=(float(clock[0]), float(clock[-1])),
-        first_stamp_s=first_stamp(columns, mapped),
+        first_stamp_s=conversion.first_stamp(columns, mapped),
         crop_s=crop if isinstance(crop, tuple) else None,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
@@ -144,9 +123,9 @@ def read_signals(
         parameters={},
         stated={},
     )
-    converted = to_program_frames(on_clock, settings)
+    converted = conversion.to_program_frames(on_clock, settings)
     if "attitude" in setpoints and "attitude" in converted:
-        # A full turn beside the vehicle's own is the same.
+        # A full turn away from the vehicle's own is the same.
         setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
     return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 
@@ -159,10 +138,11 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
     }
     known = {name: values for name, values in held.items() if np.isfinite(values).all(axis=1).any()}
     left = [f"signal {name} is left out: it holds no setpoint in the part that is kept" for name in held.keys() - known]
-    return setpoints_to_program_frames(known, settings), left
+    return conversion.setpoints_to_program_frames(known, settings), left
 
 
-def _uniform_clock(time: Array) -> tuple[Array, float]:
+def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
+    """Lay a clock over stamps, and say where its rate is none of a log."""
     period = float(np.median(np.diff(time)))
     if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
         raise InputError(
@@ -170,14 +150,9 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
             " which no log has; check import.time_unit and import.time_column"
         )
     # A whole number of periods that rounding made a little short must not lose its last sample.
-    samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
-    return time[0] + period * np.arange(samples), 1 / period
-
-
-def _warn_of_clock(rate_hz: float, settings: ImportSettings) -> list[str]:
-    unit = settings.time_unit
+    samples, rate_hz = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
     words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
-    return [words] if rate_hz >= _FASTEST_HZ else []
+    return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
@@ -186,14 +161,7 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
     between the raw ones. The result is interpolated to `rate_hz` last. Setpoints stay as they were asked for.
 
-    Parameters
-    ----------
-    signals : LogSignals
-        With the body torque, aligned.
-
-    References
-    ----------
-    Section 1 of the method's description.
+    The signals are aligned and have the body torque (section 1 of the method's description).
     """
     filtered: dict[str, Any] = {
         name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
@@ -246,3 +214,172 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
     if signals.body_torque is not None:
         derived["torque"] = rotations.generalised_torque(signals.attitude, signals.body_torque)
     return derived
+
+
+# Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion.
+
+
+def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
+    """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
+
+    Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
+
+    The signals are not yet filtered, and an estimate looks at a leading share of their samples.
+    """
+    estimate = None
+    if settings.delay_s == "estimate":
+        body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
+        if body_rate is None or signals.body_torque is None:
+            raise SettingError("delay_s", "needs a torque, and body rates or an attitude")
+        filtered = (settings.delay_max_s, settings.lowpass_hz, settings.lowpass_order)
+        estimate = estimate_delay(signals.time, body_rate, signals.body_torque, *filtered, share=delay_share)
+    delay = estimate.delay_s if estimate else float(settings.delay_s)
+    warnings = signals.report.warnings + (_warnings(estimate) if estimate else ())
+    report = replace(signals.report, delay_s=delay, delay=estimate, warnings=warnings)
+    return _shifted(replace(signals, report=report), delay, settings.torque_source == "rotor-speed")
+
+
+def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
+    poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
+    odd = "at the estimated delay, a moment of inertia is negative; check signs and axes"
+    last = "the estimated delay is the longest one tried; raise import.delay_max_s"
+    negative = bool((estimate.inertia[:3] < 0).any())
+    holds = {last: estimate.at_bound, poor: estimate.pooled_r2 < _POOR_R2, odd: negative}
+    return tuple(sentence for sentence, so in holds.items() if so)
+
+
+def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSignals:
+    if delay == 0:
+        return signals
+    period = signals.time[1] - signals.time[0]
+    first = int(np.ceil(delay / period - 1e-9))
+    if first > len(signals.time) - 2:
+        raise SettingError("delay_s", f"longer than the flight, {signals.time[-1]:.4g} s")
+    time = signals.time[first:]
+    cut = {name: values[first:] for name, values in signals.arrays.items()}
+    for name in (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS:
+        if name in cut:
+            # A cubic overshoots the steps of a command; it stays within what was commanded.
+            values = signals.arrays[name]
+            moved = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
+            cut[name] = moved[first:]
+    begin, end = signals.report.span_s
+    report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
+    setpoints = {name: values[first:] for name, values in signals.setpoints.items()}
+    return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
+
+
+class _Fit(NamedTuple):
+    """Regression of the shifted torque on the columns of a rigid body."""
+
+    window: slice
+    period: float
+    torque: Array
+    scale: Array
+    regressor: Array
+    basis: Array
+
+    def scaled_torque(self, delay: float) -> Array:
+        moved = delayed(self.torque, delay / self.period)[self.window] / self.scale
+        return np.asarray(moved - moved.mean(axis=0))
+
+    def r2(self, delay: float) -> tuple[float, Array]:
+        torque = self.scaled_torque(delay)
+        fitted = (self.basis @ (self.basis.T @ torque.ravel())).reshape(torque.shape)
+        residual, total = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
+        acting = total > 0
+        unexplained = residual[acting] / total[acting]
+        r2 = np.ones(3)
+        r2[acting] = 1 - unexplained
+        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
+
+
+def estimate_delay(
+    time: Array,
+    body_rate: Array,
+    body_torque: Array,
+    delay_max_s: float = 0.2,
+    lowpass_hz: float | None = None,
+    lowpass_order: int = 4,
+    share: float = 1.0,
+) -> DelayEstimate:
+    """Estimate the delay at which a rigid body explains most of the torque.
+
+    Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
+    For every delay, the six inertia parameters and a constant torque about each axis are regressed on one common
+    window, each axis scaled by its own standard deviation. Delays are judged by the geometric mean, over the axes, of
+    the share of torque that stays unexplained: the likelihood where every axis has noise of its own size, so that an
+    axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
+    sample is refined between its neighbours (section 8 of the method's description).
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+        Uniform.
+    body_rate, body_torque : array, shape (time, 3), rad/s and N m, body frame
+        The torque as commanded, or as computed from the rotors.
+    delay_max_s : float
+        Longest delay tried, s.
+    share : float
+        Leading share of the samples that is looked at, so that data held out for a test stay unseen.
+    """
+    from scipy.optimize import minimize_scalar
+
+    used = slice(0, round(share * len(time)))
+    fit = _prepare(time[used], body_rate[used], body_torque[used], delay_max_s, lowpass_hz, lowpass_order)
+    delays = np.append(np.arange(0.0, delay_max_s, time[1] - time[0]), delay_max_s)
+    curve = np.array([fit.r2(delay)[0] for delay in delays])
+    best = int(np.argmin(levelled(-curve)))
+    bounds = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
+    refined = float(minimize_scalar(lambda own: -fit.r2(float(own))[0], bounds=bounds, method="bounded").x)
+    delay = refined if less(fit.r2(float(delays[best]))[0], fit.r2(refined)[0]) else float(delays[best])
+    pooled, r2 = fit.r2(delay)
+    inertia = np.linalg.lstsq(fit.regressor, fit.scaled_torque(delay).ravel(), rcond=None)[0]
+    return DelayEstimate(
+        delay_s=delay,
+        r2=r2,
+        pooled_r2=pooled,
+        inertia=np.asarray(inertia, dtype=float),
+        delays=delays,
+        curve=curve,
+        at_bound=bool(delay > delays[-2]),
+    )
+
+
+def _prepare(
+    time: Array, body_rate: Array, body_torque: Array, delay_max_s: float, lowpass_hz: float | None, order: int
+) -> _Fit:
+    if len(time) < 2:
+        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
+    rate_hz = 1 / (time[1] - time[0])
+    smooth_rate = low_pass(body_rate, rate_hz, lowpass_hz, order)
+    smooth_torque = low_pass(body_torque, rate_hz, lowpass_hz, order)
+    # Without the filter's transients and, at the start, the longest delay.
+    edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
+    first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge]).tolist()
+    if last - first < _SMALLEST_WINDOW:
+        raise SettingError(
+            "delay_max_s",
+            f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
+            f" remain, and at least {_SMALLEST_WINDOW} are needed",
+        )
+    window = slice(first, last)
+    scale = smooth_torque[window].std(axis=0)
+    if not scale.any():
+        raise ComputationError("the delay cannot be estimated: the torque is constant")
+    scale[scale == 0] = np.inf
+    columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
+    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
+    # Of columns of one length, so that a weakly excited one is not lost.
+    lengths = np.linalg.norm(regressor, axis=0)
+    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
+    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, directions[:, sizes > 1e-10 * sizes[0]])
+
+
+def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
+    """Replace rotor commands by their first-order response in tau s, ``tau w' + w = u``, u held between samples."""
+    command = signals.rotor_command
+    if command is None or time_constant == 0:
+        return signals
+    ratio = time_constant / (signals.time[1] - signals.time[0])
+    return replace(signals, rotor_command=lagged(command, ratio, "previous").start)

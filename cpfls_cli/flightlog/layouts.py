@@ -169,6 +169,6 @@ def count_by_form(parameters: Parameters, moving: int) -> int | None:
 
 
 def lifting_rotors(parameters: Parameters) -> list[int]:
-    """List the rotors that PX4's CA_ROTOR* let push upward, from 0: a VTOL has one that pushes forward beside them."""
+    """List the rotors that PX4's CA_ROTOR* let push upward, from 0: a VTOL has one that pushes forward too."""
     count = whole(parameters, "CA_ROTOR_COUNT") or 0
     return [index for index in range(count) if float(parameters.get(f"CA_ROTOR{index}_AZ", -1.0)) < _UPWARD]

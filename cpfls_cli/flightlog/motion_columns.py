@@ -4,12 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import (
     AS_NAMED,
     AxisFit,
-    Order,
-    Sign,
     body_rate_from,
     first_derivative,
     fit_axes,
@@ -19,8 +16,7 @@ from cpfls_cli.flightlog.agreement import (
 from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, Reading, nearest
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
-from cpfls_cli.flightlog.rotor_columns import RotorGuess
+from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
@@ -29,14 +25,14 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 _TOLERANCE, _TEN = 1.4, 10.0
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
-# Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2.
+# Sizes of an acceleration that holds no gravity, over that over ground in m/s^2.
 _OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
 # Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
 _BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
-# a gyroscope beside motion capture it is 0.1 to 0.4.
+# a gyroscope with motion capture it is 0.1 to 0.4.
 _FAST_HZ, _DERIVED = 10.0, 0.8
-# What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former.
+# What is left of a velocity in body axes, as a share of what is left in those of the world, that shows the former.
 _CLOSER = 0.4
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
@@ -45,7 +41,7 @@ _ALONG, _AGAINST = 0.3, -0.6
 # The gyroscope.
 
 
-def gyroscope_first(seen: Seen, reading: Reading, rotors: RotorGuess | None, are_commands: bool) -> bool:
+def gyroscope_first(seen: Seen, reading: Reading, rotors: Guess | None) -> bool:
     """Put a gyroscope before a rate that is the attitude's own derivative, where the rotors explain more of it.
 
     Both are one motion where that is slow. Above, a derivative holds what noise and filter of the attitude make of it,
@@ -55,16 +51,25 @@ def gyroscope_first(seen: Seen, reading: Reading, rotors: RotorGuess | None, are
     fit = reading.rates
     if first is None or first.known or rotors is None or fit is None or fit.explained < CLEAR:
         return False
-    derived = body_rate_from(reading.attitude.rotation, seen.rate_hz)
-    if _fast_share(derived, seen.grid(first), seen.rate_hz) < _DERIVED:
+    derived, rate_hz, speeds = (
+        body_rate_from(reading.attitude.rotation, seen.rate_hz),
+        seen.rate_hz,
+        seen.mapped(rotors),
+    )
+
+    def fast_share(named: Named) -> float:
+        """Give the share of what is fast of a rate that the derivative of the attitude explains."""
+        fast = [slow(own, rate_hz, _FAST_HZ) - slow(own, rate_hz) for own in (derived, seen.grid(named))]
+        return fit_axes(*fast).explained
+
+    if fast_share(first) < _DERIVED:
         return False
-    turning = slow(derived, seen.rate_hz)
-    speeds = seen.mapped(rotors.guess)
-    driven = {first: explained_by_rotors(seen.grid(first), speeds, seen.rate_hz, are_commands)}
-    for named in others:
-        own = fit_axes(turning, slow(seen.grid(named), seen.rate_hz))
-        if own.explained > GOOD and _fast_share(derived, seen.grid(named), seen.rate_hz) < _DERIVED:
-            driven[named] = explained_by_rotors(seen.grid(named), speeds, seen.rate_hz, are_commands)
+    turning = slow(derived, rate_hz)
+    own_motion = (own for own in others if fit_axes(turning, slow(seen.grid(own), rate_hz)).explained > GOOD)
+    driven = {
+        named: explained_by_rotors(seen.grid(named), speeds, rate_hz, rotors.signal == "rotor_command")
+        for named in (first, *(own for own in own_motion if fast_share(own) < _DERIVED))
+    }
     best = largest(driven, lambda named: driven[named])
     if best is first:
         return False
@@ -75,12 +80,6 @@ def gyroscope_first(seen: Seen, reading: Reading, rotors: RotorGuess | None, are
         f" {', '.join(best.group.columns)}"
     )
     return True
-
-
-def _fast_share(derived: Array, measured: Array, rate_hz: float) -> float:
-    """Give the share of what is fast of a rate that the derivative of the attitude explains."""
-    fast = [slow(own, rate_hz, _FAST_HZ) - slow(own, rate_hz) for own in (derived, measured)]
-    return fit_axes(*fast).explained
 
 
 def take_body_rate(seen: Seen, reading: Reading | None) -> None:
@@ -102,15 +101,8 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
                 " explains: is the unit of the stamps right?"
             )
-        seen.take(
-            named,
-            unit,
-            _rates_in_words(named, fit, unit, scale),
-            "data" if agrees else "guess",
-            scale=scale,
-            order=fit.order,
-            sign=fit.sign,
-        )
+        sure: Sure = "data" if agrees else "guess"
+        seen.take(named, unit, _rates_in_words(named, fit, unit, scale), sure, scale, fit.order, fit.sign)
         _doubt_rates(seen, named, fit)
         return
     values = seen.grid(named)
@@ -127,7 +119,7 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
             f"{named.group.pattern}: {against}; one of the two is late, noisy or in other axes; the axes"
             " are taken as named"
         )
-    sure: Sure = "guess" if rivals or fit is not None else "named"
+    sure = "guess" if rivals or fit is not None else "named"
     reason = f"{called(named)}, {size_in_words}{turned}; {against}"
     seen.take(named, unit, reason, sure, sign=named.sign, rivals=rivals)
 
@@ -135,14 +127,12 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
 def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
     axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
     better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
-    gain = f"{fit.gain:.3g}"
-    large = "as large" if gain == "1" else f"{gain} times as large"
+    large = "as large" if f"{fit.gain:.3g}" == "1" else f"{fit.gain:.3g} times as large"
     size = f" and is {large}, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
     return f"{called(named)}; follows the attitude's derivative{axes} ({100 * fit.explained:.0f} %, {better}){size}"
 
 
 def _doubt_rates(seen: Seen, named: Named, fit: AxisFit) -> None:
-    """Warn of axes of a gyroscope that are not as the others."""
     columns = [named.group.columns[index] for index in fit.order]
     seen.warn_of_mirrored(named, fit.order, fit.sign, "the attitude")
     loose = [c for c, own in zip(columns, fit.along, strict=True) if not own > _ALONG]
@@ -203,23 +193,23 @@ def take_places(seen: Seen, reading: Reading | None) -> None:
 def _take_place(
     seen: Seen, named: Named, units: tuple[UnitName, UnitName], tilt: Reading | None, relative: AxisFit | None
 ) -> None:
-    stated, place = named.unit, seen.guesses.get("position")
+    stated, place, reason = named.unit, seen.guesses.get("position"), called(named)
     unit: UnitName = stated or units[0]
     sure: Sure = "named"
     rivals: tuple[Rival, ...] = ()
-    reason = called(named)
-    follows = relative is not None and relative.explained > CLEAR
+    relative = relative if relative is not None and relative.explained > CLEAR else None
     gain = float("nan") if tilt is None or tilt.lean is None else tilt.lean.gain
-    if follows and relative is not None and stated is None and place is not None:
+    leaning = (
+        "" if tilt is None else f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in"
+    )
+    if relative is not None and stated is None and place is not None:
         # What it is in follows from the position, whatever else is logged in other units.
         small = known_unit(place.columns.unit).factor / relative.gain < 0.03
-        unit, sure = units[1] if small else units[0], place.sure
+        unit, sure = units[small], place.sure
     elif tilt is not None and stated is None:
-        unit = units[1] if gain > 100 else units[0]
-        sure = "data" if 1 / _TEN < gain / (1000 if unit == units[1] else 1) < _TEN else "guess"
-        reason += (
-            f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit.split('/')[0]}"
-        )
+        unit = units[gain > 100]
+        sure = "data" if 1 / _TEN < gain / (1000 if gain > 100 else 1) < _TEN else "guess"
+        reason += f"{leaning} {unit.split('/')[0]}"
     elif stated is None:
         spread = float(np.ptp(seen.grid(named), axis=0).max())
         sure = "data" if spread < 50 else "guess"
@@ -229,28 +219,24 @@ def _take_place(
         reason += f", which is in {stated}"
         # The lean was held against the velocity only where there is no position.
         leans = tilt is not None and tilt.place_share > GOOD and (named.signal == "position" or place is None)
-        if leans and tilt is not None and not 1 / _TEN < gain * known_unit(stated).factor < _TEN:
+        if leans and not 1 / _TEN < gain * known_unit(stated).factor < _TEN:
             unit, sure = units[gain > 100], "data" if gain > 100 else "guess"
-            reason += f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit}"
+            reason += f"{leaning} {unit}"
             seen.disagree(named, unit, "judged by tilt and gravity, it is in")
     # The kind of log states its axes.
     free = named.frame is None
     order, sign = (tilt.place_order, tilt.place_sign) if free and tilt is not None else AS_NAMED
-    if named.signal == "velocity" and follows and relative is not None:
+    if named.signal == "velocity" and relative is not None:
         reason += f"; the position's derivative explains {100 * relative.explained:.0f} % of it"
-        order, sign = _behind(relative, order, sign) if free else AS_NAMED
+        if free:
+            # Its axes, as they lie to those of the position, behind those of the position.
+            own = [-1 if along < _AGAINST else one for one, along in zip(relative.sign, relative.along, strict=True)]
+            sign = tuple(own[index] * one for index, one in zip(order, sign, strict=True))
+            order = tuple(relative.order[index] for index in order)
     if (order, sign) != AS_NAMED:
         reason += "; rotated into the axes of the attitude, as the tilt requires"
     seen.take(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
-
-
-def _behind(relative: AxisFit, order: Order, sign: Sign) -> tuple[Order, Sign]:
-    """Put the axes of a velocity, as they lie to those of the position, behind those of the position."""
-    own = [-one if along < _AGAINST else one for one, along in zip(relative.sign, relative.along, strict=True)]
-    return tuple(relative.order[index] for index in order), tuple(
-        own[index] * one for index, one in zip(order, sign, strict=True)
-    )
 
 
 # The accelerometer.
@@ -270,9 +256,14 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         [row for row in SENSED if 1 / near < abs(vertical) / (weight * row[0]) < near] for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
-    world = _of_places(seen)
+    place, derived = seen.guesses.get("velocity"), first_derivative
+    if place is None:
+        place, derived = seen.guesses.get("position"), second_derivative
     along_world = None
-    if world is not None:
+    if place is not None:
+        # The acceleration of the world, m/s^2, in the axes of what is taken for velocity or position.
+        size = known_unit(place.columns.unit).factor * place.columns.scale
+        world = derived(size * seen.log.on_grid(place.columns.columns)[seen.part], seen.rate_hz)
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
         along_world = fit_axes(slow(ground * world, seen.rate_hz, 1.0), slow(ground * values, seen.rate_hz, 1.0))
     # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
@@ -313,16 +304,6 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     return True
 
 
-def _of_places(seen: Seen) -> Array | None:
-    """Derive the acceleration of the world, m/s^2, from what is told of velocity or position, in their own axes."""
-    velocity, position = seen.guesses.get("velocity"), seen.guesses.get("position")
-    guess, derived = (position, second_derivative) if velocity is None else (velocity, first_derivative)
-    if guess is None:
-        return None
-    size = known_unit(guess.columns.unit).factor * guess.columns.scale
-    return derived(size * seen.log.on_grid(guess.columns.columns)[seen.part], seen.rate_hz)
-
-
 def _leave_gravity_out(seen: Seen, named: Named, fit: AxisFit) -> None:
     seen.left_out.append(
         f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
@@ -346,8 +327,8 @@ def _take_sensed(
 ) -> None:
     _, unit, scale = sensed
     up = "FLU" if vertical > 0 else "FRD"
-    told = None if reading is None or reading.lean is None else reading.body
-    body = told or (named.frame if named.frame in ("FLU", "FRD") else None)
+    by_lean = None if reading is None or reading.lean is None else reading.body
+    body = by_lean or (named.frame if named.frame in ("FLU", "FRD") else None)
     weight = "gravity" if 1 / _WEIGHT < carried < _WEIGHT else f"{carried:.2g} times gravity, as it moves"
     reason = f"{called(named)}; z has a median of {vertical:.3g} in flight: {weight}, in {unit}"
     if named.unit not in (None, unit):

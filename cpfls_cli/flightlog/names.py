@@ -3,56 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.agreement import (
-    SLOW_HZ,
-    first_derivative,
-    fit_axes,
-    on_clock,
-    rotations_of,
-    second_derivative,
-    slow,
-    turning_of,
-)
+from cpfls_cli.flightlog import agreement, vocabulary
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
-from cpfls_cli.flightlog.vocabulary import (
-    A_WORD,
-    ALLOWED,
-    ARDUPILOT,
-    ASKED,
-    BETAFLIGHT,
-    CRAZYFLIE,
-    FAST,
-    IN_FULL,
-    IN_RADIANS,
-    KIN,
-    KNOWN,
-    MEANINGS,
-    NOT_MEASURED,
-    ONE_WORD,
-    PX4,
-    RATE_WORDS,
-    SECOND_HAND,
-    SPELLINGS,
-    WISHED,
-    Meaning,
-)
-from cpfls_cli.rounding import less
+from cpfls_cli.flightlog.vocabulary import CRAZYFLIE, KIN, MEANINGS, NOT_MEASURED, PX4, WISHED, Meaning
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-_MEASURED: Final = tuple(own for own in KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
+_MEASURED: Final = tuple(own for own in vocabulary.KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
 _WRITTEN: Final = {
-    text: (unit, scale) for unit, own in SPELLINGS.items() for scale, written in own.items() for text in written.split()
+    text: (unit, scale)
+    for unit, own in vocabulary.SPELLINGS.items()
+    for scale, written in own.items()
+    for text in written.split()
 }
 Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
@@ -62,7 +36,7 @@ class ColumnGroup:
     """Columns whose names differ in an axis or a number alone."""
 
     pattern: str  # The name with ``*`` in place of the axis or the number.
-    kind: Kind  # What tells the columns apart.
+    kind: Kind  # In what the columns differ.
     columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
 
     @cached_property
@@ -87,7 +61,7 @@ class ColumnGroup:
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
         parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", f"{before} {after}".replace("*", " "))
         words = " ".join(part.lower() for part in parts if not part.isdecimal())
-        for pattern, one in ONE_WORD.items():
+        for pattern, one in vocabulary.ONE_WORD.items():
             words = re.sub(pattern, one, words)
         return tuple(words.split())
 
@@ -97,7 +71,7 @@ def _symbols(text: str) -> str:
     """Write a unit as `SPELLINGS` do, such as rad/s for rad_per_sec."""
     text = re.sub(r"([a-z]{2})([A-Z])", r"\1_\2", text.strip("[]()_ ")).lower().replace("²", "2")
     parts = re.split(r"[/_ .·^]+|(?<=[a-z])per(?=[a-z])", text)
-    for full, symbol in IN_FULL.items():
+    for full, symbol in vocabulary.IN_FULL.items():
         parts = [symbol if re.fullmatch(full, part) else part for part in parts]
     joined = "/".join(part for part in parts if part not in ("", "per"))
     return joined.replace("s/2", "s2").replace("s/-", "s-")
@@ -120,16 +94,12 @@ class Named:
 # What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
 _FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (
-    ("wxyz", ("w", "x", "y", "z")),
-    ("wxyz", ("W", "X", "Y", "Z")),
-    ("xyz", ("x", "y", "z")),
-    ("xyz", ("X", "Y", "Z")),
-    ("xyz", ("N", "E", "D")),
-    ("angles", ("roll", "pitch", "yaw")),
-    ("angles", ("phi", "theta", "psi")),
-    ("angles", ("Roll", "Pitch", "Yaw")),
-    ("angles", ("R", "P", "Y")),
-    ("angles", ("p", "q", "r")),
+    *(("wxyz", tuple(axes)) for axes in ("wxyz", "WXYZ")),
+    *(("xyz", tuple(axes)) for axes in ("xyz", "XYZ", "NED")),
+    *(
+        ("angles", tuple(axes.split()))
+        for axes in ("roll pitch yaw", "phi theta psi", "Roll Pitch Yaw", "R P Y", "p q r")
+    ),
 )
 _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
 
@@ -138,28 +108,22 @@ def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[Column
     """Find columns whose names differ in an axis or a number alone, and leave every other one as its own group."""
     known = dict.fromkeys(names)
     # roll, pitch, yaw and p, q, r have one pattern, a star alone, and are two groups.
-    found: dict[tuple[str, Kind, tuple[str, ...]], ColumnGroup] = {}
-    of_axes = (group for name in known for kind, axes in _FAMILIES for group in _from_first(name, known, kind, axes))
-    for group in (*of_axes, *_numbered(known)):
-        found.setdefault((group.pattern, group.kind, group.columns), group)
-    single = tuple(ColumnGroup(name, "one", (name,)) for name in known)
-    return (*found.values(), *single)
+    found = dict.fromkeys((*_of_axes(known), *_numbered(known)))
+    return (*found, *(ColumnGroup(name, "one", (name,)) for name in known))
 
 
-def _from_first(name: str, names: Mapping[str, None], kind: Kind, axes: tuple[str, ...]) -> Iterator[ColumnGroup]:
+def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
     """Look for the columns of the other axes wherever the first one stands in a name."""
-    for found in re.finditer(re.escape(axes[0]), name):
-        before, after = name[: found.start()], name[found.end() :]
-        # An axis ends a word; a single letter of the angles is a word of its own.
-        ends = not after or not after[0].islower()
-        alone = not before or not before[-1].isalpha()
-        if not ends and kind != "angles":
-            continue
-        if kind == "angles" and len(axes[0]) == 1 and not (alone and ends):
-            continue
-        columns = tuple(f"{before}{axis}{after}" for axis in axes)
-        if all(column in names for column in columns):
-            yield ColumnGroup(f"{before}*{after}", kind, columns)
+    for name, (kind, axes) in product(names, _FAMILIES):
+        for found in re.finditer(re.escape(axes[0]), name):
+            before, after = name[: found.start()], name[found.end() :]
+            # An axis ends a word; a single letter of the angles is a word of its own.
+            ends = not after or not after[0].islower()
+            alone = not before or not before[-1].isalpha()
+            if (len(axes[0]) > 1 or (alone and ends)) if kind == "angles" else ends:
+                columns = tuple(f"{before}{axis}{after}" for axis in axes)
+                if all(column in names for column in columns):
+                    yield ColumnGroup(f"{before}*{after}", kind, columns)
 
 
 def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
@@ -189,13 +153,18 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
     found = [named for named in known if system or len(kinds[named.known]) > 1]
     found += [named for group in groups for named in _by_words(group)]
-    if any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
-        # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
+    if lists_all(system):
+        # Words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
     best: dict[tuple[SignalName, tuple[str, ...]], Named] = {}
     for named in sorted(found, key=lambda named: named.rank):
         best.setdefault((named.signal, named.group.columns), named)
     return tuple(best.values())
+
+
+def lists_all(system: str) -> bool:
+    """Tell whether all that drives rotors, and all that is asked for, stands in `KNOWN` for logs of a system."""
+    return any(is_of(system, known) for known in (PX4, *KIN))
 
 
 def is_of(system: str, known: str) -> bool:
@@ -220,31 +189,28 @@ def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
     return enough and group.kind in meaning.kinds.split()
 
 
-def _by_words(group: ColumnGroup) -> Iterator[Named]:
-    """List what the words of a name and a unit in it suggest; words that speak of no measurement rule it out."""
-    words = group.words
-    rank = _BY_WORDS + len(words) + 10 * sum(word in SECOND_HAND for word in words)
-    rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
-    squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
-    for meaning, stated in _possible(group, words, NOT_MEASURED):
-        signal = meaning.signal
-        if not (squared and signal in ROTORS) and _means(meaning, group, words):
-            fast = any(signal in IN_RADIANS.get(word, ()) for word in words)
-            usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
-            yield Named(signal, group, rank, *(stated or (usual, 1.0)))
-
-
-def _possible(
-    group: ColumnGroup, words: tuple[str, ...], never: frozenset[str]
-) -> Iterator[tuple[Meaning, tuple[UnitName, float] | None]]:
-    """List the meanings that suit a group and its unit, and the unit; those that words rule out are left out."""
-    for meaning in MEANINGS:
-        stated, ending = stated_unit(group, meaning.signal), group.ending
+def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
+    """List what the words of a name and a unit in it suggest: measurements, or what is wished where a word says so."""
+    words = tuple(word for word in group.words if not (wished and word in WISHED))
+    rank = _BY_WORDS + len(words)
+    if not wished:
+        rank += 10 * sum(word in vocabulary.SECOND_HAND for word in words)
+        rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
+    before, _, after = group.pattern.partition("*")
+    pqr = wished and group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
+    squared = bool(re.search(r"[a-z]2($|_)", f"{before}{after}")) or bool({"squared", "sq"} & {*words})
+    for meaning in () if wished and words == group.words else MEANINGS:
+        signal, stated, ending = meaning.signal, _stated_unit(group, meaning.signal), group.ending
         # A name that ends in a unit, and in none of the signal, is of something else.
         other = bool(ending) and stated is None and (len(ending.strip("_ ")) > 1 or ending == "_m")
-        ruled_out = (never - ALLOWED.get(meaning.signal, frozenset())) & {*words}
-        if _suits(meaning, group) and not other and not ruled_out:
-            yield meaning, stated
+        allowed = vocabulary.ALLOWED.get(signal, frozenset()) | (WISHED if wished else frozenset())
+        named = _SETPOINT_OF.get(signal) if wished else None if squared and signal in ROTORS else signal
+        if named is None or other or not _suits(meaning, group) or (NOT_MEASURED - allowed) & {*words}:
+            continue
+        if signal == "body_rate" if pqr else _means(meaning, group, words):
+            fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
+            usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
+            yield Named(named, group, rank, *(stated or (usual, 1.0)))
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -258,24 +224,13 @@ def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
     # Three components of a quaternion follow an attitude too, at half of its size.
     of_quaternions = {column for group in groups if group.kind == "wxyz" for column in group.columns}
     own = (group for group in groups if group.kind == "wxyz" or not of_quaternions & {*group.columns})
-    found = (named for group in own for named in _wished(group))
+    found = (named for group in own for named in _by_words(group, wished=True))
     return tuple(sorted(found, key=lambda named: named.rank))
 
 
-def _wished(group: ColumnGroup) -> Iterator[Named]:
-    words = tuple(word for word in group.words if word not in WISHED)
-    before, _, after = group.pattern.partition("*")
-    pqr = group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
-    for meaning, stated in _possible(group, words, NOT_MEASURED - WISHED) if len(words) < len(group.words) else ():
-        signal = meaning.signal
-        if signal in _SETPOINT_OF and (signal == "body_rate" if pqr else _means(meaning, group, words)):
-            usual: UnitName | None = "1" if signal == "quaternion" else None
-            yield Named(_SETPOINT_OF[signal], group, _BY_WORDS + len(words), *(stated or (usual, 1.0)))
-
-
-def stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:
+def _stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:
     """Give the unit that a name states for a signal, at its end or as a word, and the factor that makes it."""
-    words = (_symbols(word) for word in group.words if word in A_WORD)
+    words = (_symbols(word) for word in group.words if word in vocabulary.A_WORD)
     for text in (_symbols(group.ending), *words):
         for own in (_WRITTEN.get(text), _WRITTEN.get(f"{text}/s")):
             # Of a rate "deg" is deg/s.
@@ -293,16 +248,17 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if own & set(meaning.never.split()):
         return False
     if signal in ROTORS:
+        asked = own & vocabulary.ASKED
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
-        fast = bool(own & FAST) or (many and (words == ("w",) or ends_in_speed))
+        fast = bool(own & vocabulary.FAST) or (many and (words == ("w",) or ends_in_speed))
         motors = words == ("m",) or bool({"motor", "motors"} & own)
-        return (fast and not own & ASKED) if signal == "rotor_speed" else bool(own & ASKED) or (motors and not fast)
+        return (fast and not asked) if signal == "rotor_speed" else bool(asked) or (motors and not fast)
     if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"
-        turns = pqr or ends_in_speed or bool(own & {*RATE_WORDS.split(), "speed"})
+        turns = pqr or ends_in_speed or bool(own & {*vocabulary.RATE_WORDS.split(), "speed"})
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
     return bool({*words[-meaning.last :]} & set(meaning.words.split()))
 
@@ -346,7 +302,7 @@ def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
 def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
     """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names, on a clock, s.
 
-    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity tells the
+    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity shows the
     accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
     are rotors. Without an attitude nothing is found.
     """
@@ -356,99 +312,86 @@ def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, 
     if table is None or not np.isfinite(table).all():
         return ()
     grid = np.arange(time[0], time[-1], every * float(np.median(np.diff(time))))[: len(table)]
+    taken: dict[int, Named] = {}
+    rate_hz = 1 / float(grid[1] - grid[0])
     table = table[: len(grid)]
-    return tuple(_Matrix(names, table, time[::every][: len(grid)], grid).signals())
+
+    def runs(length: int) -> list[tuple[int, Array]]:
+        """List the runs of neighbours of which none is taken and each changes."""
+        firsts = range(table.shape[1] - length + 1)
+        free = [first for first in firsts if not taken.keys() & {*range(first, first + length)}]
+        every_run = ((first, table[:, first : first + length]) for first in free)
+        return [(first, values) for first, values in every_run if float(np.ptp(values, axis=0).min()) > 0]
+
+    def take(signal: SignalName, first: int, length: int) -> None:
+        own = tuple(names[first : first + length])
+        group = ColumnGroup(f"columns {own[0]} to {own[-1]}", "numbers", own)
+        taken.update(dict.fromkeys(range(first, first + length), Named(signal, group, 0.0, known=OF_A_MATRIX)))
+
+    attitude = _matrix_attitude(runs, time[::every][: len(grid)], grid, rate_hz)
+    if attitude is None:
+        return ()
+    first, rotation, rates = attitude
+    take("quaternion", first, 4)
+    take("body_rate", rates, 3)
+    places = _matrix_places(runs(3), rotation, rate_hz)
+    carried: tuple[float, ...] = (STANDARD_GRAVITY,)
+    if places is not None:
+        place, speed = places
+        # The usual size of what carries the vehicle, z of the position upward and downward.
+        moving = agreement.second_derivative(table[:, place : place + 3], rate_hz)
+        forces = (moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]) for up in (1.0, -1.0))
+        carried = tuple(float(np.median(np.linalg.norm(force, axis=1))) for force in forces)
+        take("position", place, 3)
+        take("velocity", speed, 3)
+    sensed = []
+    for first, values in runs(3):
+        # Of the size of what carries the vehicle, nearly all of it in the third.
+        middle, size = np.median(np.abs(values), axis=0), float(np.median(np.linalg.norm(values, axis=1)))
+        if middle[:2].max() < 0.3 * middle[2]:
+            sensed.append((min(abs(size / own - 1) for own in carried), first))
+    if sensed and min(sensed)[0] < _SIZE:
+        take("acceleration", min(sensed)[1], 3)
+    for first, values in runs(4):
+        middle = np.median(values, axis=0)
+        if values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ROTORS_ALIKE * middle.min():
+            take("rotor_speed", first, 4)
+            break
+    return tuple(dict.fromkeys(taken.values()))
 
 
-class _Matrix:
-    """The table, and which of its columns are taken."""
+_Runs = list[tuple[int, Array]]
 
-    def __init__(self, names: Sequence[str], table: Array, time: Array, grid: Array) -> None:
-        self.names, self.table, self.grid, self.time = names, table, grid, time
-        self.rate_hz = 1 / float(grid[1] - grid[0])
-        self.taken: set[int] = set()
-        self.carried: tuple[float, ...] = (STANDARD_GRAVITY,)
 
-    def runs(self, length: int) -> Iterator[tuple[int, Array]]:
-        """Go through the runs of neighbours of which none is taken."""
-        for first in range(self.table.shape[1] - length + 1):
-            if not self.taken & set(range(first, first + length)):
-                values = self.table[:, first : first + length]
-                if float(np.ptp(values, axis=0).min()) > 0:
-                    yield first, values
+def _matrix_attitude(
+    runs: Callable[[int], _Runs], time: Array, grid: Array, rate_hz: float
+) -> tuple[int, Rotation, int] | None:
+    """Find the quaternion whose derivative explains three other columns best."""
+    found = []
+    rates = [(first, agreement.slow(values, rate_hz)) for first, values in runs(3)]
+    for first, values in runs(4):
+        if float(np.quantile(np.abs(np.linalg.norm(values, axis=1) - 1), 0.95)) > _UNIT_LENGTH:
+            continue
+        for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
+            rotation = agreement.on_clock(agreement.rotations_of(values, *key), time, grid)
+            turning = agreement.turning_of(rotation, rate_hz)
+            for other, measured in rates if turning is not None else ():
+                if turning is not None and (other + 3 <= first or other >= first + 4):
+                    share = agreement.fit_axes(turning, measured).as_named
+                    found += [(share, first, rotation, other)] if share > _FOLLOWS else []
+    return largest(found, lambda own: own[0])[1:] if found else None
 
-    def take(self, signal: SignalName, first: int, length: int) -> Named:
-        """Take neighbours for a signal."""
-        self.taken |= set(range(first, first + length))
-        columns = tuple(self.names[first : first + length])
-        pattern = f"columns {columns[0]} to {columns[-1]}"
-        return Named(signal, ColumnGroup(pattern, "numbers", columns), 0.0, known=OF_A_MATRIX)
 
-    def signals(self) -> Iterator[Named]:
-        attitude = self._attitude()
-        if attitude is None:
-            return
-        first, rotation, rates = attitude
-        yield self.take("quaternion", first, 4)
-        yield self.take("body_rate", rates, 3)
-        yield from self._places(rotation)
-        sensed = self._accelerometer()
-        if sensed is not None:
-            yield self.take("acceleration", sensed, 3)
-        for first, values in self.runs(4):
-            middle = np.median(values, axis=0)
-            if values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ROTORS_ALIKE * middle.min():
-                yield self.take("rotor_speed", first, 4)
-                return
-
-    def _attitude(self) -> tuple[int, Rotation, int] | None:
-        """Find the quaternion whose derivative explains three other columns best."""
-        best: tuple[float, int, Rotation, int] | None = None
-        for first, values in self.runs(4):
-            if float(np.quantile(np.abs(np.linalg.norm(values, axis=1) - 1), 0.95)) > _UNIT_LENGTH:
-                continue
-            for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
-                rotation = on_clock(rotations_of(values, *key), self.time, self.grid)
-                turning = turning_of(rotation, self.rate_hz)
-                if turning is None:
-                    continue
-                for rates, measured in self.runs(3):
-                    fit = fit_axes(turning, slow(measured, self.rate_hz))
-                    apart = rates + 3 <= first or rates >= first + 4
-                    if apart and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
-                        best = (fit.as_named, first, rotation, rates)
-        return None if best is None else best[1:]
-
-    def _places(self, rotation: Rotation) -> Iterator[Named]:
-        """Find three columns whose derivative, as it is or turned into the body, three others are."""
-        best: tuple[float, int, int] | None = None
-        for place, values in self.runs(3):
-            derived = first_derivative(values, self.rate_hz)
-            turned = rotation.inv().apply(derived)
-            for speed, measured in self.runs(3):
-                if abs(speed - place) < 3:
-                    continue
-                own = slow(measured, self.rate_hz, SLOW_HZ)
-                for reference in (derived, turned):
-                    fit = fit_axes(slow(reference, self.rate_hz, SLOW_HZ), own)
-                    near = 1 / _NEAR < fit.gain < _NEAR
-                    if near and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
-                        best = (fit.as_named, place, speed)
-        if best is not None:
-            # The usual size of what carries the vehicle, z of the position upward and downward.
-            moving = second_derivative(self.table[:, best[1] : best[1] + 3], self.rate_hz)
-            forces = (moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]) for up in (1.0, -1.0))
-            self.carried = tuple(float(np.median(np.linalg.norm(force, axis=1))) for force in forces)
-            yield self.take("position", best[1], 3)
-            yield self.take("velocity", best[2], 3)
-
-    def _accelerometer(self) -> int | None:
-        """Find three columns of the size of what carries the vehicle, nearly all of it in the third."""
-        best: tuple[float, int] | None = None
-        for first, values in self.runs(3):
-            middle = np.median(np.abs(values), axis=0)
-            size = float(np.median(np.linalg.norm(values, axis=1)))
-            off = min(abs(size / own - 1) for own in self.carried)
-            if middle[:2].max() < 0.3 * middle[2] and off < (best[0] if best else _SIZE):
-                best = (off, first)
-        return None if best is None else best[1]
+def _matrix_places(runs: _Runs, rotation: Rotation, rate_hz: float) -> tuple[int, int] | None:
+    """Find three columns whose derivative, as it is or turned into the body, three others are."""
+    found = []
+    measured = [(first, agreement.slow(values, rate_hz)) for first, values in runs]
+    for place, values in runs:
+        derived = agreement.first_derivative(values, rate_hz)
+        references = [agreement.slow(own, rate_hz) for own in (derived, rotation.inv().apply(derived))]
+        for (speed, own), reference in product(measured, references):
+            if abs(speed - place) >= 3:
+                fit = agreement.fit_axes(reference, own)
+                near = 1 / _NEAR < fit.gain < _NEAR and fit.as_named > _FOLLOWS
+                found += [(fit.as_named, place, speed)] if near else []
+    return largest(found, lambda own: own[0])[1:] if found else None

@@ -74,7 +74,7 @@ class Proposal:
     airframe: Airframe | None  # None where neither parameters nor motion tell the rotors.
     rotors: int  # Number of rotors; 0 where no columns are theirs.
     speed_max: float  # Round number above the largest rotor speed, rad/s.
-    facts: tuple[str, ...]  # That the logs state beside.
+    facts: tuple[str, ...]  # What else the logs state.
     equal: tuple[str, ...]  # Names of the logs whose rotors carry what those of the first one do.
     warnings: tuple[str, ...]
 
@@ -95,10 +95,9 @@ class Proposal:
 
     @property
     def share_of_speed(self) -> bool:
-        """Whether the rotors are told by commands that are shares alone."""
-        names = {guess.signal: guess for guess in self.signals}
-        command = names.get("rotor_command")
-        return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
+        """Whether nothing but commands that are shares says what the rotors do."""
+        units = {guess.signal: guess.columns.unit for guess in self.signals}
+        return "rotor_speed" not in units and units.get("rotor_command") == "1"
 
 
 def propose(
@@ -106,22 +105,22 @@ def propose(
 ) -> Proposal:
     """Make one proposal of what each of several logs is taken for; logs of two vehicles are refused.
 
-    Parameters
-    ----------
-    mass_kg, arm_m : float or None
-        Of the vehicle, and from its middle to a rotor, m, where they are known.
-    scale_to_arm : bool
-        Whether places that a log states are scaled to that arm.
+    The arm is from the middle to a rotor, m; places that a log states are scaled to it where that is asked for.
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
-        # One crop suits no two logs, and what flies in a log is told by its rotors alone.
+        # One crop suits no two logs, and what flies in a log is known by its rotors alone.
         raise InputError(
             f"{winged.name}: flies on the wing for a part, which is cut in seconds: run cpfls init for it alone"
         )
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
-    signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
+    signals = _merged_signals(logs)
+    slowest = max(one.recognition.slowest_s for one in logs)
+    others = max(one.recognition.slowest_but_voltage_s for one in logs)
+    if slowest > max(_SLOWEST_VOLTAGE_S, others):
+        # A voltage that would make gaps of all signals long is left out.
+        signals, slowest = tuple(guess for guess in signals if guess.signal != "voltage"), others
     if mass_kg is not None and arm_m is not None:
         signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
     airframe, doubts = airframe_of(logs)
@@ -189,15 +188,15 @@ def _time_column(logs: Sequence[KnownLog]) -> str | None:
         wrong = [one for one in logs if "." not in one.recognition.time_column]
         if not wrong:
             return None
-    if wrong:
-        clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
-        odd = {one.name: (one.recognition.time_column, one.recognition.time_unit) for one in wrong}
-        way = _way_on([(one, odd.get(one.name)) for one in logs])
-        raise InputError(
-            f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
-            f" both: {way}"
-        )
-    return first.recognition.time_column
+    if not wrong:
+        return first.recognition.time_column
+    clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
+    odd = {one.name: (one.recognition.time_column, one.recognition.time_unit) for one in wrong}
+    way = _way_on([(one, odd.get(one.name)) for one in logs])
+    raise InputError(
+        f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
+        f" both: {way}"
+    )
 
 
 def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
@@ -228,8 +227,8 @@ def _setpoint_of_all(
             shared.append((one, guess))
         else:
             rivals.append(Rival(f"columns: [{', '.join(guess.columns.columns)}]", f"what {one.name} follows"))
-    told = replace(kept, sure="guess", rivals=(*kept.rivals, *rivals)) if rivals else kept
-    return (first, told), [(one, told if one is first else guess) for one, guess in shared]
+    own = replace(kept, sure="guess", rivals=(*kept.rivals, *rivals)) if rivals else kept
+    return (first, own), [(one, own if one is first else guess) for one, guess in shared]
 
 
 def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequence[str]) -> Guess:
@@ -237,8 +236,8 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
     if not lacking:
         return guess
     maps = tuple(ColumnMap(**{each.name: getattr(own, each.name) for each in fields(ColumnMap)}) for own in others)
-    without = [name for name in lacking if name not in others.values()]
-    columns = replace(guess.columns, otherwise=maps, required=guess.columns.required and not without)
+    required = guess.columns.required and {*lacking} <= {*others.values()}
+    columns = replace(guess.columns, otherwise=maps, required=required)
     reason = f"{guess.reason}; these columns are missing in {', '.join(lacking)}"
     return replace(guess, columns=columns, reason=reason)
 
@@ -246,14 +245,18 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
 def _require_same_map(
     name: SignalName, surest: tuple[KnownLog, Guess], others: Sequence[tuple[KnownLog, Guess]]
 ) -> None:
-    """Refuse two maps of a signal that both logs are sure of."""
+    """Refuse two maps of a signal that both logs are sure of; ranges of commands may be next to the same."""
     first, kept = surest
-    sure = [(one, guess) for one, guess in others if "guess" not in (guess.sure, kept.sure)]
     own = replace(kept.columns, required=True)
-    read = [(one, _as_read(replace(guess.columns, required=True), own)) for one, guess in sure]
-    for second, columns in read:
-        if columns == own:
-            continue
+    read = []
+    for one, guess in others:
+        columns = replace(guess.columns, required=True)
+        apart = np.abs(np.subtract(_span(columns), _span(own))).max()
+        if columns.unit == own.unit == "1" and apart < _SAME_RANGE * np.ptp(_span(own)):
+            columns = replace(columns, scale=own.scale, offset=own.offset)
+        read += [(one, columns)] if "guess" not in (guess.sure, kept.sure) else []
+    second, columns = next(((one, columns) for one, columns in read if columns != own), (first, own))
+    if columns != own:
         maps = [
             f"{', '.join(each.columns)} in {_unit_in_words(each)} (sign {each.sign or 'as logged'}) in {one.name}"
             for one, each in ((first, own), (second, columns))
@@ -262,13 +265,6 @@ def _require_same_map(
             f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both:"
             f" {_way_on(read)}"
         )
-
-
-def _as_read(columns: SignalMap, first: SignalMap) -> SignalMap:
-    """Give a map with the scale and offset of the first one, where the ranges of commands are next to the same."""
-    apart = np.abs(np.subtract(_span(columns), _span(first))).max()
-    same = columns.unit == first.unit == "1" and apart < _SAME_RANGE * np.ptp(_span(first))
-    return replace(columns, scale=first.scale, offset=first.offset) if same else columns
 
 
 def _span(columns: SignalMap) -> tuple[float, float]:
@@ -313,22 +309,13 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
     return tuple(merged)
 
 
-def _without_slow_voltage(logs: Sequence[KnownLog], signals: tuple[Guess, ...]) -> tuple[tuple[Guess, ...], float]:
-    """Leave a voltage out that would make gaps of all signals long; give the longest step of the others too."""
-    slow = max(one.recognition.slowest_s for one in logs)
-    others = max(one.recognition.slowest_but_voltage_s for one in logs)
-    if slow > max(_SLOWEST_VOLTAGE_S, others):
-        return tuple(guess for guess in signals if guess.signal != "voltage"), others
-    return signals, slow
-
-
 def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float) -> Guess:
     """Let the mass that rotors carry tell rad/s from rpm, where the size of their speeds does not."""
     if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
         return guess
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
-    diameter = room(arm_m, speeds.shape[1])
-    numbers = {unit: thrust_number(mass_kg, diameter, known_unit(unit).factor * speeds) for unit in units}
+    sizes = {unit: known_unit(unit).factor * speeds for unit in units}
+    numbers = {unit: thrust_number(mass_kg, room(arm_m, speeds.shape[1]), own) for unit, own in sizes.items()}
     fitting = [unit for unit, own in numbers.items() if IN_ROOM.usual[0] < own < IN_ROOM.usual[1]]
     if len(fitting) != 1:
         return guess
@@ -346,31 +333,27 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
     ratio, measured = heavy.size / light.size, first.recognition.signal("rotor_speed") is not None
     if not _apart(light, heavy, measured):
         return []
-    lighter, heavier = first.name, last.name
-    more = f"{100 * (ratio - 1):.0f} %"
+    more, what = f"{100 * (ratio - 1):.0f} %", "squared speeds" if measured else "squared commands"
     masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other weighs {mass_kg:.3g} kg"
     battery = "" if measured else ", or its battery is lower"
-    what = "squared speeds" if measured else "squared commands"
     return [
-        f"{lighter} and {heavier}: in flight the {what} of the rotors are {more} higher in {heavier}, so with equal"
-        f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls init"
-        " for each of them with its own --mass"
+        f"{first.name} and {last.name}: in flight the {what} of the rotors are {more} higher in {last.name}, so with"
+        f" equal propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls"
+        " init for each of them with its own --mass"
     ]
 
 
 def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
-    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others.
+    """Sort logs by what their rotors carry; none where that is known by speeds of some and commands of others.
 
     What squared commands, or speeds without an accelerometer, tell of a flight that does not hover is how it is flown.
     """
-    measured = {one.recognition.signal("rotor_speed") is not None for one in logs}
+    measured = {one.name: one.recognition.signal("rotor_speed") is not None for one in logs}
     loads = [(one.recognition.load, one) for one in logs]
     known = [
-        (load, one)
-        for load, one in loads
-        if load is not None and (load.steady or (load.sensed and one.recognition.signal("rotor_speed") is not None))
+        (load, one) for load, one in loads if load is not None and (load.steady or (load.sensed and measured[one.name]))
     ]
-    return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len(measured) == 1 else []
+    return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len({*measured.values()}) == 1 else []
 
 
 def _apart(light: Load, heavy: Load, measured: bool) -> bool:
@@ -382,18 +365,19 @@ def _apart(light: Load, heavy: Load, measured: bool) -> bool:
 def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
     """List the logs whose loads a step parts from that of the first log; a battery that empties makes no step."""
     measured = logs[0].recognition.signal("rotor_speed") is not None
-    groups: list[list[tuple[Load, KnownLog]]] = []
+    groups: list[list[KnownLog]] = []
+    before: Load | None = None
     for load, one in _by_load(logs):
-        if groups and not _apart(groups[-1][-1][0], load, measured):
-            groups[-1].append((load, one))
-        else:
-            groups.append([(load, one)])
-    own = next((group for group in groups if any(one is logs[0] for _, one in group)), None)
-    return [] if own is None else [one for group in groups if group is not own for _, one in group]
+        if before is None or _apart(before, load, measured):
+            groups.append([])
+        groups[-1].append(one)
+        before = load
+    own = next((group for group in groups if any(one is logs[0] for one in group)), None)
+    return [] if own is None else [one for group in groups if group is not own for one in group]
 
 
 def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
-    """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
+    """Take the rotors that parameters state, else those that the motion shows, and hold the one against the other."""
     with about(logs[0].name, InputError):
         own = (stated_airframe(one.parameters, one.recognition.rotors) for one in logs)
         stated = next((found for found in own if found is not None), None)
@@ -421,14 +405,13 @@ def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
     """Round up what is somewhat above the largest speed; for commands any number will do, and 1000 is taken."""
-    largest = 0.0
-    units = {guess.signal: guess.columns.unit for guess in signals}
+    largest, units = 0.0, {guess.signal: guess.columns.unit for guess in signals}
     unit = units.get("rotor_speed", units.get("rotor_command", "1"))
-    for one in logs:
-        if one.recognition.speeds is not None and unit != "1":
-            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
+    for one in logs if unit != "1" else ():
+        if one.recognition.speeds is not None:
             guessed = one.recognition.signal("rotor_speed")
             changed = guessed is not None and guessed.columns.unit == "rad/s" and unit == "rpm"
+            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
             largest = max(largest, own * (known_unit("rpm").factor if changed else 1.0))
     return _rounded_up(_ROOM * largest) if largest else 1000.0
 

@@ -24,24 +24,11 @@ from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES = [
-    "t",
-    "time",
-    "time_s",
-    "timestamp",
-    "time_us",
-    "timeus",
-    "time_ms",
-    "stamp",
-    "tick",
-    "seconds",
-    "sec",
-    "t_s",
-]
+_TIME_NAMES: Final = re.compile(r"t(_s)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
-_SLOWEST_HZ = 0.5  # Below which a signal tells nothing of a flight.
+_SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
@@ -58,14 +45,13 @@ class LogTable:
         samples = max(map(len, topics[""].values()), default=0) if self.flat else _FEWEST_SAMPLES
         if samples < _FEWEST_SAMPLES:
             raise InputError(f"holds only {samples} samples, too few for a flight")
-        self.time_column, self.time_unit, self.time_doubt = (
-            _flat_time(topics[""], units) if self.flat else ("", "s", None)
-        )
+        stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
+        self.time_column, self.time_unit, self.time_doubt = stamps
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
 
     def with_topic(self, topic: str, fields: Mapping[str, Array]) -> "LogTable":
-        """Give the same log with one more topic, which has stamps of its own."""
+        """Add a topic, which has stamps of its own."""
         more = copy(self)
         more.topics = {**self.topics, topic: fields}
         more.names = column_names(more.topics)
@@ -93,15 +79,11 @@ class LogTable:
     def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
         """Stamps and values of columns, rows without a value left out; all on the clock of the first one's topic."""
         topic = self.parts(columns[0])[0]
-        if all(self.parts(column)[0] == topic for column in columns):
-            return self._of_topic(topic, columns)
-        clocks = [self.values((column,)) for column in columns]
-        time = clocks[0][0]
-        if not all(len(own) for own, _ in clocks):
-            return np.empty(0), np.empty((0, len(columns)))
-        return time, np.column_stack([np.interp(time, own, values[:, 0]) for own, values in clocks])
-
-    def _of_topic(self, topic: str, columns: Sequence[str]) -> tuple[Array, Array]:
+        if any(self.parts(column)[0] != topic for column in columns):
+            clocks = [self.values((column,)) for column in columns]
+            time = clocks[0][0] if all(len(own) for own, _ in clocks) else np.empty(0)
+            each = [np.interp(time, own, values[:, 0]) if len(time) else time for own, values in clocks]
+            return time, np.column_stack(each)
         time = self.clock(topic)
         rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
         if len(rows) != len(time):
@@ -132,22 +114,24 @@ class LogTable:
         return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
 
 
-def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str | None]:
+def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str]:
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
-    rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
-    rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
-    for name in rising:
-        if _time_rank(name) > 2:
-            break
+    ranks: dict[str, int] = {}
+    for name, values in fields.items():
+        lower, known = name.lower().strip(), np.asarray(values, dtype=float)
+        known = known[np.isfinite(known)]
+        usual = _TIME_NAMES.fullmatch(lower)
+        rises = len(known) > max(2, 0.5 * len(values)) and (np.diff(known) >= 0).all() and np.ptp(known) > 0
+        if rises and (usual or "time" in lower or "stamp" in lower):
+            ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2
+    for name in sorted(ranks, key=ranks.__getitem__):
         step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
         if name in units:
-            return name, "s", None
+            return name, "s", ""
         ending = re.search(r"(?:[_ \[(]|time)([num]?s)[\])]?$", name.lower())
-        stated = [ending[1]] if ending else []
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
-        if stated or fitting:
-            unit = (stated or fitting)[0]
-            doubt = None
+        if ending or fitting:
+            unit, doubt = ending[1] if ending else fitting[0], ""
             if fitting and unit not in fitting:
                 doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
             elif step == 1:
@@ -155,24 +139,11 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             return name, unit, doubt
     clock = nameless_clock(fields)
     if clock is not None:
-        return clock, "s", None
+        return clock, "s", ""
     raise InputError(
         "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"
     )
-
-
-def _time_rank(name: str) -> int:
-    lower = name.lower().strip()
-    if lower in _TIME_NAMES:
-        return lower not in _TIME_NAMES[:2]
-    return 2 if "time" in lower or "stamp" in lower else 3
-
-
-def _rises(values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    enough = len(known) > 2 and len(known) > 0.5 * len(values)
-    return enough and bool((np.diff(known) >= 0).all() and np.ptp(known) > 0)
 
 
 def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
@@ -188,33 +159,28 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
             enough = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
             named = replace(named, group=replace(named.group, columns=enough or named.group.columns))
             time, values = log.values(named.group.columns)
-        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
-            continue
-        if float(np.ptp(values, axis=0).max()) > 0:
+        enough_rows = len(time) >= _FEWEST_SAMPLES and log.rate_hz(named.group.columns) >= _SLOWEST_HZ
+        if enough_rows and float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)
     for found in kept.values():
         # Columns that the same kind of log is known for, and that come several times as often, go first.
-        fastest = max((log.rate_hz(named.group.columns) for named in found if named.known), default=0.0)
-        slow = [bool(named.known) and log.rate_hz(named.group.columns) * _SEVERAL < fastest for named in found]
-        found[:] = [named for _, named in sorted(zip(slow, found, strict=True), key=lambda entry: entry[0])]
+        rates = {named: log.rate_hz(named.group.columns) for named in found if named.known}
+        fastest = max(rates.values(), default=0.0)
+        found.sort(key=lambda named: named in rates and rates[named] * _SEVERAL < fastest)
     return kept
 
 
 def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
     """Refuse a log whose rotors are all logged and never change: it is of a vehicle on the ground."""
-    if any(name in candidates for name in ROTORS):
-        return
-    dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
-    if dead is not None:
-        raise InputError(f"no flight in it: the rotors ({dead.group.pattern}) never change")
+    for own in () if candidates.keys() & {*ROTORS} else named:
+        if own.signal in ROTORS and len(log.values(own.group.columns[:1])[0]):
+            raise InputError(f"no flight in it: the rotors ({own.group.pattern}) never change")
 
 
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
     """Lay one uniform clock over all signals of motion and rotors."""
-    chosen = [found[0] for name, found in candidates.items() if name != "voltage"] or [
-        found[0] for found in candidates.values()
-    ]
-    clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
+    leading = {name: log.values(found[0].group.columns[:1])[0] for name, found in candidates.items()}
+    clocks = [clock for name, clock in leading.items() if name != "voltage"] or [*leading.values()]
     rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
     begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
     log.require_long_enough(end - begin)
@@ -231,15 +197,14 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
 Sure = Literal["data", "named", "guess"]
 
 
-@dataclass(frozen=True)
-class Rival:
+class Rival(NamedTuple):
     """Another guess that the data cannot part from the one that is taken."""
 
     text: str  # As it would stand in the config, such as ``unit: deg``.
     reason: str  # Why it is not ruled out.
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Guess:
     """A signal of the log."""
 
@@ -248,6 +213,8 @@ class Guess:
     reason: str
     sure: Sure
     rivals: tuple[Rival, ...] = ()
+    rate_hz: float = 0.0  # Of rotors, samples in a second, pauses left out.
+    kind: str = ""  # Kind of log that is known for such columns of rotors; empty where none is.
 
     @property
     def other_columns(self) -> Rival | None:
@@ -255,8 +222,7 @@ class Guess:
         return next((rival for rival in self.rivals if rival.text.startswith("columns: [")), None)
 
 
-@dataclass(frozen=True)
-class KeyChoice:
+class KeyChoice(NamedTuple):
     """A key of the section `import` that holds for the whole log."""
 
     key: str
@@ -272,7 +238,7 @@ class Load(NamedTuple):
     # Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
     # propellers it is as the mass.
     size: float
-    # Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
+    # Whether an accelerometer senses that force; else it is gravity, and a flight that leans far looks heavier.
     sensed: bool
     steady: bool  # Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
     voltage: float = float("nan")  # Of the battery in flight, V; NaN where the log does not hold it.
@@ -291,10 +257,10 @@ class Recognition:
     rate_hz: float  # Of the clock.
     slowest_s: float  # Longest median step of a topic that is mapped, s; and without that of the voltage.
     slowest_but_voltage_s: float
-    kind: str  # Kind of log that is known for such columns of rotors; empty where none is.
-    moved: MovedBy | None  # The rotors as the motion tells them.
+    moved: MovedBy | None  # The rotors as the motion shows them.
     # Shape (time, rotor), or None; rotor speeds in flight in rad/s, or commands as shares of the largest speed.
     speeds: Array | None = field(repr=False)
+    kind: str = ""  # Kind of log that is known for such columns of rotors; empty where none is.
     load: Load | None = None  # None where no columns are those of rotors.
     warnings: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()  # All columns that are mapped to nothing, stamps left out.
@@ -315,13 +281,12 @@ class Recognition:
     @property
     def rotors(self) -> int:
         """Number of rotors that the columns name; 0 where none do."""
-        names: tuple[SignalName, ...] = ("rotor_speed", "rotor_command")
-        return max((len(guess.columns.names) for name in names if (guess := self.signal(name))), default=0)
+        return max((len(guess.columns.names) for guess in self.signals if guess.signal in ROTORS), default=0)
 
 
 @dataclass
 class Seen:
-    """A log, the part of it that is flown, and what has been told of it so far."""
+    """A log, the part of it that is flown, and what has been found of it so far."""
 
     log: LogTable
     candidates: Mapping[SignalName, Sequence[Named]]
@@ -343,6 +308,11 @@ class Seen:
         choice = self.choices.get("quaternion_order")
         return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
 
+    @property
+    def open_rotors(self) -> bool:
+        """Whether other columns may be those of rotors too."""
+        return any(self.guesses[name].other_columns is not None for name in ROTORS if name in self.guesses)
+
     def first(self, name: SignalName) -> Named | None:
         """Give the best candidate for a signal."""
         return next(iter(self.candidates.get(name, ())), None)
@@ -363,12 +333,10 @@ class Seen:
         unit: UnitName,
         reason: str,
         sure: Sure,
-        *,
         scale: float = 1.0,
         order: Sequence[int] | None = None,
         sign: Sequence[float] | None = None,
         rivals: tuple[Rival, ...] = (),
-        required: bool = True,
     ) -> None:
         """Take columns for a signal, in an order and with signs."""
         columns = named.group.columns
@@ -377,17 +345,16 @@ class Seen:
             unit=unit,
             scale=named.scale * scale,
             sign=None if sign is None or min(sign) > 0 else tuple(sign),
-            required=required,
+            required=named.signal != "voltage",
         )
-        guess = Guess(signal=named.signal, columns=mapped, reason=reason, sure=sure, rivals=rivals)
-        self.guesses[named.signal] = guess
+        self.guesses[named.signal] = Guess(named.signal, mapped, reason, sure, rivals)
 
     def choose(self, key: str, value: str, reason: str, sure: Sure, *rivals: Rival) -> None:
         """Take a value of a key that holds for the whole log."""
         self.choices[key] = KeyChoice(key, value, reason, sure, rivals)
 
     def doubt(self, name: SignalName, *rivals: Rival) -> None:
-        """Make a guess of what was told."""
+        """Make a guess of what was known."""
         guess = self.guesses[name]
         self.guesses[name] = replace(guess, sure="guess", rivals=(*guess.rivals, *rivals))
 
@@ -396,7 +363,7 @@ class Seen:
         self.warnings.append(f"{named.group.pattern} is said to be in {named.unit}; {by} {unit}")
 
     def warn_of_mirrored(self, named: Named, order: Sequence[int], sign: Sequence[float], whose: str) -> None:
-        """Warn of axes that are left-handed beside those of all others."""
+        """Warn of axes that are left-handed, unlike those of all others."""
         if handed(order, sign) > 0:
             return
         columns = [named.group.columns[index] for index, own in zip(order, sign, strict=True) if own < 0]

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Final
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import motion_columns, recognised
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading, read_attitude
@@ -15,26 +17,9 @@ from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.motion_columns import (
-    gyroscope_first,
-    position_by_velocity,
-    take_acceleration,
-    take_body_rate,
-    take_places,
-)
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
-from cpfls_cli.flightlog.recognised import (
-    Load,
-    LogTable,
-    Recognition,
-    Rival,
-    Seen,
-    called,
-    holding_values,
-    make_grid,
-    refuse_dead_rotors,
-)
+from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import take_setpoints
@@ -95,31 +80,30 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)
     named = named_signals(column_groups(log.names), system)
-    candidates = holding_values(log, named)
+    candidates = recognised.holding_values(log, named)
     if not candidates and log.flat:
-        candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
+        candidates = recognised.holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
-        clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
-        if clocks:
-            log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
-            names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
-            raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
-        if system and not log.flat:
-            raise InputError(f"holds only {some([*topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight")
-        shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
-        raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
-    refuse_dead_rotors(log, named, candidates)
+        raise InputError(_nothing_found(log, named, system))
+    recognised.refuse_dead_rotors(log, named, candidates)
     log, candidates, ended = _live_part(log, candidates)
-    make_grid(log, candidates)
-    columns = {str(name): [(own, own.group.columns) for own in candidates.get(name, ())] for name in ROTORS}
+    recognised.make_grid(log, candidates)
     found = {
-        name: [(own, log.values(each)[0], log.without_spikes(each)) for own, each in held]
-        for name, held in columns.items()
+        str(name): [
+            (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
+            for own in candidates.get(name, ())
+        ]
+        for name in ROTORS
     }
     rotors = find_rotors(found, parameters, system)
-    rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
+    rotors = rotors if rotors.driving else find_mixed(log) or rotors
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
-    shares = _shares(log, rotors)
+    shares = None
+    if rotors.driving:
+        # Commands or speeds on the clock, shape (time, rotor), as shares; 0 where rotors stand.
+        own = rotors.command or rotors.driving
+        logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
+        shares = rotor_shares(logged, shares=own is rotors.command)
     flown = find_flown(_signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
         raise InputError(flown.reasons[0])
@@ -127,29 +111,42 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if kind is None else [flown.reasons[-1]]
-    seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
-    position_by_velocity(seen)
+    seen.warnings += [log.time_doubt] if log.time_doubt else []
+    motion_columns.position_by_velocity(seen)
     verdict = read_attitude(seen)
-    if verdict is not None and gyroscope_first(
-        seen, verdict.best, rotors.speed or rotors.command, rotors.speed is None
-    ):
+    if verdict is not None and motion_columns.gyroscope_first(seen, verdict.best, rotors.driving):
         verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
-    take_places(seen, reading)
-    take_body_rate(seen, reading)
-    take_acceleration(seen, reading)
+    motion_columns.take_places(seen, reading)
+    motion_columns.take_body_rate(seen, reading)
+    motion_columns.take_acceleration(seen, reading)
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    _take_voltage(seen)
+    if (voltage := seen.first("voltage")) is not None:
+        level = float(np.median(seen.grid(voltage)))
+        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
+        seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
     speeds, moved = _take_rotors(seen, rotors)
     _take_wrench(seen)
     _doubt_columns(seen)
     take_setpoints(seen, parameters, system)
     _list_unused(seen)
-    driving = rotors.speed or rotors.command
-    taken = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
-    return replace(taken, winged=winged, rebuilt=rebuilt)
+    taken = _gathered(seen, flown, speeds, moved)
+    return replace(taken, winged=winged, rebuilt=rebuilt, kind=rotors.driving.kind if rotors.driving else "")
+
+
+def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
+    """Say why a log without a column that is recognised is refused."""
+    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+    if clocks:
+        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+        return f"no flight in it: {names} never change, or hold too few samples for a flight"
+    if system and not log.flat:
+        return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
+    shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
+    return f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}"
 
 
 def _live_part(
@@ -169,20 +166,11 @@ def _live_part(
         return log, candidates, ""
     part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
-    return part, holding_values(part, [named for found in candidates.values() for named in found]), ended
-
-
-def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
-    """Give the rotors' commands or speeds on the clock, shape (time, rotor), as shares; 0 where they stand."""
-    found = rotors.command or rotors.speed
-    if found is None:
-        return None
-    values = log.on_grid(found.columns.columns, spikes=False)
-    return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
+    return part, recognised.holding_values(part, [named for found in candidates.values() for named in found]), ended
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
-    """Gather what tells flight by the names of columns, before axes and frames are known."""
+    """Gather what shows flight by the names of columns, before axes and frames are known."""
     first = {name: found[0] for name, found in candidates.items() if found}
     values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
     height = rate = None
@@ -209,8 +197,8 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
 
 def _part(log: LogTable, flown: FlownPart) -> slice:
     begin, end = flown.span_s or (0.0, np.inf)
-    inside = np.flatnonzero((log.grid - log.grid[0] >= begin) & (log.grid - log.grid[0] <= end))
-    return slice(int(inside[0]), int(inside[-1]) + 1)
+    time = log.grid - log.grid[0]
+    return slice(int(np.searchsorted(time, begin)), int(np.searchsorted(time, end, "right")))
 
 
 def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
@@ -230,9 +218,6 @@ def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
         return replace(flown, reasons=(*flown.reasons, f"{what}, and it hovers throughout"))
     reason = f"{what}: its hover from {begin:.1f} to {end:.1f} s is used, and no flight on the wing"
     return replace(flown, span_s=(round(begin, 2), round(end, 2)), reasons=(*flown.reasons, reason))
-
-
-# Frames.
 
 
 def _take_frames(seen: Seen, reading: Reading | None) -> None:
@@ -261,11 +246,8 @@ def _take_frames(seen: Seen, reading: Reading | None) -> None:
     seen.choose("world_frame", world, reason, "guess" if body is None else body.sure)
 
 
-# What drives it.
-
-
 def _take_wrench(seen: Seen) -> None:
-    """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
+    """Take torque and thrust where the log has no rotors; with rotors they are what a controller asked for."""
     torque, thrust, rate = seen.first("body_torque"), seen.first("thrust"), seen.guesses.get("body_rate")
     if torque is None:
         return
@@ -273,7 +255,14 @@ def _take_wrench(seen: Seen) -> None:
         seen.left_out.append(f"{torque.group.pattern}: looks like a commanded torque; the rotors say more")
         return
     turning = first_derivative(seen.log.on_grid(rate.columns.columns)[seen.part], seen.rate_hz)
-    shares = [_follows(turning, seen.grid(torque), late, seen.rate_hz) for late in _LATE_S]
+    shares = []
+    for steps in (round(late * seen.rate_hz) for late in _LATE_S):
+        # Of roll and pitch, some time after the torque.
+        pair = (turning[steps:], seen.grid(torque)[: len(turning) - steps])
+        own, other = (slow(each, seen.rate_hz, _TORQUE_HZ) for each in pair)
+        moves = own.std(axis=0) * other.std(axis=0) != 0
+        both = [float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) if moves[axis] else 0.0 for axis in range(2)]
+        shares.append(both)
     share = largest(shares, min)
     if not min(share) > _FOLLOWS:
         seen.left_out.append(f"{torque.group.pattern}: looks like a torque, but the motion does not follow it")
@@ -289,33 +278,14 @@ def _take_wrench(seen: Seen) -> None:
         seen.take(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
 
 
-def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> list[float]:
-    """Correlate angular acceleration with a torque some time before, about roll and pitch."""
-    steps = round(late_s * rate_hz)
-    own = slow(turning[steps:], rate_hz, _TORQUE_HZ)
-    other = slow(torque[: len(torque) - steps], rate_hz, _TORQUE_HZ)
-    still = own.std(axis=0) * other.std(axis=0) == 0
-    return [0.0 if still[axis] else float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
-
-
-def _take_voltage(seen: Seen) -> None:
-    voltage = seen.first("voltage")
-    if voltage is None:
-        return
-    level = float(np.median(seen.grid(voltage)))
-    scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
-    reason = f"{called(voltage)}; {level * scale:.3g} V in flight"
-    seen.take(voltage, "V", reason, "named", scale=scale, required=False)
-
-
 def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
     seen.left_out += rotors.left_out
     seen.warnings += rotors.warnings
     speeds = None
     for found in (rotors.command, rotors.speed):
         if found is not None:
-            seen.guesses[found.guess.signal] = found.guess
-            speeds = seen.mapped(found.guess)
+            seen.guesses[found.signal] = found
+            speeds = seen.mapped(found)
             if found is rotors.command and rotors.command_is is not None and rotors.command_is.value == "thrust":
                 speeds = np.sqrt(np.maximum(speeds, 0.0))
     if rotors.command_is is not None:
@@ -327,14 +297,10 @@ def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedB
     if seen.choices["body_frame"].value == "FRD":
         body = body * np.array([1.0, -1.0, -1.0])
     moved = airframe_from_motion(body, speeds, seen.rate_hz, rotors.speed is None)
-    if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or _open_rotors(seen)):
+    if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or seen.open_rotors):
         # Whose axes are not known says left for right.
-        moved = replace(moved, clear=False, airframe=replace(moved.airframe, sure="guess"))
+        moved = moved._replace(clear=False, airframe=replace(moved.airframe, sure="guess"))
     return speeds, moved
-
-
-def _open_rotors(seen: Seen) -> bool:
-    return any(seen.guesses[name].other_columns is not None for name in ROTORS if name in seen.guesses)
 
 
 def _load(seen: Seen, speeds: Array) -> Load | None:
@@ -358,13 +324,9 @@ def _doubt_columns(seen: Seen) -> None:
     for name, guess in tuple(seen.guesses.items()):
         values = dict(zip(guess.columns.columns, seen.log.values(guess.columns.columns)[1].T, strict=True))
         still = [column for column, own in values.items() if len(values) > 1 and not np.ptp(own) > 0]
-        twice = [
-            f"{one} and {other}"
-            for index, one in enumerate(values)
-            for other in list(values)[index + 1 :]
-            if one not in still and np.array_equal(values[one], values[other])
-        ]
-        odd = [*(f"{column} never changes" for column in still), *(f"{pair} have the same values" for pair in twice)]
+        pairs = [(one, two) for one, two in combinations(values, 2) if np.array_equal(values[one], values[two])]
+        odd = [f"{column} never changes" for column in still]
+        odd += [f"{one} and {two} have the same values" for one, two in pairs if one not in still]
         if odd:
             seen.warnings.append(f"{name}: {'; '.join(odd)}")
             seen.doubt(name)
@@ -383,7 +345,7 @@ def _list_unused(seen: Seen) -> None:
             seen.left_out.append(f"{some(groups, _SHOWN, '; ')}: also {name} by name; not used")
 
 
-def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
+def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None) -> Recognition:
     log = seen.log
     signals = tuple(seen.guesses[name] for name in _ORDER if name in seen.guesses)
     asked = tuple(seen.guesses[name] for name in SETPOINTS if name in seen.guesses)
@@ -400,7 +362,8 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
     if flown.span_s is not None:
         # import.crop_s counts from the first stamp of the clock.
         off = float(log.grid[0]) - float(begin)
-        flown = replace(flown, span_s=(max(0.0, round(flown.span_s[0] + off, 2)), round(flown.span_s[1] + off, 2)))
+        first, last = (round(own + off, 2) for own in flown.span_s)
+        flown = replace(flown, span_s=(max(0.0, first), last))
     used = {time_column, *(column for guess in (*signals, *asked) for column in guess.columns.columns)}
     stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
     return Recognition(
@@ -413,10 +376,9 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         rate_hz=rates[base.signal],
         slowest_s=max(1 / rates[guess.signal] for guess in signals),
         slowest_but_voltage_s=max(1 / rates[guess.signal] for guess in signals if guess.signal != "voltage"),
-        kind=kind,
         moved=moved,
         speeds=speeds,
-        load=None if speeds is None or _open_rotors(seen) else _load(seen, speeds),
+        load=None if speeds is None or seen.open_rotors else _load(seen, speeds),
         warnings=tuple(seen.warnings),
         unused=tuple(name for name in log.names if name not in used | stamps),
         counted_from_s=float(log.grid[0]) - log.origin,

@@ -1,6 +1,6 @@
 """Rows of a log on their way to a uniform clock: stamps that increase, no impossible values, spikes or long gaps."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, log10, pi
 
@@ -35,9 +35,6 @@ class SignalTable:
     def rows(self, kept: slice | IntArray | BoolArray) -> "SignalTable":
         """Select rows."""
         return SignalTable(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
-
-
-# The clock.
 
 
 def same_rate(rates_hz: Sequence[float]) -> bool:
@@ -104,46 +101,43 @@ def refuse_restart(time: Array, rows: IntArray) -> None:
     """
     finite = np.isfinite(time)
     time, rows = time[finite], rows[finite]
-    behind = runs(_behind(time))
-    if not _too_many(behind, len(time)):
+    if not _too_many(_behind(time)):
         return
-    first, length = max(((begin, end - begin) for begin, end in behind), key=lambda run: run[1])
-    inside = {crop: time[(time >= crop[0]) & (time <= crop[1])] for crop in _crops(time)}
-    # A crop within which the clock goes back keeps nothing.
-    kept = {crop: len(own) for crop, own in inside.items() if not _too_many(runs(_behind(own)), len(own))}
-    kept = {crop: count for crop, count in kept.items() if count > SMALLEST_SHARE_KEPT * len(time)}
+    first, after = max(runs(_behind(time)), key=lambda run: run[1] - run[0])
+    kept = {}
+    for begin, end in _crops(time):
+        own = time[(time >= begin) & (time <= end)]
+        # A crop within which the clock goes back keeps nothing.
+        if len(own) > SMALLEST_SHARE_KEPT * len(time) and not _too_many(_behind(own)):
+            kept[(begin, end)] = len(own)
     remedy = "split the log (import.crop_s cannot tell the parts apart: their time stamps overlap)"
     if kept:
-        crop = max(kept, key=lambda own: kept[own])
+        crop = max(kept, key=kept.__getitem__)
         remedy = f"split the log, or keep one part of {kept[crop]} rows with import.crop_s = [{crop[0]:g}, {crop[1]:g}]"
     raise InputError(
         f"time goes backward at row {rows[first]} (from {time[first - 1]:.6g} s to {time[first]:.6g} s after the first"
-        f" stamp) and stays behind for {length} rows: the clock was reset or logs were joined; {remedy}"
+        f" stamp) and stays behind for {after - first} rows: the clock was reset or logs were joined; {remedy}"
     )
 
 
-def _crops(time: Array) -> Iterator[tuple[float, float]]:
+def _crops(time: Array) -> set[tuple[float, float]]:
     """List the intervals of time that may hold one part of the log: before, beyond and among the stamps behind."""
     behind = _behind(time)
-    last = float(time.max())
     lowest, highest = float(time[behind].min()), float(time[behind].max())
     earlier, later = time[~behind & (time < lowest)], time[~behind & (time > highest)]
     stretches = [(0.0, max(0.0, highest)), (max(0.0, lowest), highest)]
     stretches += [(0.0, float(earlier.max()))] if len(earlier) else []
-    stretches += [(max(0.0, float(later.min())), last)] if len(later) else []
-    yield from {(float(f"{begin:g}"), float(f"{end:g}")) for begin, end in stretches if begin < end}
+    stretches += [(max(0.0, float(later.min())), float(time.max()))] if len(later) else []
+    return {(float(f"{begin:g}"), float(f"{end:g}")) for begin, end in stretches if begin < end}
 
 
-def _too_many(behind: list[tuple[int, int]], rows: int) -> bool:
+def _too_many(behind: BoolArray) -> bool:
     """Tell whether more rows are behind than come late one by one."""
-    return sum(end - begin for begin, end in behind if end - begin > 1) > _LARGEST_SHARE_BEHIND * rows
+    return sum(end - begin for begin, end in runs(behind) if end - begin > 1) > _LARGEST_SHARE_BEHIND * len(behind)
 
 
 def _behind(time: Array) -> BoolArray:
     return np.asarray(time < np.maximum.accumulate(time), dtype=bool)
-
-
-# Gaps.
 
 
 def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> tuple[slice, int, int]:
@@ -151,8 +145,6 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
 
     Parameters
     ----------
-    time : array, shape (sample,), s
-        Increasing time stamps.
     present : array of bool, shape (sample, column)
         Where each column has a value.
 
@@ -191,12 +183,12 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
 def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:
     """Describe a log whose median step, not a gap in it, exceeds the longest gap allowed; None if it does not."""
     step = float(np.median(np.diff(time)))
+    slowest = max(float(np.median(np.diff(time[column]))) for column in present.T)
     if step > settings.gap_s:
         return (
             f"the median step is {step:.3g} s, longer than import.gap_s = {settings.gap_s:g}: check import.time_unit ="
             f" {settings.time_unit}, or raise import.gap_s"
         )
-    slowest = max(float(np.median(np.diff(time[column]))) for column in present.T)
     if slowest > settings.gap_s:
         return (
             f"a mapped column has a value only every {slowest:.3g} s (median), longer than import.gap_s ="
@@ -217,9 +209,6 @@ def _gap_steps(time: Array, present: BoolArray, gap_s: float) -> BoolArray:
     return np.asarray(np.cumsum(depth)[:-1] > 0, dtype=bool)
 
 
-# Values.
-
-
 def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, tuple[str, ...]]:
     """Take values that no flight has, and quaternions without a length, for absent ones; warn of each such column.
 
@@ -231,24 +220,20 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
         values, unit = signals[name], KNOWN_UNITS[signal.unit].si
         with np.errstate(invalid="ignore"):
             broken = np.abs(values) > _LARGEST[unit]
-        for column, (label, marked) in enumerate(zip(signal.names, broken.T, strict=True)):
-            if marked.any():
-                first = int(np.argmax(marked))
-                text = (
-                    f"column {label!r} holds {int(marked.sum())} of {len(values)} values that no flight has, the first"
-                    f" {values[first, column]:.3g} in row {first + 1}"
-                    f" (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
-                )
-                if marked.mean() > _LARGEST_SHARE_BROKEN:
-                    raise InputError(
-                        f"import.signals.{name}: {text}: check its unit, scale and offset, or leave it out"
-                    )
-                warnings.append(f"{name}: {text}: taken as missing")
-        if name == "quaternion":
-            without = ~np.any(values, axis=1, keepdims=True)
-            broken = broken | without
-            rows = int(without.sum())
-            warnings += [f"quaternion: {rows} rows are 0 0 0 0, not an attitude: taken as missing"] if rows else []
+        for column in np.flatnonzero(broken.any(axis=0)):
+            marked = broken[:, column]
+            first = int(np.argmax(marked))
+            text = (
+                f"column {signal.names[column]!r} holds {int(marked.sum())} of {len(values)} values that no flight has,"
+                f" the first {values[first, column]:.3g} in row {first + 1}"
+                f" (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
+            )
+            if marked.mean() > _LARGEST_SHARE_BROKEN:
+                raise InputError(f"import.signals.{name}: {text}: check its unit, scale and offset, or leave it out")
+            warnings.append(f"{name}: {text}: taken as missing")
+        if name == "quaternion" and not (turned := values.any(axis=1, keepdims=True)).all():
+            rows, broken = int((~turned).sum()), broken | ~turned
+            warnings.append(f"quaternion: {rows} rows are 0 0 0 0, not an attitude: taken as missing")
         signals[name] = np.where(broken, np.nan, values)
     return SignalTable(table.time, signals), tuple(warnings)
 
@@ -256,9 +241,7 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
 def make_continuous(table: SignalTable) -> SignalTable:
     """Remove jumps that are not motion, full turns of roll and yaw and signs of a quaternion, for interpolation."""
     ways = {"attitude": continuous_attitude, "quaternion": align_quaternion_signs}
-    return SignalTable(
-        table.time, {name: ways[name](own) if name in ways else own for name, own in table.signals.items()}
-    )
+    return SignalTable(table.time, {name: ways.get(name, np.asarray)(own) for name, own in table.signals.items()})
 
 
 def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
@@ -277,25 +260,12 @@ def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str
 
 
 def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
-    """Find spikes by Hampel's identifier, ``|x - median| > deviations * scale``.
+    """Find spikes by Hampel's identifier, ``|x - median| > deviations * scale`` (F. R. Hampel, 1974).
 
     The scale is the largest of 1.4826 times the median departure from the median within the running window, 1.4826
     times the median departure of the whole channel from its running median, and the channel's mean step. The first is
     large where the signal turns fast, so that a resolved crest is not a spike; the last two keep a quiet stretch, and a
-    signal of few distinct values, from being taken for spikes.
-
-    Parameters
-    ----------
-    values : array, shape (sample,)
-        One channel; values that are not finite are not spikes.
-    deviations : float
-        Threshold in robust standard deviations.
-    window : int
-        Samples of the running median.
-
-    References
-    ----------
-    F. R. Hampel, The influence curve and its role in robust estimation, 1974.
+    signal of few distinct values, from being taken for spikes. Values that are not finite are none.
     """
     spikes = np.zeros(len(values), dtype=bool)
     known = np.flatnonzero(np.isfinite(values))
@@ -304,36 +274,27 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     # Mirrored at the ends, where repetition would hide a spike.
     padded = np.pad(values[known], (window // 2, window - 1 - window // 2), mode="reflect")
     around = np.asarray(sliding_window_view(padded, window), dtype=float)
-    median = _medians(around)
+
+    def medians(rows: Array) -> Array:
+        # A general median spends half its time on what is not finite.
+        half, odd = divmod(window, 2)
+        ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
+        return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))
+
+    median = medians(around)
     departure = np.abs(values[known] - median)
-    local = _medians(np.abs(around - median[:, None]))
-    scale = _DEVIATION_OF_MEDIAN * np.maximum(local, np.median(departure))
+    scale = _DEVIATION_OF_MEDIAN * np.maximum(medians(np.abs(around - median[:, None])), np.median(departure))
     spikes[known] = departure > deviations * np.maximum(scale, np.abs(np.diff(values[known])).mean())
     return spikes
 
 
-def _medians(rows: Array) -> Array:
-    """Take the median of each row of finite values; a general one spends half its time on what is not finite."""
-    half, odd = divmod(rows.shape[1], 2)
-    ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
-    return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))
-
-
 def count_saturated(values: Array, samples: int, rest: float | None = None) -> int:
-    """Count the values of a channel, shape (sample,), in runs at its smallest or largest one; 0 for a constant one.
-
-    Parameters
-    ----------
-    samples : int
-        Length from which a run counts.
-    rest : float, optional
-        Extreme at which the channel may stand without being saturated.
-    """
+    """Count the values of a channel in runs of so many samples at an extreme, but for that at which it may rest."""
     known = values[np.isfinite(values)]
     if len(known) == 0 or known.min() == known.max():
         return 0
     extremes = [extreme for extreme in (known.min(), known.max()) if extreme != rest]
-    lengths = (after - first for extreme in extremes for first, after in runs(known == extreme))
+    lengths = [after - first for extreme in extremes for first, after in runs(known == extreme)]
     return sum(length for length in lengths if length >= samples)
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Su
 from cpfls_cli.flightlog.settings import SignalMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, MOTORS, SLOW_HZ, VTOL_TYPES, log_faster
 from cpfls_cli.flightlog.topics import logged_hz
-from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PX4, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined
 
@@ -29,8 +29,6 @@ _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch"
 # Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
-
-
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
 # Share of its range from its least up to which an output stands, and beyond which it drives; how long the motors have
@@ -51,41 +49,19 @@ _RANGES = (
 _USUAL_PULSES = "the usual pulses: a guess, since neither MOT_PWM_MIN, MOT_PWM_MAX nor RC3_MIN, RC3_MAX is in the log"
 
 
-class _Unit(NamedTuple):
-    """The unit of columns with scale and offset, and what tells it."""
-
-    unit: UnitName
-    scale: float
-    offset: float
-    reason: str
-    sure: Sure
-    rivals: tuple[Rival, ...] = ()
-
-
-@dataclass(frozen=True)
-class RotorGuess:
-    """A signal of the rotors."""
-
-    guess: Guess
-    rate_hz: float
-    kind: str  # Kind of log that is known for such columns; empty where none is.
-    left_out: tuple[str, ...] = ()  # Sentences on outputs beside them that move and drive no motor.
-
-    @property
-    def columns(self) -> SignalMap:
-        """Columns, unit, scale and offset."""
-        return self.guess.columns
-
-
-@dataclass(frozen=True, kw_only=True)
-class RotorColumns:
+class RotorColumns(NamedTuple):
     """All that a log says of its rotors."""
 
-    speed: RotorGuess | None
-    command: RotorGuess | None
-    command_is: KeyChoice | None  # What a command of unit 1 is a share of; None without one.
+    speed: Guess | None = None
+    command: Guess | None = None
+    command_is: KeyChoice | None = None  # What a command of unit 1 is a share of; None without one.
     left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def driving(self) -> Guess | None:
+        """What drives the vehicle: measured speeds, or else commands."""
+        return self.speed or self.command
 
 
 Found = tuple[Named, Array, Array]  # A candidate, its stamps in s and its values, shape (sample, rotor).
@@ -95,37 +71,30 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     """Choose the columns of rotor speeds and of rotor commands, from candidates for both, the best first."""
     # Electric speeds, whose pole pairs have to be known, come behind mechanical ones.
     speeds = sorted(found["rotor_speed"], key=lambda entry: _is_electric(entry[0]))
-    speed, command = (
-        next((guess for own in candidates if (guess := _guess(own, parameters)) is not None), None)
+    (speed, odd), (command, others) = (
+        next((own for each in candidates if (own := _guess(each, parameters))[0] is not None), (None, []))
         for candidates in (speeds, found["rotor_command"])
     )
-    left_out = [words for guess in (speed, command) if guess is not None for words in guess.left_out]
+    left_out = [*odd, *others]
     if speed is not None and command is not None:
-        counts = [len(guess.columns.columns) for guess in (speed, command)]
+        columns, counts = command.columns.columns, [len(own.columns.columns) for own in (speed, command)]
         if speed.rate_hz * FASTER < command.rate_hz:
-            left_out.append(
-                f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz; the"
-                f" commands come at {command.rate_hz:.3g} Hz"
-            )
+            left_out.append(f"{left_for_commands(speed)}; the commands come at {command.rate_hz:.3g} Hz")
             speed = None
         elif counts[0] != counts[1]:
-            left_out.append(
-                f"{command.columns.columns[0]} and the columns with it: {counts[1]} commands, {counts[0]} rotors"
-            )
+            left_out.append(f"{columns[0]} and the columns with it: {counts[1]} commands, {counts[0]} rotors")
             command = None
-    warnings = [
-        warning for guess in (speed, command) if guess is not None for warning in too_slow(guess, system, parameters)
-    ]
+    warnings = [each for own in (speed, command) if own is not None for each in too_slow(own, system, parameters)]
     if speed is None and command is None:
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
-    shares = command is not None and command.columns.unit == "1"
-    return RotorColumns(
-        speed=speed,
-        command=command,
-        command_is=_meaning(command, parameters, system) if command is not None and shares else None,
-        left_out=tuple(left_out),
-        warnings=tuple(warnings),
-    )
+    shares = None if command is None or command.columns.unit != "1" else command
+    command_is = None if shares is None else _meaning(shares, parameters, system)
+    return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
+
+
+def left_for_commands(speed: Guess) -> str:
+    """Say which measured speeds are left out for commands that come more often."""
+    return f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz"
 
 
 def find_mixed(log: LogTable) -> RotorColumns | None:
@@ -143,17 +112,14 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
         " roll and pitch, and yaw, with the signs of its place"
     )
     mapped = SignalMap(columns=columns, unit="1", scale=1 / 65536, mixer=_CRAZYFLIE_MIXER)
-    guess = Guess(signal="rotor_command", columns=mapped, reason=reason, sure="named")
-    older = Rival("rotor_command_is: speed", "before 2022 the firmware passed what it had mixed to the motors")
     said = "a Crazyflie mixes thrusts, before it compensates for the battery"
-    command = RotorGuess(guess, logged_hz(time), "Crazyflie")
+    older = Rival("rotor_command_is: speed", "before 2022 the firmware passed what it had mixed to the motors")
+    command = Guess("rotor_command", mapped, reason, "named", rate_hz=logged_hz(time), kind=CRAZYFLIE)
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
-    return RotorColumns(
-        speed=None, command=command, command_is=command_is, warnings=tuple(too_slow(command, "Crazyflie", {}))
-    )
+    return RotorColumns(None, command, command_is, warnings=tuple(too_slow(command, CRAZYFLIE, {})))
 
 
-def too_slow(guess: RotorGuess, system: str, parameters: Parameters) -> Iterator[str]:
+def too_slow(guess: Guess, system: str, parameters: Parameters) -> Iterator[str]:
     """Say of rotors that are logged too slowly how to log them faster."""
     if guess.rate_hz < SLOW_HZ:
         yield (
@@ -167,7 +133,7 @@ def _beyond_commands(found: Found, parameters: Parameters) -> Iterator[str]:
     named, time, values = found
     beyond = (values < min(own.low for own in RANGES)) | (values > max(own.high for own in RANGES))
     kept = ~beyond.any(axis=1)
-    if kept.all() or kept.sum() < _FEWEST_SAMPLES or _guess((named, time[kept], values[kept]), parameters) is None:
+    if kept.all() or kept.sum() < _FEWEST_SAMPLES or _guess((named, time[kept], values[kept]), parameters)[0] is None:
         return
     row = int(np.argmin(kept))
     index = int(np.argmax(np.abs(values).max(axis=0)))
@@ -183,18 +149,18 @@ def _is_electric(named: Named) -> bool:
     return "erpm" in named.group.pattern.lower()
 
 
-def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
-    """Take columns that are connected in the unit that is stated or fits; None where none does."""
+def _guess(found: Found, parameters: Parameters) -> tuple[Guess | None, list[str]]:
+    """Take columns that are connected in the unit that is stated or fits, and say which move and drive no motor."""
     named, time, values = found
     chosen = _connected(found, parameters)
     if len(chosen.outputs) < _FEWEST:
-        return None
+        return None, []
     columns, values = tuple(named.group.columns[index] for index in chosen.outputs), values[:, chosen.outputs]
     is_speed = named.signal == "rotor_speed"
-    taken = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters, chosen)
-    if taken is None:
-        return None
-    sure, rivals = taken.sure, taken.rivals
+    guess = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters, chosen)
+    if guess is None:
+        return None, []
+    sure, rivals = guess.sure, guess.rivals
     still = [column for column in named.group.columns if column not in (*columns, *chosen.others)]
     if len(columns) == _FEWEST and still and not chosen.stated:
         every = f"columns: [{', '.join(named.group.columns)}]"
@@ -204,21 +170,9 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
         words = f"if {joined(chosen.doubtful)}, which do not rise with the others and swing further, are no servos"
         sure, rivals = "guess", (Rival(every, words), *rivals)
     sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
-    guess = Guess(
-        signal=named.signal,
-        columns=SignalMap(
-            columns=columns,
-            unit=taken.unit,
-            scale=taken.scale,
-            offset=taken.offset,
-            sign=sign if is_speed and min(sign) < 0 else None,
-        ),
-        reason=taken.reason,
-        sure=sure,
-        rivals=rivals,
-    )
-    left_out = tuple(f"{column}: {why}" for column, why in chosen.others.items())
-    return RotorGuess(guess, logged_hz(time), named.known, left_out)
+    mapped = replace(guess.columns, columns=columns, sign=sign if is_speed and min(sign) < 0 else None)
+    guess = replace(guess, columns=mapped, sure=sure, rivals=rivals, rate_hz=logged_hz(time))
+    return guess, [f"{column}: {why}" for column, why in chosen.others.items()]
 
 
 class _Connected(NamedTuple):
@@ -237,13 +191,17 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
     named, time, values = found
     spread = values.std(axis=0)
     moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
-    of_outputs = "output" in named.group.pattern
+
+    def but(why: str, motors: Sequence[int], moving: Sequence[int]) -> dict[str, str]:
+        return {named.group.columns[index]: f"it moves, but {why}" for index in moving if index not in motors}
+
     functions = _functions(named, parameters)
     for motors, span in functions:
         if {*motors} <= {*range(values.shape[1])} and len({*motors} & {*moving}) >= _FEWEST:
-            return _Connected(motors, True, _not_motors(named, moving, motors, "no function of a motor"), span)
-    if named.known == "PX4" and not of_outputs and _FEWEST <= len(lifting_rotors(parameters)) <= values.shape[1]:
-        return _Connected(lifting_rotors(parameters), True, {})
+            return _Connected(motors, True, but("no function of a motor", motors, moving), span)
+    lifting = lifting_rotors(parameters) if named.known == PX4 and "output" not in named.group.pattern else []
+    if _FEWEST <= len(lifting) <= values.shape[1]:
+        return _Connected(lifting, True, {})
     if functions:
         # The motors are connected elsewhere.
         return _Connected([], True, {})
@@ -252,27 +210,25 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
     kept = [index for index in moving if index not in odd]
     others = {named.group.columns[index]: why for index, why in odd.items()}
     count = stated_count(parameters) or count_by_form(parameters, len(kept))
-    if named.known in ("PX4", "ArduPilot") and count is not None and {*range(count)} <= {*kept}:
+    if named.known in (PX4, ARDUPILOT) and count is not None and {*range(count)} <= {*kept}:
         motors = list(range(count))
-        more = _not_motors(named, kept, motors, f"the frame has {count} motors")
-        return _Connected(motors, True, others | more)
-    apart = [named.group.columns[index] for index in _swung_apart(time, values, kept)]
-    why = "it does not rise with the others and swings further: a servo?"
-    motors = [index for index in kept if named.group.columns[index] not in apart]
-    return _Connected(motors, False, others | dict.fromkeys(apart, why), doubtful=tuple(apart))
+        return _Connected(motors, True, others | but(f"the frame has {count} motors", motors, kept))
+    apart = _swung_apart(time, values, kept)
+    servos = tuple(named.group.columns[index] for index in apart)
+    others |= dict.fromkeys(servos, "it does not rise with the others and swings further: a servo?")
+    return _Connected([index for index in kept if index not in apart], False, others, doubtful=servos)
 
 
 def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:
-    """List outputs that swing far and not with the rest, which lifts: surfaces beside motors, where nothing says so."""
+    """List outputs that swing far and not with the rest, which lifts: surfaces among motors, where nothing says so."""
     rows = max(1, round(_SWING_S / float(np.median(np.diff(time)))))
     if len(kept) <= _FEWEST_BESIDE or len(time) < _FEWEST_SAMPLES + rows:
         return []
     own = values[:, kept]
     changes = own[rows:] - own[:-rows]
     sizes = np.quantile(np.abs(changes), 0.9, axis=0)
-    far = [index for index, size in enumerate(sizes) if size > _SWINGS * float(np.median(sizes)) > 0]
     apart = []
-    for index in far:
+    for index in np.flatnonzero((sizes > _SWINGS * np.median(sizes)) & (np.median(sizes) > 0)).tolist():
         common = np.median(np.delete(own, index, axis=1), axis=1)
         if np.ptp(common) == 0 or np.corrcoef(common, own[:, index])[0, 1] < _RISES:
             apart.append(kept[index])
@@ -281,7 +237,7 @@ def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:
 
 def _other_functions(named: Named, parameters: Parameters, moving: Sequence[int]) -> dict[int, str]:
     """List outputs of an ArduPilot that have another function than a motor."""
-    if named.known != "ArduPilot" or named.signal != "rotor_command":
+    if named.known != ARDUPILOT or named.signal != "rotor_command":
         return {}
     keys = {f"{prefix}{index + 1}_FUNCTION": index for index in moving for prefix in ("SERVO", "RC")}
     numbers = {key: whole(parameters, key) or 0 for key in keys}
@@ -292,21 +248,17 @@ def _other_functions(named: Named, parameters: Parameters, moving: Sequence[int]
     }
 
 
-def _not_motors(named: Named, moving: Sequence[int], motors: Sequence[int], why: str) -> dict[str, str]:
-    return {named.group.columns[index]: f"it moves, but {why}" for index in moving if index not in motors}
-
-
 def _functions(named: Named, parameters: Parameters) -> list[tuple[list[int], tuple[float, float, str] | None]]:
     """List by each group of parameters that give outputs a function the outputs of motors, from 0, and their range."""
     if named.signal != "rotor_command":
         return []
     found: dict[str, dict[int, int]] = {}
-    if named.known == "ArduPilot":
+    if named.known == ARDUPILOT:
         for prefix, output in product(("SERVO", "RC"), range(1, len(named.group.columns) + 1)):
             number = whole(parameters, f"{prefix}{output}_FUNCTION")
             if number in MOTORS:
                 found.setdefault(prefix, {})[MOTORS.index(number)] = output - 1
-    elif named.known == "PX4" and "output" in named.group.pattern:
+    elif named.known == PX4 and "output" in named.group.pattern:
         for name in sorted(parameters):
             own = re.fullmatch(r"(\w+)_FUNC(\d+)", name)
             number = whole(parameters, name) if own else None
@@ -322,9 +274,7 @@ def _functions(named: Named, parameters: Parameters) -> list[tuple[list[int], tu
 
 def _span(prefix: str, outputs: Sequence[int], parameters: Parameters) -> tuple[float, float, str] | None:
     """Give the range that PX4 states of each output, where it is that of all motors."""
-    ends = {
-        tuple(float(parameters.get(f"{prefix}_{end}{output + 1}", 0)) for end in ("MIN", "MAX")) for output in outputs
-    }
+    ends = {tuple(float(parameters.get(f"{prefix}_{end}{own + 1}", 0)) for end in ("MIN", "MAX")) for own in outputs}
     low, high = ends.pop() if len(ends) == 1 else (0.0, 0.0)
     return (low, high, f"{prefix}_MIN and _MAX of the log") if low < high else None
 
@@ -362,28 +312,34 @@ def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int
     return odd if len(moving) - len(odd) >= _FEWEST else {}
 
 
-def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
+def _in_unit(
+    named: Named, unit: UnitName, scale: float, reason: str, sure: Sure, *rivals: Rival, offset: float = 0.0
+) -> Guess:
+    mapped = SignalMap(columns=named.group.columns, unit=unit, scale=scale, offset=offset)
+    return Guess(named.signal, mapped, reason, sure, rivals, kind=named.known)
+
+
+def _speed_unit(named: Named, values: Array, parameters: Parameters) -> Guess:
     size = np.abs(values)
     level = float(np.median(size[size >= 0.3 * float(size.max())]))
     called = f"called {named.group.pattern}, {level:.4g} in flight"
     if _is_electric(named):
-        factor = 100.0 if named.known == "Betaflight" else 1.0
+        factor = 100.0 if named.known == BETAFLIGHT else 1.0
         poles = float(parameters.get("motor_poles", 0) or 0)
         if poles:
             reason = f"{called}: electrical speed, divided by motor_poles {poles:.0f} / 2 of the header"
-            return _Unit("rpm", factor / (poles / 2), 0.0, reason, "named")
+            return _in_unit(named, "rpm", factor / (poles / 2), reason, "named")
         rival = Rival(f"scale: {factor / 6:.6g}", "six pole pairs; the log does not say how many the motors have")
         reason = f"{called}: electrical speed, divided by 7 pole pairs, a usual number"
-        return _Unit("rpm", factor / _USUAL_POLE_PAIRS, 0.0, reason, "guess", (rival,))
+        return _in_unit(named, "rpm", factor / _USUAL_POLE_PAIRS, reason, "guess", rival)
     if named.unit is not None:
-        return _Unit(named.unit, named.scale, 0.0, f"{called}: {named.unit} by its name", "named")
+        return _in_unit(named, named.unit, named.scale, f"{called}: {named.unit} by its name", "named")
     if level > _RPM_FROM:
-        return _Unit("rpm", 1.0, 0.0, f"{called}: faster than any rotor in rad/s", "data")
-    rival = Rival("unit: rpm", f"a level of {level:.4g} fits both")
-    return _Unit("rad/s", 1.0, 0.0, called, "guess", (rival,))
+        return _in_unit(named, "rpm", 1.0, f"{called}: faster than any rotor in rad/s", "data")
+    return _in_unit(named, "rad/s", 1.0, called, "guess", Rival("unit: rpm", f"a level of {level:.4g} fits both"))
 
 
-def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _Connected) -> _Unit | None:
+def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _Connected) -> Guess | None:
     """Tell the unit of commands: parameters and the name first, then the first of `RANGES` that holds the numbers."""
     low, high = float(values.min()), float(np.quantile(values, 0.999))
     called = f"called {named.group.pattern}, up to {high:.4g}"
@@ -392,40 +348,40 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     driven = values[values > 0]
     if stated is not None and len(driven) and stated[0] <= float(np.median(driven)) <= stated[1]:
         begin, end, where = stated
-        reason = f"{called}: {begin:g} to {end:g} by {where}"
+        reason, scale = f"{called}: {begin:g} to {end:g} by {where}", 1 / (end - begin)
         sure: Sure = "guess" if where == _USUAL_PULSES else "named"
-        return _Unit("1", 1 / (end - begin), -begin / (end - begin), reason, sure)
-    if named.known == "Crazyflie":
-        return _Unit("1", named.scale, 0.0, f"{called}: 16 bits, as on a Crazyflie", "named")
+        return _in_unit(named, "1", scale, reason, sure, offset=-begin / (end - begin))
+    if named.known == CRAZYFLIE:
+        return _in_unit(named, "1", named.scale, f"{called}: 16 bits, as on a Crazyflie", "named")
     words = {*named.group.words}
     if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
         unit = named.unit or ("rpm" if high > _RPM_FROM else "rad/s")
         rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
-        reason = f"{called}: a commanded speed"
-        return _Unit(unit, named.scale, 0.0, reason, "guess" if rivals else "named", rivals)
+        sure = "guess" if rivals else "named"
+        return _in_unit(named, unit, named.scale, f"{called}: a commanded speed", sure, *rivals)
     if named.unit == "1" and named.scale != 1.0:
-        return _Unit("1", named.scale, 0.0, f"{called}: per cent by its name", "named")
-    for own in RANGES:
-        if low >= own.low and own.high_from < high <= own.high:
-            told = own.tells == "always" or (own.tells == "of commands" and bool(words & ASKED))
-            others = [Rival(*rival) for rival in own.rivals]
-            if not (told or named.unit == "us" or "pwm" in words):
-                others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
-            reason = f"{called}: {own.words}"
-            return _Unit("1", own.scale, own.offset, reason, "data" if told else "guess", tuple(others))
-    return None
+        return _in_unit(named, "1", named.scale, f"{called}: per cent by its name", "named")
+    own = next((own for own in RANGES if low >= own.low and own.high_from < high <= own.high), None)
+    if own is None:
+        return None
+    clear = own.clear == "always" or (own.clear == "of commands" and bool(words & ASKED))
+    others = [Rival(*rival) for rival in own.rivals]
+    if not (clear or named.unit == "us" or "pwm" in words):
+        others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
+    sure = "data" if clear else "guess"
+    return _in_unit(named, "1", own.scale, f"{called}: {own.words}", sure, *others, offset=own.offset)
 
 
 def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, str] | None:
     """Give the range of outputs that the log's parameters state."""
-    if named.known == "Betaflight" and "motorOutput" in parameters:
+    if named.known == BETAFLIGHT and "motorOutput" in parameters:
         low, high = (float(part) for part in str(parameters["motorOutput"]).split(",")[:2])
         return low, high, "motorOutput of the header"
     for low_name, high_name in _RANGES:
         low, high = (float(parameters.get(name, 0) or 0) for name in (low_name, high_name))
-        if 500 < low < high and ("output" in named.group.pattern or named.known == "ArduPilot"):
+        if 500 < low < high and ("output" in named.group.pattern or named.known == ARDUPILOT):
             return low, high, f"{low_name} and {high_name} of the log"
-    if named.known == "ArduPilot":
+    if named.known == ARDUPILOT:
         # Where both are 0, and before they were, motors have the range of the throttle's stick.
         stick = whole(parameters, "RCMAP_THROTTLE") or 3
         low, high = (float(parameters.get(f"RC{stick}_{end}", 0) or 0) for end in ("MIN", "MAX"))
@@ -436,13 +392,13 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     return None
 
 
-def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> KeyChoice:
+def _meaning(command: Guess, parameters: Parameters, system: str) -> KeyChoice:
     """Tell whether a command is a share of thrust or of speed."""
 
     def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> KeyChoice:
         return KeyChoice("rotor_command_is", value, reason, sure, rivals)
 
-    if command.kind == "Crazyflie":
+    if command.kind == CRAZYFLIE:
         if "motor.m" in command.columns.columns[0]:
             older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
             return choose("thrust", "motor.m* of a Crazyflie are thrusts, before it compensates for the battery", older)

@@ -1,7 +1,7 @@
 """What was asked of an autopilot: columns of setpoints and sticks, held against what was measured."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,19 +10,19 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.flightlog.agreement import slow
 from cpfls_cli.flightlog.conversion import as_mapped, attitude_from_quaternion
 from cpfls_cli.flightlog.layouts import Parameters
-from cpfls_cli.flightlog.names import column_groups, is_of, wished_signals
-from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure
+from cpfls_cli.flightlog.names import column_groups, is_of, lists_all, wished_signals
+from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN, PX4
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, CRAZYFLIE, KNOWN
 from cpfls_cli.units import UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
 _FEWEST_COMPARED = 100  # Of the one clock, a second of flight.
 # Correlations from which on what is measured follows what is asked for, and runs against it.
 _FOLLOWS, _OPPOSES = 0.6, -0.8
-_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift.
+_MOVES = 0.25  # As large as what is measured from which on a setpoint moves: one that stays shows nothing of a drift.
 _LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)  # By which a vehicle follows, s.
 _MOTION_HZ = 5.0  # Below which a vehicle follows anything; above there is the noise of sensors.
 _HELD_S = 0.1
@@ -42,8 +42,7 @@ _REFERENCE: Final = "a reference may be a second measurement instead of a setpoi
 _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 
 
-@dataclass(frozen=True)
-class _Candidate:
+class _Candidate(NamedTuple):
     """Columns that may be a setpoint, as they would be mapped, and why they may be, in words."""
 
     signal: SignalName
@@ -60,20 +59,16 @@ class _Candidate:
         return SETPOINTS[self.signal].replace("_", " ")
 
     @property
-    def units(self) -> tuple[float, ...]:
-        """Factors that may make SI units of what is asked for."""
-        return (1.0,) if self.states_unit else tuple(known_unit(unit).factor for unit in _UNITS[self.signal])
-
-    def guess(self, columns: SignalMap, reason: str, sure: Sure, rivals: tuple[Rival, ...] = ()) -> Guess:
-        """Take columns for the setpoint."""
-        return Guess(signal=self.signal, columns=columns, reason=reason, sure=sure, rivals=rivals)
+    def units(self) -> dict[UnitName, float]:
+        """Units that what is asked for may be in, and the factor that makes SI units of it."""
+        units = () if self.states_unit else _UNITS[self.signal]
+        return {unit: known_unit(unit).factor for unit in units} or {self.columns.unit: 1.0}
 
 
 def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
     """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs."""
     candidates = list(_of_known_logs(seen.log, parameters, system))
-    if not any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
-        # Of these logs all that is asked for is in the list.
+    if not lists_all(system):
         known = {column for own in candidates for column in own.columns.columns}
         candidates += [own for own in _by_words(seen) if not known & {*own.columns.columns}]
     for name in SETPOINTS:
@@ -86,14 +81,10 @@ def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
             seen.left_out += [own for own in judged if isinstance(own, str)]
 
 
-# Candidates.
-
-
 def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterator[_Candidate]:
     # On its card a Crazyflie puts the name of an event before that of a variable.
     events = tuple(f"{topic}." for topic in log.topics) if system.startswith(CRAZYFLIE) else ("",)
-    rows = ((name, row) for row in KNOWN for name in SETPOINTS if name == row.signal)
-    for name, row in rows:
+    for name, row in ((name, row) for row in KNOWN for name in SETPOINTS if name == row.signal):
         own = row.columns
         if row.system == ARDUPILOT and name == "sticks":
             # On the channels that its parameters name.
@@ -110,16 +101,14 @@ def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterat
                     sign=row.sign,
                     required=False,
                 )
-                called = f"a log of {row.system} calls it so"
-                yield _Candidate(name, _in_stated_unit(log, name, mapped), called, True, True)
+                mapped = _in_stated_unit(log, name, mapped)
+                yield _Candidate(name, mapped, f"a log of {row.system} calls it so", True, True)
 
 
 def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> SignalMap:
     """Let the unit that a log states win over the one that its kind is known for."""
-    unit = log.stated_unit(mapped.columns[0], signal)
-    if unit is None or len(mapped.columns) != 3:
-        return mapped
-    return replace(mapped, unit=unit, scale=1.0, offset=0.0)
+    unit = log.stated_unit(mapped.columns[0], signal) if len(mapped.columns) == 3 else None
+    return mapped if unit is None else replace(mapped, unit=unit, scale=1.0, offset=0.0)
 
 
 def _by_words(seen: Seen) -> Iterator[_Candidate]:
@@ -143,30 +132,29 @@ def _changes(log: LogTable, own: _Candidate) -> bool:
     return all(len(one) >= _FEWEST_SAMPLES for one in values) and any(np.ptp(one) > 0 for one in values)
 
 
-# Judgement.
-
-
 def _judged(seen: Seen, own: _Candidate) -> Guess | str:
     """Make a guess of a candidate, or say why it is none."""
-    asked = _asked(seen, own.columns)
+    # In the part that is flown, as it would be mapped, in SI; NaN where absent.
+    samples = (seen.log.values((column,)) for column in own.columns.columns)
+    held = [hold_asked(time, values[:, 0], seen.log.grid[seen.part], _HELD_S) for time, values in samples]
+    asked = known_unit(own.columns.unit).factor * as_mapped(np.column_stack(held), own.columns)
     if own.signal in ("setpoint_thrust", "sticks"):
         return _by_range(own, asked)
-    measured = _measured(seen, own.signal)
-    columns = ", ".join(own.columns.columns)
+    measured, columns = _measured(seen, own.signal), ", ".join(own.columns.columns)
     if measured is None:
         against = f"there is no {own.what} to compare it with"
-        if not own.known:
-            return f"{columns}: looks like a setpoint of the {own.what}, but {against}"
-        return own.guess(own.columns, f"{own.called}; {against}", "named")
+        if own.known:
+            return Guess(own.signal, own.columns, f"{own.called}; {against}", "named")
+        return f"{columns}: looks like a setpoint of the {own.what}, but {against}"
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked, measured)
-    fit = _follow(measured, asked, seen.rate_hz, own.units)
-    if not fit.followed.any():
-        return (
-            f"{columns}: looks like a setpoint of the {own.what}, which does not follow it; if gusts are "
-            f"why, state it as import.signals.{own.signal}"
-        )
-    return _by_motion(own, fit)
+    fit = _follow(measured, asked, seen.rate_hz, tuple(own.units.values()))
+    if fit.followed.any():
+        return _by_motion(own, fit)
+    return (
+        f"{columns}: looks like a setpoint of the {own.what}, which does not follow it; if gusts are "
+        f"why, state it as import.signals.{own.signal}"
+    )
 
 
 def _by_range(own: _Candidate, asked: Array) -> Guess | str:
@@ -181,7 +169,7 @@ def _by_range(own: _Candidate, asked: Array) -> Guess | str:
     if own.signal == "setpoint_thrust" and not float(np.median(known)) > 0:
         return f"{columns}: {own.called}, but it does not lift"
     unit = f"shares of {what}" if own.columns.unit == "1" else f"in {own.columns.unit}"
-    return own.guess(own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named")
+    return Guess(own.signal, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named")
 
 
 def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
@@ -192,9 +180,8 @@ def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     if opposed and (own.known or axes is not columns):
         return f"{', '.join(columns)}: {own.called}, but the {own.what} runs against {', '.join(opposed)}"
     if not own.states_unit:
-        factor = _nearest(gain, own.units)
-        unit = next(each for each in _UNITS[own.signal] if known_unit(each).factor == factor)
-        mapped, gain = replace(mapped, unit=unit), gain / factor
+        unit = min(own.units, key=lambda each: abs(np.log(gain / own.units[each])))
+        mapped, gain = replace(mapped, unit=unit), gain / own.units[unit]
     most = _TIMES if own.known else _TIMES_BY_WORDS
     if not 1 / most < gain < most:
         size = f"the {own.what} is {gain:.2g} times as large, which no unit explains"
@@ -209,19 +196,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     doubts = [*own.doubts, *([f"the measured motion does not follow {', '.join(loose)}"] if loose else [])]
     rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
     reason = f"{own.called}; the {own.what} follows it{turned} (correlation {share}){size}"
-    return own.guess(mapped, reason, "guess" if rivals else "data", rivals)
-
-
-def _nearest(gain: float, factors: tuple[float, ...]) -> float:
-    return min(factors, key=lambda factor: abs(np.log(gain / factor)))
-
-
-def _asked(seen: Seen, columns: SignalMap) -> Array:
-    """Give the columns of a candidate in the part that is flown, as they would be mapped, in SI; NaN where absent."""
-    grid = seen.log.grid[seen.part]
-    samples = (seen.log.values((column,)) for column in columns.columns)
-    held = [hold_asked(time, values[:, 0], grid, _HELD_S) for time, values in samples]
-    return known_unit(columns.unit).factor * as_mapped(np.column_stack(held), columns)
+    return Guess(own.signal, mapped, reason, "guess" if rivals else "data", rivals)
 
 
 def _measured(seen: Seen, signal: SignalName) -> Array | None:
@@ -296,7 +271,8 @@ def _at_delay(measured: Array, asked: Array, steps: int, factors: tuple[float, .
     best = int(np.argmax(along))
     if not along[best] > 0:
         return _Following(moves=np.asarray(spread > 0, dtype=bool))
-    factor = _nearest(float(shared[best] / spread[best]), factors)
+    gain = float(shared[best] / spread[best])
+    factor = min(factors, key=lambda each: abs(np.log(gain / each)))
     moves = np.asarray(factor**2 * spread > _MOVES**2 * flown, dtype=bool)
     found = _Following(np.where(moves, along, 0.0), moves)
     sure = found.followed | found.opposed

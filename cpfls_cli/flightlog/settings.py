@@ -227,10 +227,9 @@ class ImportSettings(Settings):
 
 def _check_attitude(settings: ImportSettings) -> None:
     names = settings.signals.keys()
-    if {"attitude", "quaternion"} <= names:
-        raise SettingError("signals", "attitude and quaternion are both given; keep one")
-    if {"body_rate", "attitude_rate"} <= names:
-        raise SettingError("signals", "body_rate and attitude_rate are both given; keep one")
+    for one, other in (("attitude", "quaternion"), ("body_rate", "attitude_rate"), ("torque", "body_torque")):
+        if {one, other} <= names:
+            raise SettingError("signals", f"{one} and {other} are both given; keep one")
     needing = [name for name in ("attitude_rate", "torque") if name in names]
     if needing and not {"attitude", "quaternion"} & names:
         raise SettingError("signals", f"{', '.join(needing)} needs attitude or quaternion to be converted")
@@ -247,5 +246,3 @@ def _check_torque(settings: ImportSettings) -> None:
     if wanted is not None and not wanted & names:
         missing = " or ".join(sorted(wanted))
         raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")
-    if {"torque", "body_torque"} <= names:
-        raise SettingError("signals", "torque and body_torque are both given; keep one")

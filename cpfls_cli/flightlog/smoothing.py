@@ -12,26 +12,13 @@ _PADDED_PERIODS = 3
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int) -> Array:
-    """Apply a Butterworth low-pass filter forward and backward, without phase shift.
+    """Apply a Butterworth low-pass filter of that order forward and backward, without phase shift.
 
     Parameters
     ----------
     values : array, shape (time, column)
-    rate_hz : float
-        Sampling rate, Hz.
     cutoff_hz : float or None
-        Where the two passes together halve the amplitude (-6 dB), Hz; None leaves the values as they are.
-    order : int
-        Order of one pass.
-
-    Returns
-    -------
-    array, shape (time, column)
-
-    Raises
-    ------
-    SettingError
-        If the cut-off is not below half of the sampling rate.
+        Where the two passes together halve the amplitude (-6 dB), Hz, below half of the rate; None: nothing is changed.
     """
     if cutoff_hz is None:
         return values
@@ -46,25 +33,15 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
 
 
 def derivative(time: Array, values: Array) -> Array:
-    """Differentiate by the cubic spline through the samples.
+    """Differentiate values, shape (time, column), by the cubic spline through the samples.
 
     On a uniform clock this is the compact central difference of fourth order: its relative error is
     ``(2 pi f / rate)^4 / 180``, where the plain central difference has ``(2 pi f / rate)^2 / 6`` and would make
     every identified inertia too large. It does not smooth; `low_pass` does.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    values : array, shape (time, column)
-
-    Returns
-    -------
-    array, shape (time, column), 1/s
     """
     from scipy.interpolate import CubicSpline
 
-    slopes: Array = CubicSpline(time, values).derivative()(time)
-    return slopes
+    return np.asarray(CubicSpline(time, values).derivative()(time))
 
 
 def body_rate_of(time: Array, attitude: Array | None, measured: Array | None) -> Array | None:

@@ -90,21 +90,11 @@ class VehicleKind(NamedTuple):
     what: str
     reason: str
 
-    @property
-    def hovers(self) -> bool:
-        """Whether rotors carry it for a part of its flight."""
-        return self.what == VTOL
-
-
-def other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
-    """Name what a log flies by its states, parameters and columns; None for a multirotor, and where they do not say."""
-    return next(_evidence(topics, parameters, system), None)
-
 
 def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) -> VehicleKind | None:
-    """Refuse a log of something that no rotors carry; a VTOL is given back, which hovers as a multirotor."""
-    found = other_vehicle(topics, parameters, system)
-    if found is not None and not found.hovers:
+    """Refuse a log of what no rotors carry, by states, parameters and columns; a VTOL is given back, which hovers."""
+    found = next(_evidence(topics, parameters, system), None)
+    if found is not None and found.what != VTOL:
         raise InputError(
             f"a log of {found.what} ({found.reason}), not of a multirotor: only vehicles that rotors carry are modelled"
         )
@@ -247,7 +237,7 @@ def _nearly(first: str, other: str) -> bool:
 
 
 FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 50 ms.
-# Below which they are logged too slowly for what they drive to be told from what drives them: two samples in the 50 ms
+# Below which they are logged too slowly for cause and effect to be distinguished: two samples in the 50 ms
 # within which they follow, and a half.
 SLOW_HZ = 25.0
 _DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
@@ -275,10 +265,7 @@ _NONE: Final[Parameters] = MappingProxyType({})
 def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters = _NONE) -> str:
     """Ask for what is logged too slowly faster, and say what to set in the autopilots that wrote the logs.
 
-    Parameters
-    ----------
-    *systems : str
-        What the logs name as their writers, with versions.
+    The systems are what logs name as their writers, with versions.
     """
     asked = f"log {what} at {least_hz:g} Hz or more"
     known = dict.fromkeys(
@@ -304,13 +291,10 @@ def _of_copter(system: str, parameters: Parameters) -> str:
     version, has = _version(system), parameters.get("LOG_BITMASK")
     new = version is not None and version >= _WITH_DSHOT
     bits = [bit for bit in _BITS if bit != _FAST_IMU or version is None or version >= _WITH_FAST_IMU]
-    if has is None and new:
-        has = _USUAL_BITS
+    has = _USUAL_BITS if has is None and new else has
+    named = "with"
     if isinstance(has, int | float) and has >= 0:
-        own = int(has)
-        named = f"= {own | sum(1 << bit for bit in bits)}, which is {own} with"
-    else:
-        named = "with"
+        named = f"= {int(has) | sum(1 << bit for bit in bits)}, which is {int(has)} with"
     names = joined(f"{bit} ({_BITS[bit]})" for bit in bits)
     return (
         f"log motor speeds with bidirectional DShot ({'' if new else 'ArduPilot 4: '}SERVO_BLH_BDMASK), for {system} "

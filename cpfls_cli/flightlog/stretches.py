@@ -1,6 +1,6 @@
 """Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import ceil, floor, pi
 from typing import Any
 
@@ -97,14 +97,14 @@ def _when(time: Array, marked: BoolArray) -> str:
 
 
 def _crop(time: Array, rest: BoolArray) -> str:
-    flown = [(time[first], time[after - 1]) for first, after in runs(~rest)]
+    flown = ((time[first], time[after - 1]) for first, after in runs(~rest))
     begin, end = max(flown, key=lambda part: float(part[1] - part[0]), default=(0.0, 0.0))
     if end - begin < SMALLEST_SHARE_KEPT * (time[-1] - time[0]):
         return "there is hardly anything else in the log"
     return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without it"
 
 
-def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSettings) -> Iterator[str]:
+def warn_of_dead(table: SignalTable, known: Iterable[str], settings: ImportSettings) -> Iterator[str]:
     """Name columns that are constant, or, unless they are known to be, clipped, or that stand still for a while."""
     for name, signal in settings.signals.items():
         values = table.signals[name]
@@ -152,8 +152,7 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
     for first, last in runs(same):
         # Steps from row to row: the row after the last one is still the same.
         enough = last - first + 1 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
-        if enough and time[last] - time[first] >= _SHORTEST_PAUSE_S:
-            marked[first : last + 1] = True
+        marked[first : last + 1] = enough and time[last] - time[first] >= _SHORTEST_PAUSE_S
     if marked.any():
         each = "rotor" if name in ROTORS else "axis"
         yield (
@@ -202,9 +201,8 @@ def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]
     found = list(nothing)
     for side, (first, after) in enumerate((lines[:1] + lines[-1:]) if lines else []):
         at_edge = first == 0 if side == 0 else after == len(straight)
-        long = after - first >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual) and time[after] - time[first] >= (
-            _SHORTEST_PAUSE_S
-        )
+        long = after - first >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
+        long &= bool(time[after] - time[first] >= _SHORTEST_PAUSE_S)
         moves = bool((np.abs(slopes[first:after]).max(axis=0) > 0).all())
         # The corner itself is the last row that was measured.
         rest, line = values[after + 1 :] if side == 0 else values[: first + 1], values[first : after + 2]
@@ -216,16 +214,10 @@ def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]
 
 def count_values(
     table: SignalTable, spikes: Mapping[str, BoolArray], resting: Mapping[str, BoolArray], settings: ImportSettings
-) -> dict[str, dict[str, int]]:
-    """Count bad values of each column of the log, by what they are in an `ImportReport`; columns without are left out.
+) -> dict[str, Any]:
+    """Count bad values of each column of what is kept, by what they are in an `ImportReport`; others are left out.
 
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
-    spikes : mapping from signal name to array of bool, shape (sample, column)
-    resting : mapping from signal name to array of bool, shape (sample,)
-        Where no rotor turns, which is not saturated; nor is a quaternion at hover (1), or a coarse voltage.
+    Where no rotor turns is not saturated; nor is a quaternion at hover (1), or a coarse voltage.
     """
 
     def by_column(signals: Mapping[str, Array | BoolArray], count: Callable[[Any], int]) -> dict[str, int]:

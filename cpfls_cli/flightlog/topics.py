@@ -102,17 +102,15 @@ def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
     steps = {topic: _step(topics[topic][STAMP]) for topic in mapped if STAMP in topics.get(topic, {})}
     # Some topics have stamps that stand still.
     steps = {topic: step for topic, step in steps.items() if 0 < step < inf}
-    fastest = f"{min(steps, key=steps.__getitem__)}.{STAMP}" if steps else None
+    fastest, held = f"{min(steps, key=steps.__getitem__)}.{STAMP}" if steps else None, column_names(topics)
     if settings.time_column is None and fastest:
         return replace(settings, time_column=fastest)
     if settings.time_column is None:
-        raise InputError(
-            f"import.signals: the log has none of the mapped topics; {columns_in_words(column_names(topics))}"
-        )
+        raise InputError(f"import.signals: the log has none of the mapped topics; {columns_in_words(held)}")
     example = f", such as {fastest}" if fastest else ""
     raise InputError(
         f"import.time_column = {settings.time_column!r}: in this log every topic has its own stamps; name those of the"
-        f" fastest mapped one{example}, or null for them; {columns_in_words(column_names(topics))}"
+        f" fastest mapped one{example}, or null for them; {columns_in_words(held)}"
     )
 
 
@@ -126,8 +124,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
     for name, signal in settings.signals.items():
         asked = name in SETPOINTS
         # A setpoint comes as seldom as it likes: it stays until the next one.
-        limit_s = inf if asked else settings.gap_s
-        unfit = None if signal.required else _unfit(signal, topics, clocks, base, limit_s)
+        unfit = None if signal.required else _unfit(signal, topics, clocks, base, inf if asked else settings.gap_s)
         if unfit:
             warnings.append(f"signal {name} is left out: {unfit}")
             left = {".".join(topic_and_field(column)) for column in signal.columns} | {*signal.columns}
@@ -135,6 +132,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
             continue
         for column, values in _continuous(name, signal, topics).items():
             topic = topic_and_field(column)[0]
+            columns[column] = values
             if asked:
                 columns[column] = hold_asked(clocks[topic], values, target, settings.gap_s)
                 continue
@@ -143,9 +141,16 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 if _step(clocks[topic]) > settings.gap_s:
                     slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                values = interpolate(clocks[topic], values, target, settings.gap_s, hold=name in COMMANDS)
-            columns[column] = values
-    return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
+                hold = name in COMMANDS
+                columns[column] = interpolate(clocks[topic], values, target, settings.gap_s, hold=hold)
+    step, steps = _step(clocks[base]), {topic: _step(clocks[topic]) for topic in sorted(used)}
+    warnings += [
+        f"topic {topic} ({1 / own:.4g} Hz) is downsampled to the clock of {base} ({1 / step:.4g} Hz), which aliases its"
+        f" noise into the flight: name the faster one in import.time_column"
+        for topic, own in steps.items()
+        if 0 < own * _THINNED < step
+    ]
+    return columns, tuple(warnings)
 
 
 def _unfit(signal: SignalMap, topics: Topics, clocks: Mapping[str, Array], base: str, limit_s: float) -> str | None:
@@ -178,21 +183,8 @@ def _slowness(topic: str, time: Array, gap_s: float) -> str:
     return f"topic {topic} has a sample only every {_step(time):.3g} s (median), longer than import.gap_s = {gap_s:g}"
 
 
-def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]:
-    step = _step(clocks[base])
-    faster = {topic: 1 / _step(time) for topic, time in clocks.items() if 0 < _step(time) * _THINNED < step}
-    return tuple(
-        f"topic {topic} ({rate_hz:.4g} Hz) is downsampled to the clock of {base} ({1 / step:.4g} Hz), which aliases its"
-        f" noise into the flight: name the faster one in import.time_column"
-        for topic, rate_hz in faster.items()
-    )
-
-
 def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
-    """Count how often a second each mapped signal was logged, by the stamps of its own topic, lost samples left out.
-
-    A flat log has one clock, and no rates.
-    """
+    """Count how often a second each signal was logged, by its topic's stamps; a flat log has no rates."""
     rates: dict[str, float] = {}
     for name, signal in settings.signals.items():
         topic, field = topic_and_field(signal.columns[0])
@@ -227,14 +219,9 @@ def interpolate(time: Array, values: Array, target: Array, longest_s: float, *, 
     time, values : array, shape (sample,)
         Stamps, s, and values; those that are not finite are absent.
     target : array, shape (row,), s
-        When values are wanted.
+        When values are wanted; NaN is given before the first sample, after the last and in longer steps.
     longest_s : float
         Longest step between samples that is bridged, s.
-
-    Returns
-    -------
-    array, shape (row,)
-        NaN before the first sample, after the last and in longer steps.
     """
     time, values = _present(time, values)
     if not len(time):

@@ -225,10 +225,10 @@ class Meaning(NamedTuple):
 
     signal: SignalName
     words: str  # One of them has to stand in the name.
-    kinds: str  # How its columns are told apart, and how many there are; of rotors at least.
+    kinds: str  # In what its columns differ, and how many there are; of rotors at least.
     number: int
     last: int = 0  # Only so many words at the end of the name count; 0: all of them.
-    never: str = ""  # Words that rule it out, beside those of `NOT_MEASURED`.
+    never: str = ""  # Words that rule it out, with those of `NOT_MEASURED`.
 
 
 # Words of a name that mean together what neither does, as a pattern, and the one word that means it.
@@ -261,36 +261,27 @@ MEANINGS: Final = (
 )
 FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
 ASKED: Final = _each("cmd command commands pwm u control output outputs throttle omcmd ref des d r")
+# Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement.
 NOT_MEASURED: Final = _each(
     "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
     " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"
     " temperature current thrust thrusts jerk snap stamp timestamp counter padding derivative test ratio ratios clip"
 )
-"""Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement."""
-
 SECOND_HAND: Final = _each("raw groundtruth mocap poses estimator filtered filt unfilt backup")
 ALLOWED: Final = {"thrust": frozenset({"thrust"}), **dict.fromkeys(ROTORS, _each("cmd command status r ref des d"))}
 _DEGREES = 180 / pi
+_ANGLES: Final[tuple[tuple[UnitName, float], ...]] = (("rad", 1.0), ("deg", 1 / _DEGREES))
 # Size that speaks for a unit, the unit, and the factor that makes it of what is logged.
 Row = tuple[float, UnitName, float]
-# Sizes of a gyroscope beside the attitude's derivative.
+# Sizes of a gyroscope over that of the attitude's derivative.
 RATES: Final[tuple[Row, ...]] = ((1.0, "rad/s", 1.0), (_DEGREES, "deg/s", 1.0), (1000.0, "rad/s", 1e-3))
-ANGLES: Final[tuple[Row, ...]] = (
-    (1.0, "rad", 1.0),
-    (1000.0, "rad", 1.0),
-    (1 / _DEGREES, "deg", 1.0),
-    (1000.0 / _DEGREES, "deg", 1.0),
-)
-"""Sizes of an acceleration over ground, in m or mm, beside that which gravity and a lean in rad make."""
-
+# Sizes of an acceleration over ground, in m or mm, over that which gravity and a lean in rad make.
+ANGLES: Final[tuple[Row, ...]] = tuple((mm * one, unit, 1.0) for unit, one in _ANGLES for mm in (1.0, 1000.0))
+# Sizes of an accelerometer at hover.
 SENSED: Final[tuple[Row, ...]] = (
     (STANDARD_GRAVITY, "m/s^2", 1.0),
-    (1.0, "g", 1.0),
-    (1000.0, "g", 1e-3),
-    (2048.0, "g", 1 / 2048),
-    (4096.0, "g", 1 / 4096),
+    *((size, "g", 1 / size) for size in (1.0, 1000.0, 2048.0, 4096.0)),
 )
-"""Sizes of an accelerometer at hover."""
 
 
 class Range(NamedTuple):
@@ -302,9 +293,9 @@ class Range(NamedTuple):
     scale: float
     offset: float
     words: str
-    # Whether the range alone tells it: of commands it does where the name is that of one.
-    tells: Literal["always", "of commands", "never"]
-    rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, beside speeds, and where they hold.
+    # Whether the range alone shows it: of commands it does where the name is that of one.
+    clear: Literal["always", "of commands", "never"]
+    rivals: tuple[tuple[str, str], ...] = ()  # Other readings of such numbers, but for speeds, and where they hold.
 
 
 _OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "if the range is 1075 to 1950, as in older PX4")

@@ -110,30 +110,23 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, IntArray, int]:
     if header.get("Data version") != "2":
         raise ValueError(f"Data version {header.get('Data version', 'missing')}, not 2")
     fields, names = _fields(header), header["Field I name"].split(",")
-    constants = np.array(
-        [
-            _integers(header, "minthrottle", "1150")[0],
-            _integers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
-            _integers(header, "vbatref", "4095")[0],
-            names.index("motor[0]") if "motor[0]" in names else -1,
-        ]
-    )
+    throttle = header.get("minthrottle", "1150")
+    stated = (throttle, header.get("motorOutput", throttle), header.get("vbatref", "4095"))
+    least = [int(own.partition(",")[0]) for own in stated]
+    constants = np.array([*least, names.index("motor[0]") if "motor[0]" in names else -1])
     data = np.frombuffer(content, dtype=np.uint8)
     # How many frames there are is known only once they were read.
     widths = (fields.counts[MAIN], 1 + fields.counts[SLOW])
-    number, broken, changes = decode(data, begin, fields, constants, *_tables((0, 0), widths))
-    rows, slow = _tables((number, changes), widths)
-    decode(data, begin, fields, constants, rows, slow)
+    lengths: tuple[int, ...] = (0, 0)
+    for _ in range(2):
+        rows, slow = (np.empty(shape, dtype=np.int64) for shape in zip(lengths, widths, strict=True))
+        number, broken, changes = decode(data, begin, fields, constants, rows, slow)
+        lengths = (number, changes)
     return header, rows, slow, broken
 
 
-def _tables(lengths: tuple[int, int], widths: tuple[int, int]) -> tuple[IntArray, IntArray]:
-    return np.empty((lengths[0], widths[0]), dtype=np.int64), np.empty((lengths[1], widths[1]), dtype=np.int64)
-
-
-def _integers(header: Mapping[str, str], key: str, otherwise: str | None = None) -> list[int]:
-    text = header[key] if otherwise is None else header.get(key, otherwise)
-    return [int(word) for word in text.split(",")]
+def _integers(header: Mapping[str, str], key: str) -> list[int]:
+    return [int(word) for word in header[key].split(",")]
 
 
 def _fields(header: Mapping[str, str]) -> Fields:
@@ -157,7 +150,7 @@ def _fields(header: Mapping[str, str]) -> Fields:
 
 
 def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
-    """Name the columns, and give those whose unit the header tells in that unit."""
+    """Name the columns, and give those whose unit the header states in that unit."""
     names = header["Field I name"].split(",")
     # A small step back is that of a damaged frame.
     stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < -ROLLOVER // 2)
@@ -182,7 +175,7 @@ def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str
 
 
 def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
-    """List beginnings of names, factors and units, as far as the header tells them."""
+    """List beginnings of names, factors and units, as far as the header states them."""
     (gyro,) = struct.unpack(">f", int(header.get("gyro_scale", "0x0"), 16).to_bytes(4, "big"))
     system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
     version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))
@@ -196,7 +189,7 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
     if version[0] == "Betaflight" and version[1] >= (3, 1):
         scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
         scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
-    cells = max(_integers(header, "vbatcellvoltage", "0"))
+    cells = max(map(int, header.get("vbatcellvoltage", "0").split(",")))
     hundredths = cells >= _HUNDREDTHS if cells else version[1] >= (4, 0)
     # In the unit of a cell; before 2017 it is what the converter reads.
     known = int(header.get("vbatref", "0")) < _MOST_CELLS * cells

@@ -105,9 +105,9 @@ def _three(data: Bytes, place: int, values: IntArray, wide: bool) -> Any:
         return place + 1 + kind
     if kind == 1:
         values[0], values[1], values[2] = _extended(first, 4), _extended(second >> 4, 4), _extended(second, 4)
-        return place + 2
-    values[0], values[1], values[2] = _extended(first, 6), _extended(second, 6), _extended(third, 6)
-    return place + 3
+    else:
+        values[0], values[1], values[2] = _extended(first, 6), _extended(second, 6), _extended(third, 6)
+    return place + 1 + kind
 
 
 @part
@@ -248,27 +248,15 @@ def _kind(marker: int) -> int:
 def decode(
     data: Bytes, place: int, fields: Fields, constants: IntArray, rows: IntArray, slow: IntArray
 ) -> tuple[int, int, int]:
-    """Read the main frames of a flight, and those of what changes slowly.
+    """Count main frames, broken ones (that are none, or jump in time) and slow ones from where the header ends.
 
     Parameters
     ----------
-    place : int
-        Where the header ends.
     constants : array of int, shape (4,)
         Least throttle, least motor output, reference of the battery, and the field of the first motor.
-    rows : array of int, shape (frame, field)
-        Filled as far as it goes; an empty one counts the frames.
-    slow : array of int, shape (frame, 1 + field)
-        The same of slow frames: the number of the main frame that comes next, and the fields.
-
-    Returns
-    -------
-    number : int
-        Main frames.
-    broken : int
-        Frames that are none, or that jump in time.
-    changes : int
-        Slow frames.
+    rows, slow : array of int, shape (frame, field) and (frame, 1 + field)
+        Filled as far as they go; empty ones are counted alone. What changes slowly is behind the number of the main
+        frame that comes next.
     """
     # Arrays are made here and copied by element: numba would compile the words of errors of shapes for two seconds.
     width = fields.encoding.shape[1]

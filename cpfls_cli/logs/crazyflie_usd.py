@@ -2,8 +2,8 @@
 
 import struct
 from collections.abc import Collection
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -20,13 +20,12 @@ _CHECK_SUM = 4
 _LETTERS = "BbHhIiQqefd"  # Types of numbers that a log may hold.
 
 
-@dataclass(frozen=True)
-class _Event:
+class _Event(NamedTuple):
     """One kind of event: its variables, packed behind number and stamp, and where the samples begin."""
 
     name: str
     kind: np.dtype
-    begins: list[int] = field(default_factory=list)
+    begins: list[int]
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -74,7 +73,7 @@ def _header(content: bytes) -> tuple[int, dict[int, _Event], int]:
             if letter not in _LETTERS:
                 raise ValueError(f"the type {letter!r} of {variable}")
             fields.append((variable[:-3], f"<{np.dtype(letter).str[1:]}"))
-        events[number] = _Event(name, np.dtype(fields))
+        events[number] = _Event(name, np.dtype(fields), [])
     return version, events, place
 
 

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Final, NamedTuple, TextIO
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
     with _opened(path) as table:
         names, first = table.names, dict(zip(table.names, table.first, strict=False))
-    numeric = [name for name in names if name in first and (_is_number(first[name]) or _is_time(first[name]))]
-    units = {name: "s" for name in numeric if _is_time(first[name])}
+    numeric = [name for name in names if name in first and _kind(first[name])]
+    units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)
     left_out = sorted(set(names) - set(numeric))
@@ -83,10 +83,11 @@ class _Table(NamedTuple):
 @contextmanager
 def _opened(path: Path) -> Iterator[_Table]:
     """Open a CSV, of commas, semicolons, tabs or spaces; remarks before the column names are skipped."""
+    opener = gzip.open if path.suffix == ".gz" else open
     try:
         if path.suffix == ".gz":
             _refuse_inflated(path)
-        with _open(path) as stream:
+        with opener(path, "rb") as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as stream:
             # Of a line without an end a part is a row, of another length than all others.
             yield _table(path, iter(partial(stream.readline, _LONGEST_LINE), ""))
     except (OSError, EOFError, zlib.error) as error:
@@ -103,11 +104,11 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
     if not header.strip():
         raise InputError(f"{path}: is empty; a log starts with a line of column names")
-    if remark and all(_is_number(field) or _is_time(field) for field in _fields(header)):
+    if remark and all(map(_kind, _fields(header))):
         # What writes numbers only has its column names in the last remark.
         header, lines, line = remark, chain([header], lines), line - 1
     names = [name.strip() for name in _fields(header)]
-    if len(names) > 1 and all(name and _is_number(name) for name in names):
+    if len(names) > 1 and all(name and _kind(name) == "number" for name in names):
         raise InputError(
             f"{path}: has no line of column names, line {line} holds {len(names)} numbers: put a line above it that"
             " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
@@ -120,7 +121,8 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     first = _fields(begun[-1]) if begun else []
     rows = _rows(chain(begun, lines), _delimiter(begun[-1] if begun else header))
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
-        rows, first = map(_with_points, rows), _with_points(first)
+        rows = ([field.replace(",", ".") for field in fields] for fields in rows)
+        first = [field.replace(",", ".") for field in first]
     return _Table(names, first, rows, line + 1)
 
 
@@ -137,10 +139,6 @@ def _fields(line: str) -> list[str]:
     return next(_rows(iter([line]), _delimiter(line)), [])
 
 
-def _with_points(fields: list[str]) -> list[str]:
-    return [field.replace(",", ".") for field in fields]
-
-
 def _refuse_inflated(path: Path) -> None:
     """Refuse a compressed log of more text than its numbers may make up."""
     # A number and what parts it from the next take two letters at least, and eight bytes.
@@ -152,33 +150,21 @@ def _refuse_inflated(path: Path) -> None:
                 raise InputError(f"{path}: holds more than {most / 1e6:.3g} MB of text: damaged, or not a log")
 
 
-@contextmanager
-def _open(path: Path) -> Iterator[TextIO]:
-    opener = gzip.open if path.suffix == ".gz" else open
-    with opener(path, "rb") as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as text:
-        yield text
-
-
 def row_lines(path: Path) -> list[int]:
     """List the line number, from 1, of each row of values in a CSV; empty lines hold none."""
     with _opened(path) as table:
         return [number for number, row in enumerate(table.rows, start=table.line) if row]
 
 
-def _is_number(text: str) -> bool:
-    try:
-        _plain_numbers([text.strip() or "nan"])
-    except ValueError:
-        return False
-    return True
-
-
-def _is_time(text: str) -> bool:
-    try:
-        _seconds(text.strip())
-    except ValueError:
-        return False
-    return True
+def _kind(text: str) -> str:
+    """Tell a number, or nothing, from a time; empty for what is neither."""
+    for kind, read in (("number", lambda own: _plain_numbers([own or "nan"])), ("time", _seconds)):
+        try:
+            read(text.strip())
+        except ValueError:
+            continue
+        return kind
+    return ""
 
 
 def _seconds(text: str) -> float:

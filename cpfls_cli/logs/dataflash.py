@@ -2,10 +2,9 @@
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,19 +48,14 @@ _SCALED = "cCeEL"
 _UNITS = {"m/s/s": "m/s^2", "degheading": "deg", "RPM": "rpm", "PWM": "us"}
 
 
-@dataclass(frozen=True)
-class _Kind:
+class _Kind(NamedTuple):
     """One kind of message: its name, the letters of its fields' types, and where the messages begin."""
 
     name: str
     letters: dict[str, str]
     record: np.dtype
-    begins: list[int] = field(default_factory=list)
+    begins: list[int]
     text: bool = False
-
-    def factor(self, field_of: str) -> float:
-        """Give the factor that the letter of a field implies; text has it in its numbers."""
-        return 1.0 if self.text else _NUMBERS[self.letters[field_of]][1]
 
     @property
     def stamp(self) -> str:
@@ -69,10 +63,6 @@ class _Kind:
         # Beside a week, TimeMS is that of GPS, and the log's own clock is T.
         names = ("T",) if {"Week", "TimeMS", "T"} <= self.letters.keys() else ("TimeUS", "TimeMS")
         return next((name for name in names if self.letters.get(name) in ("I", "Q")), "")
-
-    def stamps(self, samples: np.ndarray) -> Array:
-        """Give the stamps of messages, s."""
-        return seconds(samples[self.stamp], 0, _STAMPS[self.stamp])
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -115,20 +105,18 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
         parameters.setdefault(_text(name), float(value))
-    broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
-    begins = {"": float(origin)}
+    broken = f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used"
     texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
     said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
-    lost_bytes = broken if lost else ()
-    return LogContents(
-        topics, units, parameters, _system(tables), lost_bytes, _flown_at(topics.get("GPS", {})), begins, tuple(said)
-    )
+    begins, flown_at = {"": float(origin)}, _flown_at(topics.get("GPS", {}))
+    warnings = (broken,) if lost else ()
+    return LogContents(topics, units, parameters, _system(tables), warnings, flown_at, begins, tuple(said))
 
 
 def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:
     """Give the stamps of messages by kind, s; events without any have those of what was written before them."""
     held = [kind for kind in kinds.values() if kind.name in tables]
-    stamps = {kind.name: kind.stamps(tables[kind.name]) for kind in held if kind.stamp}
+    stamps = {kind.name: seconds(tables[kind.name][kind.stamp], 0, _STAMPS[kind.stamp]) for kind in held if kind.stamp}
     late = [kind for kind in held if not kind.stamp and kind.name in _EVENTS]
     if late and stamps:
         places = np.concatenate([np.asarray(kind.begins) for kind in held if kind.stamp])
@@ -141,7 +129,7 @@ def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) ->
 
 def _find_messages(content: bytes, place: int) -> tuple[dict[int, _Kind], int]:
     """Note where each message begins, by kind, and count the bytes between messages that are none."""
-    kinds = {_OF_FORMATS: _Kind("FMT", {}, _FORMAT)}
+    kinds = {_OF_FORMATS: _Kind("FMT", {}, _FORMAT, [])}
     lost = place
     while 0 <= place < len(content) - 2:
         kind = kinds.get(content[place + 2]) if content.startswith(_HEAD, place) else None
@@ -167,9 +155,8 @@ def _find_messages(content: bytes, place: int) -> tuple[dict[int, _Kind], int]:
 
 def _described(name: str, letters: str, names: list[str], *, text: bool) -> _Kind | None:
     """Make a kind of message of its description; None of one that contradicts itself."""
-    if len(names) != len(letters) or len({"", _BEFORE, *names}) != len(names) + 2:
-        return None
-    if not set(letters) <= {*_NUMBERS, *_OTHERS}:
+    known = {*letters} <= {*_NUMBERS, *_OTHERS}
+    if not known or len(names) != len(letters) or len({"", _BEFORE, *names}) != len(names) + 2:
         return None
     if text:
         # A mode is written as its name.
@@ -178,7 +165,7 @@ def _described(name: str, letters: str, names: list[str], *, text: bool) -> _Kin
     else:
         places = [f"<{_NUMBERS[letter][0] if letter in _NUMBERS else _OTHERS[letter]}" for letter in letters]
         fields = [(_BEFORE, "V3"), *zip(names, places, strict=True)]
-    return _Kind(name, dict(zip(names, letters, strict=True)), np.dtype(fields), text=text)
+    return _Kind(name, dict(zip(names, letters, strict=True)), np.dtype(fields), [], text)
 
 
 def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray], int]:
@@ -229,7 +216,7 @@ def _topics(
             {
                 STAMP: np.array(stamps[rows]),
                 **{
-                    each: kind.factor(each) * numbers(own[each])
+                    each: (1.0 if kind.text else _NUMBERS[letter][1]) * numbers(own[each])
                     for each, letter in kind.letters.items()
                     if letter in _NUMBERS and each != kind.stamp and samples.dtype[each].kind != "S"
                 },

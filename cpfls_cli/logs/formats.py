@@ -12,7 +12,7 @@ from importlib import import_module
 from math import nan
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from cpfls_cli.errors import InputError, about, install_command
 
@@ -73,24 +73,23 @@ class LogColumns:
     stamped_hz: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class LogFormat:
+class LogFormat(NamedTuple):
     """One format of flight logs."""
 
     suffix: str  # End of a file's name, in lower case; empty where such files have none.
     name: str
     content: str  # What a file that begins in this way holds, in messages.
-    magic: bytes = b""  # First bytes of every such file; none for text, which begins with a line of column names.
-    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
-    shared: bool = False
+    magic: bytes  # First bytes of every such file; none for text, which begins with a line of column names.
     reader: str  # Module with ``contents(path, wanted)``, which returns `LogContents`.
     # Modules of the optional package that the reader needs, and the extra of this program that installs it.
     packages: tuple[str, ...] = ()
     extra: str = ""
+    # Whether artifacts of this program end so too; ``is_log(path)`` of the reader distinguishes them.
+    shared: bool = False
 
     @property
     def by_content(self) -> bool:
-        """Whether a file is told by its first bytes, whatever its name ends in; what a gzip holds they do not say."""
+        """Whether a file is known by its first bytes, whatever its name ends in; what a gzip holds they do not say."""
         return bool(self.magic) and self.magic != GZIP_MAGIC
 
     def begins(self, line: bytes) -> bool:
@@ -100,28 +99,24 @@ class LogFormat:
 
 # A count of names, and the first of them with the letter of its type.
 _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
-_PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
-_ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
-_OURS_TOO = {"shared": True}
-_TABLE: tuple[tuple[str, str, str, bytes, str, dict[str, Any]], ...] = (
-    (".csv", "CSV", "CSV", b"", "csv_log", {}),
-    (".csv.gz", "CSV", "gzip-compressed data", GZIP_MAGIC, "csv_log", {}),
-    (".parquet", "Parquet", "Parquet", b"PAR1", "parquet_log", _PYARROW),
-    (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", {}),
-    (".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, "dataflash", {}),
-    (".log", "ArduPilot DataFlash", "a DataFlash log in text", DATAFLASH_TEXT_MAGIC, "dataflash", {}),
-    (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
-    (".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
-    ("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, "crazyflie_usd", {}),
-    (".db3", "ROS 2 bag", "SQLite", b"SQLite format 3\x00", "rosbag", _ROSBAGS),
-    (".mcap", "ROS 2 bag", "MCAP", b"\x89MCAP", "rosbag", _ROSBAGS),
-    (".h5", "HDF5", "HDF5", HDF5_MAGIC, "matrices", _OURS_TOO),
-    (".hdf5", "HDF5", "HDF5", HDF5_MAGIC, "matrices", _OURS_TOO),
-    (".mat", "MATLAB", "MATLAB", b"MATLAB ", "matrices", {}),
-)
-LOG_FORMATS = tuple(
-    LogFormat(suffix=suffix, name=name, content=content, magic=magic, reader=f"cpfls_cli.logs.{reader}", **others)
-    for suffix, name, content, magic, reader, others in _TABLE
+_READERS: Final = "cpfls_cli.logs."
+_PYARROW: Final = (("pyarrow", "pyarrow.parquet"), "parquet")
+_ROSBAGS: Final = (("rosbags",), "rosbag")
+LOG_FORMATS = (
+    LogFormat(".csv", "CSV", "CSV", b"", f"{_READERS}csv_log"),
+    LogFormat(".csv.gz", "CSV", "gzip-compressed data", GZIP_MAGIC, f"{_READERS}csv_log"),
+    LogFormat(".parquet", "Parquet", "Parquet", b"PAR1", f"{_READERS}parquet_log", *_PYARROW),
+    LogFormat(".ulg", "ULog", "ULog", ULOG_MAGIC, f"{_READERS}ulog"),
+    LogFormat(".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, f"{_READERS}dataflash"),
+    LogFormat(".log", "ArduPilot DataFlash", "a DataFlash log in text", DATAFLASH_TEXT_MAGIC, f"{_READERS}dataflash"),
+    LogFormat(".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
+    LogFormat(".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
+    LogFormat("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, f"{_READERS}crazyflie_usd"),
+    LogFormat(".db3", "ROS 2 bag", "SQLite", b"SQLite format 3\x00", f"{_READERS}rosbag", *_ROSBAGS),
+    LogFormat(".mcap", "ROS 2 bag", "MCAP", b"\x89MCAP", f"{_READERS}rosbag", *_ROSBAGS),
+    LogFormat(".h5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
+    LogFormat(".hdf5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
+    LogFormat(".mat", "MATLAB", "MATLAB", b"MATLAB ", f"{_READERS}matrices"),
 )
 """The formats in the order in which messages list them."""
 
@@ -157,10 +152,10 @@ def log_flights(path: Path) -> list[LogContents]:
 
 def _reader(path: Path) -> ModuleType:
     """Load what reads a log, and refuse what none does."""
-    form = _format_of(path)
-    if _first_line(path).startswith(_ENCRYPTED_MAGIC):
+    form, first = _format_of(path), _first_line(path)
+    if first.startswith(_ENCRYPTED_MAGIC):
         raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
-    if form is None and _OLDER_USD.match(_first_line(path)):
+    if form is None and _OLDER_USD.match(first):
         raise InputError(
             f"{path}: a log of a Crazyflie's uSD card in its older format, which is not read; make a CSV of it"
             " with the script of that firmware, and of a quaternion in one number four columns"
@@ -172,8 +167,16 @@ def _reader(path: Path) -> ModuleType:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
         raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must hold one of {free}")
-    _refuse_other_content(path, form)
-    _require_packages(path, form)
+    alike = [other for other in LOG_FORMATS if other.begins(first)]
+    if alike and form not in alike:
+        remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"
+        raise InputError(f"{path}: seems to hold {alike[0].content}, unlike the ending of its name; {remedy}")
+    for module in form.packages:
+        try:
+            import_module(module)
+        except ImportError:
+            package = f"needs the package {module.partition('.')[0]}; {install_command(form.extra)}"
+            raise InputError(f"{path}: reading {path.suffix} {package}") from None
     return import_module(form.reader)
 
 
@@ -202,16 +205,21 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
 def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     """Say what a file is that no reader reads, and how to get a log from it; None for a log, and for what is unknown.
 
-    Parameters
-    ----------
-    form : LogFormat or None
-        That its name or its content says.
+    The format is what its name or its content says.
     """
     first = _first_line(path)
     known = any(other.magic and other.begins(first) for other in LOG_FORMATS)
     if form is not None and (known or not (first or form.magic)):
         return None
-    return named_foreign(path)
+    try:
+        with path.open("rb") as stream:
+            first = stream.read(_FIRST_BYTES)
+    except OSError:
+        return None
+    if not first:
+        return "an empty file: nothing was logged, or the copy failed"
+    found = _by_bytes(first, path.suffix.lower())
+    return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
 
 
 def _format_of(path: Path) -> LogFormat | None:
@@ -231,15 +239,6 @@ def _first_line(path: Path) -> bytes:
         return b""
 
 
-def _refuse_other_content(path: Path, form: LogFormat) -> None:
-    """Refuse a log that begins as one of another format."""
-    first = _first_line(path)
-    alike = [other for other in LOG_FORMATS if other.begins(first)]
-    if alike and form not in alike:
-        remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"
-        raise InputError(f"{path}: seems to hold {alike[0].content}, unlike the ending of its name; {remedy}")
-
-
 def _is_header(line: bytes) -> bool:
     """Tell whether a line is text with a separator of columns in it."""
     text = line.rstrip(b"\r\n")
@@ -253,28 +252,7 @@ def _is_header(line: bytes) -> bool:
     )
 
 
-def _require_packages(path: Path, form: LogFormat) -> None:
-    """Refuse a log whose reader needs a package that is not installed."""
-    for module in form.packages:
-        try:
-            import_module(module)
-        except ImportError:
-            package = module.partition(".")[0]
-            raise InputError(
-                f"{path}: reading {path.suffix} needs the package {package}; {install_command(form.extra)}"
-            ) from None
-
-
 _FIRST_BYTES = 1024
-
-
-class _Foreign(NamedTuple):
-    """A kind of file: what it begins with, at which place, what it is called, and the way to a log."""
-
-    begins: bytes
-    what: str
-    way: str
-    at: int = 0
 
 
 _UNPACK: Final = "unpack it first, and give the log inside"
@@ -288,23 +266,24 @@ _SLOW: Final = (
 _CONVERT_SDLOG2: Final = (
     "convert it to CSV with sdlog2_dump.py of that firmware, or update the firmware, which then writes .ulg"
 )
+# What a file begins with, at which place, what it is called, and the way to a log.
 _FOREIGN: Final = (
-    _Foreign(b"#ROSBAG V", "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
-    _Foreign(b"PK\x03\x04", "a zip archive", _UNPACK),
-    _Foreign(b"\x1f\x8b", "data compressed by gzip", _UNPACK),
-    _Foreign(b"BZh", "data compressed by bzip2", _UNPACK),
-    _Foreign(b"\xfd7zXZ\x00", "data compressed by xz", _UNPACK),
-    _Foreign(b"7z\xbc\xaf\x27\x1c", "a 7z archive", _UNPACK),
-    _Foreign(b"Rar!", "a rar archive", _UNPACK),
-    _Foreign(b"\x28\xb5\x2f\xfd", "data compressed by zstd", _UNPACK),
-    _Foreign(b"ustar", "a tar archive", _UNPACK, 257),
-    _Foreign(b"\x93NUMPY", "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
-    _Foreign(b"version https://git-lfs", "a pointer of Git LFS", "fetch it with `git lfs pull`"),
-    _Foreign(b"BUILD", "a .DAT of DJI", "convert it to CSV with DatCon or its like", 16),
-    _Foreign(b"\xa3\x95\x80", "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
-    _Foreign(b"%PDF", "a PDF", "give the log that it shows"),
-    _Foreign(b"\x89PNG", "a picture", "give the log that it shows"),
-    _Foreign(b"\xff\xd8\xff", "a picture", "give the log that it shows"),
+    (b"#ROSBAG V", 0, "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
+    (b"PK\x03\x04", 0, "a zip archive", _UNPACK),
+    (b"\x1f\x8b", 0, "data compressed by gzip", _UNPACK),
+    (b"BZh", 0, "data compressed by bzip2", _UNPACK),
+    (b"\xfd7zXZ\x00", 0, "data compressed by xz", _UNPACK),
+    (b"7z\xbc\xaf\x27\x1c", 0, "a 7z archive", _UNPACK),
+    (b"Rar!", 0, "a rar archive", _UNPACK),
+    (b"\x28\xb5\x2f\xfd", 0, "data compressed by zstd", _UNPACK),
+    (b"ustar", 257, "a tar archive", _UNPACK),
+    (b"\x93NUMPY", 0, "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
+    (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
+    (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
+    (b"\xa3\x95\x80", 0, "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
+    (b"%PDF", 0, "a PDF", "give the log that it shows"),
+    (b"\x89PNG", 0, "a picture", "give the log that it shows"),
+    (b"\xff\xd8\xff", 0, "a picture", "give the log that it shows"),
 )
 _TRACK: Final = "a track of positions holds no motion of the body; give the log of the autopilot"
 _AS_CSV: Final = "write its numbers as CSV, with a line of column names"
@@ -325,27 +304,14 @@ _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
 _MAVLINK, _STAMP_BYTES, _STAMPS_US = b"\xfe\xfd", 8, (10**15, 4 * 10**15)
 
 
-def named_foreign(path: Path) -> str | None:
-    """Say what a file is that is no log, and how to get a log from it; None for one that is not known."""
-    try:
-        with path.open("rb") as stream:
-            first = stream.read(_FIRST_BYTES)
-    except OSError:
-        return None
-    if not first:
-        return "an empty file: nothing was logged, or the copy failed"
-    found = _by_bytes(first, path.suffix.lower())
-    return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
-
-
 def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     if first.startswith(b"PK\x03\x04") and (suffix in (".xlsx", ".ods") or any(own in first for own in _SPREADSHEET)):
         return "a spreadsheet", "save its table as CSV, with a line of column names"
     if first.startswith(b"PK\x03\x04") and _NPY in first:
         return "arrays of NumPy", "write them as CSV, HDF5 or .mat, with a name for each column"
-    known = next((own for own in _FOREIGN if first.startswith(own.begins, own.at)), None)
+    known = next(((what, way) for begins, at, what, way in _FOREIGN if first.startswith(begins, at)), None)
     if known is not None:
-        return known.what, known.way
+        return known
     stamped = _STAMPS_US[0] < int.from_bytes(first[:_STAMP_BYTES], "big") < _STAMPS_US[1]
     frame = first[_STAMP_BYTES : _STAMP_BYTES + 1] if stamped else first[:1] if suffix in _TELEMETRY else b""
     if frame and frame in _MAVLINK:

@@ -76,15 +76,13 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
     if not topics:
         listed = f": no definition fits {', '.join(unknown)}" if unknown else ""
         raise InputError(f"{path}: a ROS 2 bag without readable messages{listed}")
-    warnings = (
-        f"topics left out because the file has no matching definition of their messages: {', '.join(unknown)}",
-        f"these topics do not use the recorder's clock and are shifted by the median offset: {', '.join(shifted)}",
+    causes = (
+        ("topics left out because the file has no matching definition of their messages", unknown),
+        ("these topics do not use the recorder's clock and are shifted by the median offset", shifted),
     )
-    present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
+    warnings = tuple(f"{words}: {', '.join(own)}" for words, own in causes if own)
     begins = reader.start_time / _NANOSECOND
-    return LogContents(
-        topics, units, system="ROS 2", warnings=tuple(present), flown_at=date(begins), begins={"": begins}
-    )
+    return LogContents(topics, units, system="ROS 2", warnings=warnings, flown_at=date(begins), begins={"": begins})
 
 
 def _columns_of_topic(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -41,24 +41,17 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     if not topics:
         raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
     begins = {"": origin / _PER_SECOND}
+    # Of a version that is no release too; old logs do not state it as a number.
+    version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
+    release = ".".join(map(str, version[:3])) if version else ""
+    system = f"{log.msg_info_dict.get('sys_name', '')} {release}".strip()
     # As the log begins; in a broken one some parameters are no numbers.
     known = log.initial_parameters.items()
     parameters: dict[str, float | str] = {name: float(own) for name, own in known if isinstance(own, int | float)}
-    said = tuple(
-        (
-            float(seconds(np.array([each.timestamp], dtype=np.uint64), origin, _PER_SECOND)[0]),
-            each.log_level_str(),
-            plain(each.message),
-        )
-        for each in log.logged_messages
-    )
-    return LogContents(
-        topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics), begins, said
-    )
-
-
-def _is_stamp(field: str, values: Any) -> bool:
-    return field.startswith(STAMP) and values.dtype.kind in "iu"
+    stamps = np.array([each.timestamp for each in log.logged_messages], dtype=np.uint64)
+    texts = ((each.log_level_str(), plain(each.message)) for each in log.logged_messages)
+    said = tuple((at, *own) for at, own in zip(seconds(stamps, origin, _PER_SECOND).tolist(), texts, strict=True))
+    return LogContents(topics, {}, parameters, system, _warn_of_file(log, origin), _flown_at(topics), begins, said)
 
 
 def _parsed(path: Path) -> Any:
@@ -102,13 +95,6 @@ def _refuse_endless(path: Path, stream: BinaryIO) -> None:
             raise InputError(
                 f"{path}: a broken ULog file: its message '{name}' would take more than {_LONGEST_MESSAGE} bytes"
             )
-
-
-def _system(log: Any) -> str:
-    name = str(log.msg_info_dict.get("sys_name", ""))
-    # Of a version that is no release too; old logs do not state it as a number.
-    version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
-    return " ".join([name, ".".join(str(part) for part in version[:3])] if version else [name]).strip()
 
 
 def _flown_at(topics: Mapping[str, Mapping[str, Array]]) -> float:

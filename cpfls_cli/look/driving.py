@@ -14,6 +14,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess
+from cpfls_cli.flightlog.topics import REBUILT
 from cpfls_cli.look.columns import FRD, LookedLog, along_each
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.units import SPEED_UNITS
@@ -21,9 +22,6 @@ from cpfls_cli.units import SPEED_UNITS
 _OF_OUTPUT, _FAST_HZ, _SLOWEST_HZ = 0.7, 40.0, 4.0
 """Times as fast as the output of the rate loop that rotors have to be logged to be taken before it, and Hz; and Hz
 below which a command says nothing of motion."""
-
-REBUILT: Final = "rebuilt"
-"""Topic of commands that are rebuilt from what an autopilot allocates."""
 
 _FOLLOWS: Final = 0.6
 """Correlation from which on one signal is another one's, but for its sign and size."""

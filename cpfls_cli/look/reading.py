@@ -29,9 +29,9 @@ from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, forward_flight, log_faster
-from cpfls_cli.flightlog.topics import Topics, column_names
+from cpfls_cli.flightlog.topics import REBUILT, Topics, column_names
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
-from cpfls_cli.look.driving import REBUILT, Rotors, as_shares, find_driving
+from cpfls_cli.look.driving import Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.units import SPEED_UNITS, STANDARD_GRAVITY, known_unit
 

@@ -75,9 +75,7 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
 
 @pytest.mark.usefixtures("fake_format")
 def test_a_package_of_a_new_format_that_is_missing_is_named(refuse, log_study, tmp_path, monkeypatch):
-    row = formats.LogFormat(
-        suffix=".fake", name="Fake", content="fakes", reader="fake_reader", packages=("no_such.part",), extra="fake"
-    )
+    row = formats.LogFormat(".fake", "Fake", "fakes", b"", "fake_reader", ("no_such.part",), "fake")
     monkeypatch.setattr(formats, "LOG_FORMATS", (row,))
     log = write(tmp_path / "log.fake")
     (line,) = refuse("import", log_study, log, "-o", tmp_path / "flight.h5")

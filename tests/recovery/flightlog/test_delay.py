@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.flightlog.alignment import estimate_delay
+from cpfls_cli.flightlog.importing import estimate_delay
 
 INERTIA = np.array([[0.012, 0.001, -0.0005], [0.001, 0.015, 0.0008], [-0.0005, 0.0008, 0.024]])
 RATE_HZ = 250

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog.alignment import apply_rotor_lag
+from cpfls_cli.flightlog.importing import apply_rotor_lag
 from cpfls_cli.flightlog.results import LogSignals
 
 TAU, PERIOD = 0.07, 0.004
