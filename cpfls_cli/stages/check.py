@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cpfls_cli.arguments import FileArgument
-from cpfls_cli.flights.models import any_model, is_model
+from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.pages.trust import stopped_words
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
-from cpfls_cli.store import findings_in
+from cpfls_cli.store import findings_in, read
 
 
 @result
@@ -26,7 +26,8 @@ def check(run: Run, file: FileArgument) -> Checked:
     """Find what is wrong in a file."""
     kind = kind_of(file)
     findings = findings_in(file, kind)
-    stopped = "" if findings or not is_model(file) else stopped_words(any_model(file))
+    is_model = issubclass(kind, AnyModel) and not findings
+    stopped = stopped_words(read(file, kind)[0]) if is_model else ""
     run.also |= {"stopped": stopped} if stopped else {}
     run.exit_code = int(bool(findings))
     run.next += [] if findings else [("cpfls", "info", file)]
