@@ -27,7 +27,7 @@ from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
-from cpfls_cli.pages.repeats import again_drawn
+from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
@@ -169,7 +169,7 @@ def _signal_words(signal: str) -> str:
 
 
 FIGURES = {
-    "comes-again": again_drawn(lambda r: (r.comes_again, None)),
+    "repeatable": repeatability_drawn(lambda r: (r.repeatability, None)),
     "gap-over-time": Drawn(
         "Gap of each channel over time in noise floors",
         lambda r: 0.7 + 1.1 * len(r.sizes.known),
