@@ -85,7 +85,7 @@ def _cut(group: str) -> float:
 
 
 def _shares(flights: list[FlightNumbers]) -> np.ndarray:
-    loads = np.array([[value for name, value in each.values.items() if name.startswith("load ")] for each in flights])
+    loads = np.array([[value for name, value in each.values.items() if name.startswith("thrust ")] for each in flights])
     return np.exp(loads) / np.exp(loads).sum(axis=1, keepdims=True)
 
 

@@ -124,11 +124,11 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
         moved = size * kind.arm * side
         return Altered(body._replace(centre=body.centre + moved), {name: tuple(moved.tolist())})
     if name == "inertia about x":
-        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), {"follow roll": (-np.log1p(size),)})
+        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), {"gain roll": (-np.log1p(size),)})
     if name == "motor lag":
-        return Altered(body._replace(lag=body.lag + size), {"late": (size,), "answer": (size,)})
+        return Altered(body._replace(lag=body.lag + size), {"delay": (size,), "lag": (size,)})
     if name == "delay":
-        return Altered(body._replace(late=body.late + size), {"late": (size,), "answer": (size,)})
+        return Altered(body._replace(late=body.late + size), {"delay": (size,), "lag": (size,)})
     if name == "drag of the body":
         return Altered(body._replace(air=body.air * (1 + size)), {})
     if name == "gyroscope bias":

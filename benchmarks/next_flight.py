@@ -34,7 +34,7 @@ from cpfls_cli.gap.balance.weak_flight import Preparation
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
-from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, usual
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, formulas_off
@@ -210,7 +210,7 @@ def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, fl
     weak = prepared.repaired(training)
     floor = best_floor(opened.diagnosis.hypothesis)
     off = formulas_off(opened.diagnosis.hypothesis, floor)
-    questions = questions_left(diagnosis.effects, diagnosis.alternatives, (), weak, floor, SETTINGS)
+    questions = open_questions(diagnosis.effects, diagnosis.alternatives, (), weak, floor, SETTINGS)
     asked = goal(questions, weak, opened.room, Logging(LOGGED, False, floor, SETTINGS, None, off))
     found = next_flight(asked, rng)
     paths: dict[str, HarmonicPath] = {

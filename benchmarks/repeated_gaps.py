@@ -24,7 +24,7 @@ import numpy as np
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -51,7 +51,7 @@ def main(draws: int) -> None:
     gusty, calm, alone = ([one[name] for one in found] for name in SETS)
     shares, inside, passed = [], [], []
     for there, truth in zip(gusty, calm, strict=True):
-        expected = truth.again / (truth.again + there.total - there.again)
+        expected = truth.repeatable / (truth.repeatable + there.total - there.repeatable)
         inside.append(np.abs(there.share - expected) < there.share_half)
         off = np.abs(there.explained - truth.explained) < half_width(there.explained_error, there.blocks)
         passed.append(off[MODELLED])
@@ -68,10 +68,12 @@ def main(draws: int) -> None:
     print(f"\nshares within their intervals: {np.mean(inside):.3f} of {np.size(inside)}")
     print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
     print(f"gusts alone: {sum(one.sure.sum() for one in alone)} of {sum(one.sure.size for one in alone)} come again")
-    print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
+    print(
+        "the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.non_repeatable[c] for one in alone])) for c in range(6))
+    )
 
 
-def split(flown: Sequence[PlaybackFlight]) -> ComesAgain:
+def split(flown: Sequence[PlaybackFlight]) -> Repeatability:
     """Split what a model without drag and damping leaves of flights."""
     recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)

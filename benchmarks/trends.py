@@ -31,7 +31,7 @@ from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
 SCATTERS = (0.5, 1.0, 1.5, 2.0)
 FLIGHTS = (10, 30)
 STEPS = (2.0, 3.0, 4.0, 6.0)
-MOVED = NAMES.index("late roll")
+MOVED = NAMES.index("delay roll")
 
 
 def found(count: int, rng: np.random.Generator, scatter: float = 1.0, step: float = 0.0) -> tuple[float, list[int]]:

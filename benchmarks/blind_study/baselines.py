@@ -80,7 +80,7 @@ def _gains(flights, chosen, effects, settings):
     tried = [c for c in candidates_of([e for e in effects if e.name not in names]) if hypothesis.can(c)]
     arranged = scoring_matrix(hypothesis, tried, floor)
     normal = folds(arranged.matrix, hypothesis.residual / floor, block_index(hypothesis, settings), arranged.prior)
-    scored, _ = score(arranged, normal.beside(arranged.base), hypothesis)
+    scored, _ = score(arranged, normal.conditional_on(arranged.base), hypothesis)
     # The score is asked only which columns the bounds leave.
     admitted = [each for each in scored if np.isfinite(each.gain)]
     matrix = arranged.matrix.reshape(-1, arranged.matrix.shape[2])

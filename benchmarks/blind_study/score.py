@@ -256,7 +256,7 @@ def _nothing_named(key, said):
 def _with_rivals(said, names, truth):
     """Tell whether a listed rival, with what it needs beside it, makes the answer right in the place of a name."""
     return any(
-        names - {rival["instead_of"]} | {rival["name"], rival.get("beside") or rival["name"]} == truth
+        names - {rival["instead_of"]} | {rival["name"], rival.get("jointly_with") or rival["name"]} == truth
         for rival in said["alternatives"]
     )
 

@@ -69,7 +69,7 @@ def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
     assert size["low"] < 0.2 < size["high"]
     assert told["since"] == "weak1.csv"
     # Of a cross each rotor carries a quarter alone.
-    load = next(each for each in told["numbers"] if each["name"] == "load M3")
+    load = next(each for each in told["numbers"] if each["name"] == "thrust M3")
     assert np.mean(load["today"]) - load["reference"] == pytest.approx(-np.log(0.8), abs=0.03)
 
 

@@ -109,7 +109,7 @@ def test_what_the_folder_holds(cpfls, told):
     rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
     assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 14)]
     assert [row["part"] for row in rows] == ["1"] * 10 + ["2"] * 3
-    assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
+    assert float(rows[-1]["thrust M3"]) - float(rows[0]["thrust M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
     summary = json.loads((told.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
     cpfls.done("check", told.out / "trend.h5")

@@ -121,7 +121,7 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
     assert page.summary["missing"] == ["disagreement", "extended"]
     assert "too short to simulate" in page.text
     assert "cpfls compare CONFIG FLIGHT" in page.text
-    assert "force along" not in page.text[: page.text.index("effects and their numbers")]
+    assert "force along" not in page.text[: page.text.index("effects and their coefficients")]
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -1,7 +1,5 @@
 """Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -12,7 +10,7 @@ from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, mean_error
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
+from cpfls_cli.gap.balance.balance_system import System, residual_along, system, window_noise
 from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
@@ -25,14 +23,13 @@ from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_USUAL_OF_BOUND = 0.2
-"""A coefficient that is large but not unheard of, as a share of its bound."""
+_USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
 
 
-def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
-    """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
+def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
+    """List the channels with an unexplained residual: size, dependence on signals, narrow band, energy."""
     hypothesis, settings, block = found.hypothesis, found.settings, found.block
-    residual = hypothesis.left(found.estimates.linear)
+    residual = hypothesis.residual_at(found.estimates.linear)
     noise = window_noise(hypothesis, residual, found.floor)
     sizes = size_in_floors(residual, noise)
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
@@ -40,14 +37,14 @@ def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ..
         residual / noise, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     # The largest of each channel.
-    told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
+    dependent = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
     band = _band(found, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = []
     for place, (channel, size, energy) in enumerate(zip(CHANNELS, sizes.tolist(), directions, strict=True)):
-        follows, rings = told.get(channel), band if band and band.channel == channel else None
+        follows, rings = dependent.get(channel), band if band and band.channel == channel else None
         if size > CLEAR or (size**2 > hypothesis.most_noise[place] and (follows or rings)):
             signal, share = (follows.signal, follows.r2) if follows else (None, 0.0)
             frequency = None
@@ -62,14 +59,16 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     hypothesis, settings = found.hypothesis, found.settings
     windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, found.estimates.linear)))
+        rows.append(
+            replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear))
+        )
         rates.append(windows.average(flight.signals.body_rate))
     band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
     return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
-    """Tell of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
+    """Say of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
 
     By the sign of the mean power ``M omega`` against its scatter over blocks of windows.
     """
@@ -84,13 +83,13 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
-def beside_the_unnamed(
+def with_unnamed(
     found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
-    formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
+    formula that is right in slow flight bends in fast flight: where a bend shows, its number changes with it.
 
     `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
     are with the unnamed effects, whose names come too, and without them.
@@ -162,8 +161,7 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
-_RADIUS = "rotor radius"
-"""A signal that comes from the config, not from a log."""
+_RADIUS = "rotor radius"  # A signal that comes from the config, not from a log.
 
 
 def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:
@@ -179,8 +177,8 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
                 logged = [name for name in to_log if name != _RADIUS]
                 asked = [f"log {' and '.join(logged)}"] if logged else []
                 asked += ["state rotors.radius_m in the config"] if _RADIUS in to_log else []
-                told = f"{' and '.join(asked)}, without which it was not tried"
-                rivals.append(Alternative(name, effect.name, np.nan, told))
+                separated_by = f"{' and '.join(asked)}, without which it was not tried"
+                rivals.append(Alternative(name, effect.name, np.nan, separated_by))
     return tuple(rivals)
 
 

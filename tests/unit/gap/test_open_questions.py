@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.leftover import energy_directions, not_excited
+from cpfls_cli.gap.naming.open_questions import energy_directions, not_excited
 from tests.builders.gap_flights import candidate, fly, weak
 
 FLOOR = np.full(6, 0.05)

@@ -7,19 +7,15 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
-from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.diagnose import _Named
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
-from cpfls_cli.gap.naming.causes import JudgedEffect
+from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects
 from cpfls_cli.gap.naming.estimate import NamedFit
-from cpfls_cli.gap.residual.air import _growing, _gusty
+from cpfls_cli.gap.residual.air import _growing
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import held as stays
 from cpfls_cli.playback.newness import PER_WINDOW, news
-from tests.builders.gap_artifacts import named_effect
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
@@ -73,7 +69,7 @@ def told(true, found, reach, rng):
     left = gust[..., 0] + moved @ (np.array(true) - found)
     rows = np.concatenate([moved, left[..., None]], axis=2)
     known = np.concatenate([known, np.zeros_like(gust)], axis=2)
-    return _Told(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
+    return _Source(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
 
 
 @pytest.mark.parametrize(
@@ -94,34 +90,8 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
         rng = np.random.default_rng(seed)
         sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
-        stand.append([each.effect.name for each, _ in that_stand(fit, None)])
+        stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
     assert stand.count(names) >= 17
-
-
-def shares(*foretold, scatter=0.0):
-    """Shares that are foretold of six channels, errors of one channel apart from those of others."""
-    without = np.tile(foretold, (18, 1))
-    for channel, (each, own) in enumerate(zip(foretold, np.broadcast_to(scatter, 6), strict=True)):
-        without[3 * channel : 3 * channel + 3, channel] = each + own * np.array([-1.0, 1.0, 0.0])
-    return SimpleNamespace(
-        foretold=np.array(foretold), foretold_without=without, foretold_error=jackknife_error(without)
-    )
-
-
-def test_what_is_sure_of_all_torques_is_believed_of_each():
-    found = shares(0.0, 0.1, 0.2, 0.0, 0.4, 0.4, scatter=0.1)
-    assert not (found.foretold + 2 * found.foretold_error < 1 / 3)[2]
-    assert _gusty(found, np.full(6, 9.0), 1 / 3).tolist() == [True, True, True, True, False, False]
-    # A channel that shows no more than its sensors speaks for no other.
-    assert not _gusty(found, np.array([1.0, 1.0, 9.0, 1.0, 1.0, 1.0]), 1 / 3)[2]
-
-
-def test_a_large_slow_gust_of_which_little_is_known_is_believed_beside_those_that_are():
-    found = shares(0.0, 0.05, 0.0, 0.0, 0.4, 0.4, scatter=np.array([0.01, 0.2, 0.01, 0.01, 0.01, 0.01]))
-    assert not (found.foretold + 2 * found.foretold_error < 1 / 3)[1]
-    assert _gusty(found, np.array([2.0, 30.0, 2.0, 2.0, 2.0, 2.0]), 1 / 3).tolist() == [True, True, True, True] + 2 * [
-        False
-    ]
 
 
 def test_what_grows_with_the_motion_is_no_air_in_its_own_channel():
@@ -163,12 +133,3 @@ def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
     new, known, _ = news(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
     assert [len(each) for each in new] == [len(each) for each in known]
     assert len(new[0]) == 0 < len(new[1])
-
-
-@pytest.mark.parametrize(("name", "rivals"), [("rotor_drag", ("wind",)), ("motor_lag", ())])
-def test_in_gusts_chance_is_what_instruments_say_and_rivals_of_what_is_late_too(name, rivals):
-    by_fit = named_effect(name, p_value=1e-30)
-    named = _Named([], [], None, None, [], (), sure={name: 0.003})
-    told = named.in_gusts(JudgedEffect(by_fit, ("wind",), {}))
-    assert (told.effect.p_value, told.alternatives) == (0.003, rivals)
-    assert _Named([], [], None, None, [], ()).in_gusts(JudgedEffect(by_fit, ("wind",), {})).effect is by_fit

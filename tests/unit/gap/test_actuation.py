@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming import lateness
-from cpfls_cli.gap.naming.by_instruments import untold
-from cpfls_cli.gap.naming.lateness import told_apart
+from cpfls_cli.gap.naming import actuation
+from cpfls_cli.gap.naming.actuation import decided_by_instruments
+from cpfls_cli.gap.naming.by_instruments import unidentified
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate
@@ -43,16 +43,16 @@ def apart(monkeypatch, own, left, sizes=None):
         tried.append(names)
         return found_with(names, (sizes or {}).get(names, [SURE] * len(names))) if names in left else None
 
-    monkeypatch.setattr(lateness._Sets, "_fit", fit)
+    monkeypatch.setattr(actuation._Sets, "_fit", fit)
     monkeypatch.setattr(
-        lateness,
-        "foretold_of_left",
+        actuation,
+        "predictable_residual",
         lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
     )
     start = found_with(own, [SURE] * len(own))
-    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
+    told = decided_by_instruments(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
     names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
-    return names, {(each.name, each.instead_of, each.beside) for each in told.alike}, told, tried
+    return names, {(each.name, each.instead_of, each.jointly_with) for each in told.alike}, told, tried
 
 
 @pytest.mark.parametrize("own", [LAG, DELAY, ()], ids=["lag", "delay", "nothing"])
@@ -157,7 +157,7 @@ def test_a_lateness_at_the_end_of_what_is_possible_is_none(monkeypatch):
 def test_rotors_that_are_measured_are_never_late():
     found = found_with((), [])
     found.hypothesis.can = lambda _candidate: False
-    told = told_apart(found, [CATALOGUE["motor_lag"]], None)
+    told = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
     assert told.found is told.without is found
 
 
@@ -166,4 +166,4 @@ def test_numbers_that_instruments_do_not_tell_are_listed():
     after = SimpleNamespace(
         hypothesis=before.hypothesis, estimates=SimpleNamespace(effects=[(), *before.estimates.effects[1:]])
     )
-    assert [effect.name for effect in untold(before, after)] == ["command_delay"]
+    assert [effect.name for effect in unidentified(before, after)] == ["command_delay"]
