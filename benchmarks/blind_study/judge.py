@@ -10,7 +10,7 @@ from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.report.outcome import as_json
+from cpfls_cli.result import plain
 
 
 def judge(folder):
@@ -21,7 +21,7 @@ def judge(folder):
         told = _judged(folder)
     except CpflsError as error:
         told = {"verdict": "ERROR", "error": str(error), "effects": []}
-    return {"set": folder.name, **as_json(told), "seconds": round(time.monotonic() - started, 2)}
+    return {"set": folder.name, **plain(told), "seconds": round(time.monotonic() - started, 2)}
 
 
 def _judged(folder):

@@ -15,11 +15,11 @@ from benchmarks.paper.claims import EvaluationTime, PaperSources, compares_readi
 from benchmarks.paper.reproduction import reproduction_section
 from benchmarks.shared.measure import program
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.commands.report import read_sources
 from cpfls_cli.config.load import load_study
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.page import Page, page_of, sections_of
 from cpfls_cli.report.content import Section
+from cpfls_cli.stages.report import read_sources
 from cpfls_cli.version import __version__
 
 _BEFORE = {"summary", "comparison", "models"}

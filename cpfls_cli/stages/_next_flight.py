@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
@@ -39,6 +38,7 @@ from cpfls_cli.report.numbers import number
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.stage import Run
 from cpfls_cli.stages._demand import demand_sentences
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.weak_form.windows import common_windows

@@ -15,7 +15,6 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
-from cpfls_cli.commands.numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
@@ -35,6 +34,7 @@ from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacke
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import did_you_mean
 

@@ -18,7 +18,6 @@ from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.errors import InputError
@@ -54,6 +53,7 @@ from cpfls_cli.report.outcome import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
 from cpfls_cli.words import joined
 

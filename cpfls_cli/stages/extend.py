@@ -10,7 +10,6 @@ from cpfls_cli.arguments import DiagnosisArgument, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import ComputationError
@@ -29,6 +28,7 @@ from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.weak_form.windows import Recording
 
 _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)

@@ -14,7 +14,6 @@ from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
@@ -26,6 +25,7 @@ from cpfls_cli.report.outcome import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
+from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 

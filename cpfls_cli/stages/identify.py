@@ -24,7 +24,6 @@ from cpfls_cli.arguments import (
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
@@ -45,6 +44,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._stopped import stop_note, without_model
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine

@@ -13,7 +13,6 @@ from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
@@ -36,6 +35,7 @@ from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, stacked, style_of
 from cpfls_cli.rotations import attitude_rate, generalised_torque
 from cpfls_cli.stage import Parts, Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.store import count_rows, read_first
 from cpfls_cli.validation.prediction import AlongFlight, Totals
 from cpfls_cli.weak_form.windows import Recording

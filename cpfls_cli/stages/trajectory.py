@@ -176,7 +176,8 @@ def trajectory(
     if planned is None or written is None or run.dry_run:
         return None
     pictures = (picture_of(FIGURES[name], name, planned) for name in names)
-    run.texts = {path: each.svg for path, each in zip(figures, pictures, strict=True) if each} | written
+    run.texts |= {path: each.svg for path, each in zip(figures, pictures, strict=True) if each}
+    run.texts |= written
     if figures:
         run.say(f"drawn: {', '.join(map(str, figures))}")
     if texts:

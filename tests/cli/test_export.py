@@ -147,8 +147,8 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     words = ("--format", "json", "-o", tmp_path / "m.json")
     (line,) = refuse("export", pipeline.flight, *words)
     assert line == (
-        f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify` or "
-        "`cpfls extend` or `cpfls gap` or `cpfls vehicle`)"
+        f"{pipeline.flight}: is a cpfls/flight; this command needs a model (made by `cpfls identify`, "
+        "`cpfls extend`, `cpfls gap` or `cpfls vehicle`)"
     )
     (line,) = refuse("export", study, *words)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
@@ -208,7 +208,7 @@ def test_output_rules(cpfls, refuse, model, tmp_path):
         missing = tmp_path / "none" / f"m.{ending}"
         (line,) = refuse("export", model, "--format", form, "-o", missing)
         assert line == f"{missing}: cannot write into the folder {missing.parent}: No such file or directory"
-    for form, name, ending in (("c", "m.h", ".c"), ("json", "m.h5", ".json")):
+    for form, name, ending in (("c", "n.h", ".c"), ("json", "n.h5", ".json")):
         (line,) = refuse("export", model, "--format", form, "-o", tmp_path / name)
         assert line == f"{tmp_path / name}: --format {form} writes a file that ends in {ending}; name it so"
     (line,) = refuse("export", model, "--format", "c", "-o", tmp_path / 'a"b.c')

@@ -63,7 +63,7 @@ def found(cpfls, tmp_path_factory):
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)
 
 
-def test_what_comes_again_stands_behind_the_verdict(found):
+def test_what_is_repeatable_is_written_after_the_verdict(found):
     (said,) = (line for line in found.stdout.splitlines() if line.startswith("REPEATS: "))
     assert said.startswith("REPEATS: Of the gap in the force along")
     assert "is repeatable: the model as given lacks an effect there." in said
@@ -76,8 +76,8 @@ def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_on
     assert (compared["runs"], compared["paths"], before["runs"]) == (3, 1, 3)
     for told in (compared, before):
         assert told["channels"]["force x"]["share"][0] > 0.7
-        assert all(told["channels"]["force x"]["repeatability"][:5])
-        assert not any(told["channels"]["torque x"]["repeatability"])
+        assert all(told["channels"]["force x"]["repeatable"][:5])
+        assert not any(told["channels"]["torque x"]["repeatable"])
     diagnosed, _ = read(found.folder / "diagnosis.h5", Diagnosis)
     assert diagnosed.repeatability_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
 

@@ -44,7 +44,7 @@ def split(flown):
     return RepeatedRuns.of(recordings).split(model.system(flights), model.linear)
 
 
-def test_the_share_that_comes_again_is_that_of_the_effects(found):
+def test_the_repeatable_share_is_that_of_the_effects(found):
     """In still air all of the gap is theirs; in gusts the same comes again, beside what does not."""
     gusty, calm = found["gusts"], found["calm"]
     rest = gusty.total - gusty.repeatable

@@ -190,7 +190,7 @@ def rerun(draw, extra=None):
     return Recording(f"run {draw}", replace(recording.signals, body_rate=noisy))
 
 
-def test_what_comes_again_is_gone_with_the_effect():
+def test_what_is_repeatable_is_gone_with_the_effect():
     """Judged on pairs with the held-out run; about all axes the damping of 0.12 comes again, and then only noise."""
     training, held = [rerun(0, damping), rerun(1, damping)], [rerun(2, damping)]
     compared_runs = compared([*training, *held])

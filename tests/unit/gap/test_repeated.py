@@ -58,7 +58,7 @@ def of_two_paths():
     return split([run(path, draw) for path in (0, 1) for draw in range(3)])
 
 
-def test_what_the_path_brings_comes_again_and_the_rest_does_not(of_two_paths):
+def test_what_the_path_brings_is_repeatable_and_the_rest_is_not(of_two_paths):
     """Six sines of 0.3 N m are 0.27 (N m)^2, six of 0.2 are 0.12; about pitch and yaw nothing comes again."""
     found = of_two_paths
     assert (found.runs, found.paths, len(found.flights)) == (6, 2, 6)

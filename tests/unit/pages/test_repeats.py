@@ -40,7 +40,7 @@ def again_box(before, after=None):
     return box, [each.text for each in told.blocks]
 
 
-def test_the_largest_share_that_comes_again_stands_first():
+def test_the_largest_repeatable_share_is_first():
     box, sentences = again_box(made.repeatability(PITCH))
     assert box.title == (
         "Of the gap in the torque about y (pitch) from 0.25 to 1.5 Hz 50 % is repeatable: the model lacks an effect "
@@ -54,7 +54,7 @@ def test_the_largest_share_that_comes_again_stands_first():
     assert len(sentences) == 6
 
 
-def test_where_nothing_comes_again_no_effect_explains_the_gap():
+def test_where_nothing_is_repeatable_no_effect_explains_the_gap():
     box, sentences = again_box(made.repeatability(NOTHING))
     assert box.title == (
         "The gap is not repeatable (at most 4 % of it): gusts or noise, and no effect of the vehicle explains it."

@@ -1,47 +1,24 @@
-"""A report as one HTML page that needs nothing else; each figure with small tables of its data."""
+"""What a figure draws as small tables, and both as HTML."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import visible
 from cpfls_cli.report.canvas import evenly_spread
-from cpfls_cli.report.content import STRUCK, Document, Panel, Picture, Series, Table
+from cpfls_cli.report.content import STRUCK, Panel, Picture, Series, Table
 from cpfls_cli.report.numbers import number, plain
 
 _CODE = re.compile("`([^`]+)`")
 _COLUMNS = 12
 _DIGITS = 4
 _SMALL = 1e-4
-
-
-def html_page(document: Document) -> str:
-    """Write a document as HTML."""
-    return _template().render(document=document)
-
-
-@cache
-def _template() -> Template:
-    environment = Environment(
-        loader=PackageLoader("cpfls_cli.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
-    environment.filters["figure"] = Markup
-    environment.filters["code"] = with_code
-    environment.filters["figure_tables"] = figure_tables
-    return environment.get_template("page.html")
 
 
 def with_code(text: str) -> Markup:
