@@ -110,7 +110,7 @@ def _gusts(found: Sequence[tuple[Hidden, Sequence[DiagnosisRun]]], gusts: tuple[
     """Hold what is told of gusts about the axes against the truth."""
     every = [run.air for _, runs in found for run in runs]
     airs = [air for air in every if air is not None]
-    told = np.array([air.told[:3] for air in airs]).reshape(-1, 3)
+    told = np.array([air.gusts_only[:3] for air in airs]).reshape(-1, 3)
     yield f"{int(told.sum())} of {3 * len(every)}"
     if gusts == CALM or not told.any():
         yield from ["—"] * 4

@@ -69,6 +69,7 @@ _FENCE = re.compile("`{3,}")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
 _HEADING = re.compile(r"(#{1,4}) (.+)")
 _VERDICT = re.compile(r"([A-Z][A-Z ,;:-]*[A-Z]): (.+)")
+_ESCAPED_STRUCK = re.compile(r"\\~\\~([^~]*)\\~\\~(?= impossible)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
 _TABLE = re.compile(r"<table[^>]*>.*?</table>", re.DOTALL)
 _LONG = 36
@@ -433,7 +434,7 @@ def markdown(text: str) -> str:
 def _markdown_of(nodes: Iterable[Node]) -> Iterator[str]:
     for node in nodes:
         if node.kind == "words":
-            yield _MARKS.sub("", _TONED_CELL.sub(r"**\1**", node.text))
+            yield _ESCAPED_STRUCK.sub(r"~~\1~~", _MARKS.sub("", _TONED_CELL.sub(r"**\1**", node.text)))
         elif node.kind == "figure":
             yield f"*{'' if node.text.startswith('Figure') else 'Figure: '}{node.text}*\n\n"
         else:

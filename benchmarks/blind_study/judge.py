@@ -51,7 +51,7 @@ def _judged(folder):
 def _air(air):
     """Tell gusts by channel, N m, N and s, and of which channels they are all that is left."""
     names = ("size", "low", "high", "memory", "memory_low", "memory_high")
-    return {"told": air.told.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
+    return {"told": air.gusts_only.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
 
 
 def _effect(effect):

@@ -41,6 +41,7 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
@@ -79,7 +80,7 @@ def identify(
     held_out = held_out_parts(run.study, data.rests, inputs, others)
     wrong = _contradictions([*flights, *choosing, *others], run.study)
     for sentence in other_vehicles([*flights, *choosing, *others], run.study):
-        run.note(sentence)
+        run.said.append(Text(sentence, "warning", always=True))
     tell_before_search(wrong)
     if run.dry_run:
         return None

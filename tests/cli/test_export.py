@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.builders.artifacts import edited
+from cpfls_cli.validation.verdict import Reason, Verdict
+from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
 
 HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
@@ -162,7 +163,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
         file.attrs["format"] = "cpfls/extended"
     (line,) = refuse("export", model, *words)
     assert line.startswith(f"{model}: was written by cpfls ")
-    assert line.endswith("whose files this version does not read; make it again with `cpfls identify`")
+    assert line.endswith("whose files this version does not read; make it again with `cpfls extend`")
 
 
 @pytest.mark.parametrize(
@@ -177,7 +178,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
             "model/fuzzy/partitions: those of D13(pitch) make no partition; identify it again",
         ),
         (
-            {"model__fuzzy__visited": np.zeros((71, 71))},
+            {"model__fuzzy__visited": np.zeros((71, 71), dtype=bool)},
             "model/fuzzy/visited: is (71, 71), not (72, 72); identify it again",
         ),
         (
@@ -310,11 +311,10 @@ def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
 
 
 def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path):
-    change(
+    with_fields(
         model,
-        verdict__label=np.array("do-not-use"),
-        verdict__reason=np.array(["it is fast", "it explains nothing"]),
-        verdict__speaks=np.array([1, -1]),
+        model,
+        verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1))),
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
     assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"

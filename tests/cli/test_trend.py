@@ -173,7 +173,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["log1.csv", "log2.csv"], "flights that tell the same numbers: 2, and a trend needs 4 at least"),
+        (["log1.csv", "log2.csv"], "flights with the same numbers: 2, and a trend needs 4 at least"),
         (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log says when it was flown"),
         (["log14.csv"], "log14.csv"),
         (["empty"], "holds no flight and no log"),

@@ -65,8 +65,8 @@ class Repeatability:
     repeatable: Array = _by_band("mean product of the gap with that of another run at the same place of the path")
     noise: Array = _by_band("mean square of the gap by white sensor noise; NaN where signals were filtered")
     motion: Array = _by_band("repeatable part of the torque or force of the motion, as a mean product")
-    share_error: Array = _by_band("standard error of repeatable over total", unit="")
-    explained_error: Array = _by_band("standard error of 1 less repeatable over motion", unit="")
+    share_error: Array = _by_band("standard error of repeatable over total", unit="1")
+    explained_error: Array = _by_band("standard error of 1 less repeatable over motion", unit="1")
     resists: Array = about(
         "moments of inertia, kg m^2, and mass, kg", "channel", unit="SI", frame="body (FLU)", brief=False
     )
