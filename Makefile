@@ -40,7 +40,7 @@ help:
 	@echo "  make bench       benchmarks, as Markdown tables; hours, and goes on where it was stopped"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
-	@echo "  make fuzz [EACH=N KILLS=N]   hostile files and killed commands against all that reads and writes them"
+	@echo "  make fuzz [EACH=N]   hostile files against all that reads them"
 	@echo "  make clean       remove what studies produced"
 
 reproduce: data/paper/report.html
@@ -88,7 +88,7 @@ $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 	@touch $@
 
 $(INSTALLED_BENCH): $(INSTALLED_DEV)
-	$(PIP) -e ".[bench,dask,simulators]"
+	$(PIP) -e ".[simulators]"
 	@touch $@
 
 $(INSTALLED_DOCS): pyproject.toml | $(INSTALLED)
@@ -188,7 +188,7 @@ data/paper/larger-%.h5: data/paper/flight.h5 data/paper/.part/sweep.yaml
 
 # No artifact holds a time, so what the report says of time is measured for it and given to it.
 data/paper/times.json: benchmarks/reproduction_time.py data/paper/trajectory.h5
-	$(BIN)/python $< --out $@
+	$(BIN)/python -m benchmarks.reproduction_time --out $@
 
 # A flight that the model never learns from: another direction, the other way round.
 UNSEEN = --set trajectory.path=straight --set "trajectory.direction=[1.0, -0.6, 0.2]" \
@@ -214,7 +214,7 @@ ARTIFACTS := trajectory flight unseen selection model prediction prediction-unse
 
 # The page of a study of the paper holds its claims too.
 REPORT = $(CPFLS) report $(1) -o $(2) --force
-PAPER_REPORT = $(BIN)/python benchmarks/paper/report.py $(1) -o $(2) $(TIMES)
+PAPER_REPORT = $(BIN)/python -m benchmarks.paper.report $(1) -o $(2) $(TIMES)
 define made_page
 data/%/$(1).html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
 	$$(call $$(if $$(filter paper quick,$$*),PAPER_REPORT,REPORT),configs/$$*.yaml $$(filter %.h5,$$^),$$@)
@@ -404,21 +404,14 @@ wheel: $(INSTALLED_RELEASE)
 
 # Every table is also written to benchmarks/results, as JSON. Programs that measure times run one after the other, the
 # rest two at once. Stopped and started again it goes on where it was, unless the code has changed since.
-TIMED := evaluation whole_run workers long_flights reduction reduction_streamed gap replay vehicle_search \
-	excitation full_circle export_speed simulators
-UNTIMED := judging band_coverage
-STUDY := data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
-ON_reduction_streamed := --samples 100000
-ON_judging := configs/paper-gentle.yaml $(STUDY)
-ON_report_cost = configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
+TIMED := evaluation whole_run long_flights gap replay export_speed simulators first_use
+UNTIMED := band_coverage trends look_health
 bench: $(INSTALLED_BENCH)
-	$(MAKE) --jobs=1 $(STUDY) data/paper/times.json $(TIMED:%=benchmarks/results/%.done)
-	$(MAKE) --jobs=2 --output-sync=target data/paper/report.html $(UNTIMED:%=benchmarks/results/%.done)
-	$(MAKE) --jobs=1 benchmarks/results/report_cost.done
+	$(MAKE) --jobs=1 data/paper/times.json $(TIMED:%=benchmarks/results/%.done)
+	$(MAKE) --jobs=2 --output-sync=target $(UNTIMED:%=benchmarks/results/%.done)
 
-benchmarks/results/report_cost.done: data/paper/report.html
 benchmarks/results/%.done: benchmarks/%.py $(shell find cpfls_cli benchmarks/shared tests/builders -name "*.py")
-	$(BIN)/python $< $(ON_$*)
+	$(BIN)/python -m benchmarks.$*
 	@mkdir -p $(@D) && touch $@
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m benchmarks.blind_study --help`.
@@ -432,11 +425,10 @@ blind-study: $(INSTALLED_DEV)
 blind-quick: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.blind_study quick --out data/blind-quick --seed 31 --processes 1 $(SIZE)
 
-# Hostile files and killed commands, as two tables; hours at full size. FUZZ takes more options.
+# Hostile files, as a table; hours at full size. FUZZ takes more options.
 EACH := 10000
-KILLS := 100
 fuzz: $(INSTALLED_DEV)
-	$(BIN)/python -m benchmarks.fuzz --each $(EACH) --kills $(KILLS) $(FUZZ)
+	$(BIN)/python -m benchmarks.fuzz --each $(EACH) $(FUZZ)
 
 clean:
 	rm -rf data/paper data/paper-gentle data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example data/changed-example

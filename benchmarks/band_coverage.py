@@ -1,6 +1,4 @@
-"""Print how often bands of 95 % hold the truth, in 200 simulated flights.
-
-    python benchmarks/band_coverage.py [--runs 200] [--seed 2027]
+"""How often bands of 95 % hold the truth, in 200 simulated flights.
 
 Each flight has the same motion and new noise, 5 % of each torque's root mean square: white, or coloured (first-order
 autoregressive, time constant 5 samples). Bands are those of `cpfls identify`: 40 blocks, 200 draws. They are asked for
@@ -16,22 +14,13 @@ where they flew, and at rolls of 60 to 120 degrees, which they never saw.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy import signal
 
-from benchmarks.shared.full_circle import INERTIA, random_flight
+from benchmarks.shared.measure import program, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
@@ -40,19 +29,18 @@ from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.identification.samples import Ready
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.trajectory.rotation import full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import POWER, BlockScores, bootstrap, missed_torque
-from cpfls_cli.validation.timeline import time_blocks
+from cpfls_cli.validation.bootstrap import bootstrap
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
+INERTIA, DURATION_S, SAMPLES = np.diag([0.6, 0.6, 1.2]), 54.86, 5487
 BENT = 0.3
 NOWHERE = np.zeros((72, 72), dtype=bool)
-POWERS = {"no correction": 0.0, "CR2": 0.5, "ours": POWER, "CR3, jackknife": 1.0}
-ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_ENTRIES)
 
 
 @dataclass(frozen=True)
@@ -98,7 +86,9 @@ class Case:
 
 
 def cases() -> list[Case]:
-    paper, path, turning = paper_study().identification, paper_flight(), random_flight(200)
+    paper, path = paper_study().identification, paper_flight()
+    rotation = full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(200))
+    turning = rigid(Motion(*vars(rotation.sample(rotation.times(SAMPLES))).values()))
     every, selected = np.arange(len(path)), np.searchsorted(path.time, paper_selection().time)
     bent = replace(turning, torque=turning.torque + bent_torque(turning))
     alone, held = IdentificationSettings(base="none"), IdentificationSettings()
@@ -119,8 +109,8 @@ def small_angles() -> list[Case]:
     held, found, far = IdentificationSettings(), [], np.zeros((ATTITUDES, 3))
     far[:, 0] = np.deg2rad(np.linspace(60.0, 120.0, ATTITUDES))
     for tilt in (13, 26, 45):
-        rigid = tilted(np.deg2rad(tilt))
-        flight, every = replace(rigid, torque=rigid.torque + bent_torque(rigid)), np.arange(len(rigid))
+        flight = tilted(np.deg2rad(tilt))
+        flight, every = replace(flight, torque=flight.torque + bent_torque(flight)), np.arange(len(flight))
         found.append(Case(f"tilt up to {tilt} degrees, vehicle not rigid", flight, every, held, bent_vehicle))
         found.append(Case("the same, at attitudes not visited", flight, every, held, bent_vehicle, far))
     return found
@@ -136,8 +126,12 @@ def tilted(largest: float) -> TorqueData:
         np.sum(amplitude * frequency**order * np.sin(angle + 0.5 * np.pi * order), axis=1) for order in range(3)
     )
     size = largest / np.max(np.abs(attitude[:, :2]))
-    motion = Motion(size * attitude, size * rate, size * acceleration)
-    return TorqueData(time, motion, newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, INERTIA))
+    return rigid(Motion(size * attitude, size * rate, size * acceleration))
+
+
+def rigid(motion: Motion) -> TorqueData:
+    """Drive the rigid vehicle along a motion."""
+    return TorqueData(0.01 * np.arange(len(motion)), motion, newton_euler_torque(*vars(motion).values(), INERTIA))
 
 
 def vehicle(attitude: Array) -> Array:
@@ -188,86 +182,19 @@ def coverage(case: Case, coloured: bool, runs: int, seed: int) -> tuple:
         weights.append(fit.ridge_weight)
     by_entry = np.mean(inside, axis=(0, 1))
     entries = np.array(
-        [by_entry[place] for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0) or not free(case)]
+        [by_entry[place] for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0) or case.settings.base != "none"]
     )
     return entries, np.mean(held, axis=0), np.min(np.mean(inside, axis=0)), np.median(weights)
 
 
-def free(case: Case) -> bool:
-    """Whether no rigid body lies below: then D12 is zero, and no band is asked for."""
-    return case.settings.base == "none"
-
-
-def compared(case: Case, coloured: bool, runs: int, seed: int) -> dict[str, Array]:
-    """Count for other ways to draw blocks: coverage by attitude of all D_ij(q), without a ridge."""
-    rng, truth = np.random.default_rng(seed), case.inertia()
-    strength, counts = NOISE * axis_scale(case.flight), {name: [] for name in ("pairs, percentiles", *POWERS)}
-    some = [place for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0)]
-    linear = unit_inertias(case.fitted(case.flight.torque)[2], case.attitude)
-    for _ in range(runs):
-        torque = case.flight.torque + strength * noise(rng, len(case.flight), coloured)
-        evaluator, training, model, _ = case.fitted(torque)
-        scores = block_scores(evaluator, training, model)
-        value, tolerance = model.inertia(case.attitude).value, case.settings.rank_tolerance
-        for name in counts:
-            if name in POWERS:
-                weights = rng.standard_normal((200, len(scores.gram)))
-                drawn = replace(scores, power=POWERS[name]).draws(weights, tolerance)
-                low, high = band(value, value + np.einsum("pnij,kp->knij", linear, drawn), len(scores.gram))
-            else:
-                drawn = pairs(scores, rng, tolerance)
-                low, high = np.quantile(value + np.einsum("pnij,kp->knij", linear, drawn), [0.025, 0.975], axis=0)
-            inside = (low <= truth) & (truth <= high)
-            counts[name].append(np.stack([inside[:, *place] for place in some]))
-    return {name: np.mean(inside, axis=0) for name, inside in counts.items()}
-
-
-def block_scores(evaluator, training: TorqueData, model: InertiaFunctions) -> BlockScores:
-    """Sum by block, without a ridge and without a rigid body."""
-    learned = evaluator.solver.learned
-    label = time_blocks(training, None).labels(learned.ready.source)
-    ready = Ready(missed_torque(learned.ready.source, model), rigid=False)
-    products = replace(learned, ready=ready, label=label, labels=int(label[-1]) + 1).products(model.partitions)
-    return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
-
-
-def unit_inertias(model: InertiaFunctions, attitude: Array) -> Array:
-    """Evaluate the inertia matrix of each coefficient by itself, shape (parameters, attitudes, 3, 3)."""
-    units = np.eye(len(model.coefficients))
-    return np.stack([replace(model, coefficients=unit).inertia(attitude).value for unit in units])
-
-
-def pairs(scores: BlockScores, rng: np.random.Generator, tolerance: float) -> Array:
-    """Draw blocks with replacement and solve anew: deviations, shape (draws, parameters)."""
-    blocks, found = len(scores.gram), []
-    for _ in range(200):
-        times = np.bincount(rng.integers(blocks, size=blocks), minlength=blocks)
-        drawn = replace(scores, gram=times[:, None, None] * scores.gram, score=times[:, None] * scores.score)
-        found.append(drawn.solution(tolerance))
-    return np.array(found)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=2027)
-    asked, rows = parser.parse_args(), []
-    runs, seed = asked.runs, asked.seed
+def main(runs: int = 200, seed: int = 2027) -> None:
+    rows = []
     for case in cases():
-        for coloured in (False, True):
-            entries, held, lowest, weight = coverage(case, coloured, runs, seed)
-            kind = "coloured" if coloured else "white"
-            rows.append((case.name, kind, weight, *map(percent, (entries, [lowest], held))))
-    columns = ("model", "noise", "median ridge weight", "D_ij, mean (by entry)", "worst D_ij(q)", "rigid body")
+        for noise in ("white", "coloured"):
+            entries, held, lowest, weight = coverage(case, noise == "coloured", runs, seed)
+            rows.append((case.name, noise, weight, *map(percent, (entries, [lowest], held))))
+    columns = "model | noise | median ridge weight | D_ij, mean (by entry) | worst D_ij(q) | rigid body"
     table("coverage", columns, rows, runs=runs, seed=seed)
-    print()
-    rows, fewer = [], max(runs // 4, 1)
-    for case in (part for part in cases() if free(part)):
-        for coloured in (False, True):
-            ways = compared(case, coloured, fewer, seed)
-            counts = (f"{100 * way.mean():.1f} ({100 * way.min():.0f})" for way in ways.values())
-            rows.append((case.name, "coloured" if coloured else "white", *counts))
-    table("coverage_ways", ("model", "noise", *ways), rows, runs=fewer, seed=seed)
 
 
 def percent(shares) -> str:
@@ -277,4 +204,4 @@ def percent(shares) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,11 +1,10 @@
-"""A load on a cable beside flights of the bare vehicle: ``python benchmarks/changed_cable.py FOLDER --gusts 1``.
+"""A load on a cable, against flights of the bare vehicle.
 
 The vehicles, flights and hidden loads of the blind study: fast, near the ground, climbing and descending, under an
-autopilot, with noise of all sensors. Five flights without a load are the reference, one or three with it today's; what
-is left of the bare ones is judged as well, one by one.
+autopilot, with noise of all sensors, written to a folder. Five flights without a load are the reference, one or three
+with it today's; the other bare ones are judged as well, one by one.
 """
 
-import argparse
 import json
 from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
@@ -16,6 +15,7 @@ import numpy as np
 
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.sets import Size, sets
+from benchmarks.shared.measure import count, program, table
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.config.load import load_study
@@ -40,43 +40,34 @@ def said(today, before, vehicle):
     loads = [each.sizes[0] for each in change.causes if each.name == "load on a cable"]
     mass = f"{loads[0].value:.3f} [{loads[0].low:.3f}, {loads[0].high:.3f}]" if loads else ""
     cable = f"{np.median([flight.cable_m for flight in today]):.2f}" if loads else ""
-    return f"{names} | {mass} | {cable}", bool(change.causes)
+    return (names, mass, cable), bool(change.causes)
 
 
-def main():
-    """Fly, judge and print."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--seed", type=int, default=90555)
-    parser.add_argument("--draws", type=int, default=4, help="loads of the largest vehicle; the others have one each")
-    parser.add_argument("--gusts", type=int, default=1, choices=(0, 1, 2))
-    asked = parser.parse_args()
+def main(folder: Path, seed: int = 90555, draws: int = 4, gusts: int = 1) -> None:
     noise = {"levels": ("mid",), "kinds": ("white",)}
-    air = {"gusts": (asked.gusts,), "instruments": ("setpoints",)}
-    size = Size(seed=asked.seed, draws=asked.draws, groups=("single", "none"), none=12, **noise, **air)
+    air = {"gusts": (gusts,), "instruments": ("setpoints",)}
+    size = Size(seed=seed, draws=draws, groups=("single", "none"), none=12, **noise, **air)
     own = [each for each in sets(size) if each[0].case.group == "none" or "-payload-" in each[0].case.name]
     with ProcessPoolExecutor(2) as pool:
-        told = list(pool.map(partial(flown, folder=asked.folder), own))
+        judged = list(pool.map(partial(flown, folder=folder), own))
     bare = defaultdict(list)
-    for key, numbers, _ in told:
+    for key, numbers, _ in judged:
         bare[key["vehicle"]] += numbers if key["group"] == "none" else []
-    print("| vehicle | load, cable | flights | found | mass of the load | cable, m |\n|---|---|---|---|---|---|")
-    for key, numbers, vehicle in told:
-        if key["group"] == "none":
-            continue
-        load = key["hidden"]["payload"]
-        for today in (1, 3):
+    rows = []
+    for key, numbers, vehicle in judged:
+        for today in (1, 3) if key["group"] != "none" else ():
+            load = key["hidden"]["payload"]
             cells, _ = said(numbers[:today], bare[key["vehicle"]][:REFERENCE], vehicle)
-            hidden = f"{load['mass'] / vehicle.mass_kg:.3f}, {load['length']:.2f}"
-            print(f"| {key['vehicle']} | {hidden} | {today} | {cells} |")
-    vehicles = {key["vehicle"]: vehicle for key, _, vehicle in told}
+            rows.append([key["vehicle"], f"{load['mass'] / vehicle.mass_kg:.3f}, {load['length']:.2f}", today, *cells])
+    table("changed_cable", "vehicle | load, cable | flights | found | mass of the load | cable, m", rows)
+    vehicles = {key["vehicle"]: vehicle for key, _, vehicle in judged}
     alarms = [
         said([flight], flights[:REFERENCE], vehicles[name])[1]
         for name, flights in bare.items()
         for flight in flights[REFERENCE:]
     ]
-    print(f"\nbare flights that are said to have changed: {sum(alarms)} of {len(alarms)}")
+    print(f"\nbare flights that are said to have changed: {count(alarms)}")
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,32 +1,27 @@
 """What is said of vehicles that nobody changed, and of fifteen changes at three sizes each, in flights with truth.
 
-    python benchmarks/changed_study.py quadrotor|hexarotor|nano [--draws N] [--trim SHARE] [--of CHANGE...]
-
-Vehicles hover and fly gentle legs for 30 s in gusts, each day with another trim, battery, wind and gusts; their configs
-are off by what configs are off by. Numbers of flights are kept in a folder, so that they need not fly again.
+Vehicles (quadrotor, hexarotor, nano) hover and fly gentle legs for 30 s in gusts, each day with another trim, battery,
+wind and gusts; their configs are off by what configs are off by. Numbers of flights are kept in a folder, so that they
+need not fly again.
 """
 
 from __future__ import annotations
 
-import argparse
+import contextlib
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
+import typer
 
 from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
+from benchmarks.shared.measure import program, table
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
@@ -102,10 +97,7 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
 
     if name in ("thrust of a rotor", "two rotors"):
         lost = sorted([one, other] if name == "two rotors" else [one])
-        weak = body._replace(
-            thrust=times(lost, 1 - size, body.thrust),
-            drag=times(lost, 1 - size, body.drag),
-        )
+        weak = body._replace(thrust=times(lost, 1 - size, body.thrust), drag=times(lost, 1 - size, body.drag))
         words = " and ".join(f"M{index + 1}" for index in lost)
         return Altered(weak, {f"rotor{'s' * (len(lost) > 1)} {words}": (size,) * len(lost)})
     if name == "drag of a rotor":
@@ -124,11 +116,11 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
         moved = size * kind.arm * side
         return Altered(body._replace(centre=body.centre + moved), {name: tuple(moved.tolist())})
     if name == "inertia about x":
-        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), {"follow roll": (-np.log1p(size),)})
+        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), {"gain roll": (-np.log1p(size),)})
     if name == "motor lag":
-        return Altered(body._replace(lag=body.lag + size), {"late": (size,), "answer": (size,)})
+        return Altered(body._replace(lag=body.lag + size), {"delay": (size,), "lag": (size,)})
     if name == "delay":
-        return Altered(body._replace(late=body.late + size), {"late": (size,), "answer": (size,)})
+        return Altered(body._replace(late=body.late + size), {"delay": (size,), "lag": (size,)})
     if name == "drag of the body":
         return Altered(body._replace(air=body.air * (1 + size)), {})
     if name == "gyroscope bias":
@@ -252,9 +244,8 @@ _NO_CAUSE = "cause not named"
 
 
 def _alarms(runs: Sequence[Changed]) -> list[object]:
-    alarms = [run for run in runs if run.changed]
-    said = ", ".join(sorted("+".join(found.name for found in run.causes) or _NO_CAUSE for run in alarms))
-    return [len(runs), len(alarms), sum(run.p <= 0.05 for run in runs), said or "—"]
+    said = sorted("+".join(found.name for found in run.causes) or _NO_CAUSE for run in runs if run.changed)
+    return [len(runs), len(said), sum(run.p <= 0.05 for run in runs), ", ".join(said) or "—"]
 
 
 def _otherwise(fleet: Fleet, faster: list[list[Told]]) -> Iterator[list[object]]:
@@ -338,11 +329,8 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
 
 def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Changed:
     """Ask what would show in the first draws alone, for it takes long."""
-    given = fleet, case.vehicle, instrument, [case.told], USUAL, case.draw
-    if case.draw < _SHOWN:
-        return _judged(*given)
-    with _WITHOUT_SHOWS:
-        return _judged(*given)
+    with contextlib.nullcontext() if case.draw < _SHOWN else _WITHOUT_SHOWS:
+        return _judged(fleet, case.vehicle, instrument, [case.told], USUAL, case.draw)
 
 
 def _shows(case: Case, run: Changed) -> float:
@@ -403,47 +391,43 @@ def _kept(path: Path | None, make: Callable[[], Any]) -> Any:
     return made
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("--draws", type=int, default=20)
-    parser.add_argument("--series", type=int, default=0, help="of vehicles, days and draws that no other has")
-    parser.add_argument("--trim", type=float, default=0.03)
-    parser.add_argument("--keep", type=Path)
-    parser.add_argument("--only", choices=["unchanged", "changes", "otherwise", "wrong"])
-    parser.add_argument("--of", nargs="+", choices=SIZES, default=list(SIZES), metavar="CHANGE")
-    given = parser.parse_args()
-    kind, trim = KINDS[given.kind], Trim(given.trim, given.trim / 30)
-    folder = given.keep and given.keep / f"{given.kind}-{given.trim:g}-{given.series}"
-    fleet: Fleet = _kept(folder and folder / "fleet.pickle", partial(_fleet, kind, trim, given.series))
-    if given.only == "otherwise":
-        faster = _kept(folder and folder / "faster.pickle", partial(_faster, kind, trim, fleet, given.series))
-        header = ["log", "references flown", "references", "sets", "alarms", "p <= 5 %", "said"]
-        table(f"changed_otherwise_{given.kind}", header, list(_otherwise(fleet, faster)))
-        return
-    if given.only == "wrong":
-        header = ["wrong", "log", "flights", "changed", "cannot tell", "no change seen", "no change"]
-        table(f"changed_wrong_{given.kind}", header, list(_wrong(kind, trim, fleet, given.series)))
-        return
-    if given.only != "changes":
-        header = ["log", "references", "flights today", "sets", "alarms", "p <= 5 %", "said"]
-        table(f"changed_unchanged_{given.kind}", header, list(_unchanged(fleet)))
+def main(
+    kind: str,
+    draws: int = 20,
+    series: Annotated[int, typer.Option(help="vehicles, days and draws that no other series has")] = 0,
+    trim: float = 0.03,
+    keep: Path | None = None,
+    only: Annotated[str, typer.Option(help="unchanged, changes, otherwise or wrong")] = "",
+    of: list[str] | None = None,
+) -> None:
+    type_, scatter = KINDS[kind], Trim(trim, trim / 30)
+    folder = keep and keep / f"{kind}-{trim:g}-{series}"
+    fleet: Fleet = _kept(folder and folder / "fleet.pickle", partial(_fleet, type_, scatter, series))
+    if only == "otherwise":
+        faster = _kept(folder and folder / "faster.pickle", partial(_faster, type_, scatter, fleet, series))
+        columns = "log | references flown | references | sets | alarms | p <= 5 % | said"
+        table(f"changed_otherwise_{kind}", columns, list(_otherwise(fleet, faster)))
+    if only == "wrong":
+        columns = "wrong | log | flights | changed | cannot tell | no change seen | no change"
+        table(f"changed_wrong_{kind}", columns, list(_wrong(type_, scatter, fleet, series)))
+    if only in ("", "unchanged"):
+        columns = "log | references | flights today | sets | alarms | p <= 5 % | said"
+        table(f"changed_unchanged_{kind}", columns, list(_unchanged(fleet)))
         print()
-    if given.only == "unchanged":
-        return
-    cases: list[Case] = []
-    for draw in range(given.draws):
-        fly = partial(_cases, kind, trim, fleet, given.of, given.series, draw)
-        cases += _kept(folder and folder / f"draw-{draw}.pickle", fly)
-    for instrument in INSTRUMENTS:
-        rows, smallest = _changes(fleet, cases, instrument)
-        header = ["change", "size", "draws", "found", "right", "among those alike", "wrong name", "said otherwise"]
-        table(f"changed_found_{given.kind}_{instrument}", header, rows)
-        print()
-        header = ["change", "found with 90 %", "said to show", "intervals that hold"]
-        table(f"changed_smallest_{given.kind}_{instrument}", header, smallest)
-        print()
+    if only in ("", "changes"):
+        cases: list[Case] = []
+        for draw in range(draws):
+            fly = partial(_cases, type_, scatter, fleet, of or list(SIZES), series, draw)
+            cases += _kept(folder and folder / f"draw-{draw}.pickle", fly)
+        for instrument in INSTRUMENTS:
+            rows, smallest = _changes(fleet, cases, instrument)
+            columns = "change | size | draws | found | right | among those alike | wrong name | said otherwise"
+            table(f"changed_found_{kind}_{instrument}", columns, rows)
+            print()
+            columns = "change | found with 90 % | said to show | intervals that hold"
+            table(f"changed_smallest_{kind}_{instrument}", columns, smallest)
+            print()
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

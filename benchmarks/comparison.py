@@ -1,7 +1,7 @@
 """Hold the answers of one checkout against those of another: terminal, exit codes, JSON, pages, numbers in files.
 
-    python benchmarks/comparison.py run PATH/TO/cpfls OUT [SCENARIO...]
-    python benchmarks/comparison.py hold OLD NEW
+    python -m benchmarks.comparison run PATH/TO/cpfls OUT [SCENARIO...]
+    python -m benchmarks.comparison hold OLD NEW
 
 A scenario is a list of commands, typed one after the other in an empty folder; minutes in all. Flights of others are
 read from the folder that CPFLS_FLIGHTS names, `../shared/data` by default. This goes when the house is rebuilt.

@@ -1,32 +1,24 @@
-"""Start from mass and geometry alone, and find the rest in flights: errors of the numbers, intervals that hold them.
+"""Fit flights of a known vehicle: errors of its numbers, intervals that hold them, blocks that are chosen.
 
-    python benchmarks/constants.py [PART...]
-
-The parts, all if none is named: `speeds` (rotor speeds logged), `search` (and the structure looked for), `commands`
-(in per cent, and no rotor speed), `rotorpy` (flights in CPFLS_FLIGHTS), `mujoco` (flown there), `weight` (added).
-Nothing but mass, places and spins of the rotors and a largest rotor speed is known to a fit; what else it starts from
-is guessed as for a config that leaves it null. Noise as in playback_truth.py; fits have the structure that flew, except
-for those of `search`.
+Parts, all if none is named: coloured (noise of 50 ms, from a config that is wrong), speeds (from mass and geometry
+alone, as all that follow; rotor speeds logged), search (and the structure looked for), commands (in per cent, and no
+rotor speed), rotorpy (flights in CPFLS_FLIGHTS), weight (added). What else a fit starts from is guessed as for a config
+that leaves it null. Fits have the structure that flew, except for those of search; each has nine flights of 20 s
+(tests/builders/playback_flights.py). With white noise a fit ends where it does from a wrong config too.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
 
+from benchmarks.shared.measure import count, program, table
+from benchmarks.shared.playback_scores import SYMBOLS, free_runs, score
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -35,7 +27,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
-from cpfls_cli.playback.vehicle import FoundNumber, carrying_weight, differences, find_vehicle, found_numbers
+from cpfls_cli.playback.vehicle import carrying_weight, differences, find_vehicle, found_numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.playback_flights import (
     ADDED_AT,
@@ -47,20 +39,19 @@ from tests.builders.playback_flights import (
     STATED,
     TRUE_BLOCKS,
     flown,
+    judged,
     loaded,
     logged,
     nothing_known,
     rotorpy_flight,
     true_numbers,
     truth,
-)
+)  # fmt: skip
 from tests.builders.recorded_flights import FLIGHTS
 
-SEEDS, SEARCHES, LOADED = 20, 2, 10
-TIMES = 3
-"""How often each kind of excitation is flown for a fit: nine flights of 20 s."""
-
-STEPS, TOLERANCE = 60, 3e-5
+SEARCHES, LOADED = 2, 10
+COLOURED = replace(MIDDLING, time_constant_s=0.05)
+STEPS, TOLERANCE, SLOPE = 60, 3e-5, 1e-5
 USUAL = PlaybackSettings()
 SEARCH = PlaybackSettings(search_windows=120, population=6, generations=1)
 LAG = "lag.time_constant_s"
@@ -74,9 +65,6 @@ NOMINAL = nothing_known(replace(STATED, rotor_speed_max_rad_s=NOMINAL_SPEED))
 OF_COMMANDS = (LAG, "inertia.Ixx", "inertia.Iyy", "inertia.Izz")
 """Numbers that do not depend on what a command of 1 is."""
 
-NOISE_OF_COMMANDS = replace(MIDDLING, speed=0.0)
-"""A command is logged as it was sent."""
-
 
 class Compared(NamedTuple):
     """A number against its true value: error and half width of its interval in per cent, or ms, or mm."""
@@ -87,23 +75,53 @@ class Compared(NamedTuple):
     unit: str
 
 
-def main(*asked: str) -> None:
-    for name in asked or PARTS:
+class Number(NamedTuple):
+    """A number with its interval, named as a fit names it."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+
+def main(parts: list[str] | None = None, seeds: int = 20) -> None:
+    for name in parts or PARTS:
         print(f"\n{name}:\n")
-        PARTS[name]()
+        PARTS[name](seeds)
+
+
+def training(model: VehicleModel, seed: int, noise=MIDDLING) -> list[PlaybackFlight]:
+    return flown(model, KINDS * 3, seed=seed, noise=noise)
 
 
 def found(
     vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], blocks: Sequence[str], groups: tuple[Group, ...] = ()
-) -> tuple[Fitted, list[FoundNumber], list]:
-    """Fit blocks beside what is not known, as `cpfls vehicle` does when it has chosen them."""
+) -> tuple[Fitted, list]:
+    """Fit blocks and what is not known, as `cpfls vehicle` does once it has chosen them; also their numbers."""
     begun, _ = carrying_weight(vehicle, [flight for flight in flights if not flight.group])
     free = Structure(tuple(block for block in blocks if block not in begun.unknown)).free(begun, groups)
     windows = windows_of(flights, USUAL.horizon_s, USUAL.window_interval_s)
     fitted = fit(free, windows, {}, STEPS, TOLERANCE)
     spread = uncertainty(fitted, windows)
-    between = list(differences(fitted, spread)) if groups else []
-    return fitted, list(found_numbers(fitted, spread)), between
+    more = differences(fitted, spread) if groups else over_yaw_inertia(fitted, spread)
+    return fitted, [*found_numbers(fitted, spread), *more]
+
+
+def over_yaw_inertia(fitted: Fitted, spread) -> Iterator[Number]:
+    """Give numbers of yaw over its inertia, which motion shows better than either."""
+
+    def ratios(step: Array | float) -> dict[str, float]:
+        physical = fitted.free.physical(fitted.values + step)
+        every = judged({name: each.value for name, each in physical.items()})
+        return {name: value for name, value in every.items() if name not in physical}
+
+    steps = SLOPE * np.diag(fitted.free.scales)
+    slopes = np.array([[*ratios(step).values()] for step in steps]) - [[*ratios(-step).values()] for step in steps]
+    slopes = slopes.T / (2 * SLOPE * fitted.free.scales)
+    halves = student.ppf(0.975, spread.blocks - 1) * np.sqrt(np.diag(slopes @ spread.covariance @ slopes.T))
+    for (name, value), half in zip(ratios(0.0).items(), halves, strict=True):
+        yield Number(name, "", value, value - half, value + half)
 
 
 def compared(numbers, true: Mapping[str, float]) -> dict[str, Compared]:
@@ -117,7 +135,7 @@ def compared(numbers, true: Mapping[str, float]) -> dict[str, Compared]:
     return rows
 
 
-COLUMNS = ("number", "asked", "median error", "largest", "mean", "median half interval", "intervals that hold it")
+COLUMNS = "number | asked | median error | largest | mean | median half interval | intervals that hold it"
 
 
 def by_number(fits: Sequence[Mapping[str, Compared]]) -> Iterator[tuple[str, ...]]:
@@ -125,30 +143,41 @@ def by_number(fits: Sequence[Mapping[str, Compared]]) -> Iterator[tuple[str, ...
         rows = [each[name] for each in fits]
         errors, unit = np.array([row.error for row in rows]), rows[0].unit
         sizes = (np.median(np.abs(errors)), np.abs(errors).max())
-        half, held = np.median([row.half for row in rows]), sum(row.held for row in rows)
+        half = np.median([row.half for row in rows])
         texts = (*(f"{size:.2f} {unit}" for size in sizes), f"{errors.mean():+.2f} {unit}", f"{half:.2f} {unit}")
-        yield name, ASKED.get(name.rpartition(": ")[2], ""), *texts, f"{held} of {len(rows)}"
+        yield name, ASKED.get(name.rpartition(": ")[2], ""), *texts, count([row.held for row in rows])
     held = [row.held for each in fits for row in each.values()]
     yield "all", "90 to 98 %", "", "", "", "", f"{100 * np.mean(held):.1f} %"
 
 
-def speeds() -> None:
-    fits = []
-    for seed in range(1, SEEDS + 1):
-        flights = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
-        fits.append(compared(found(nothing_known(), flights, TRUE_BLOCKS)[1], true_numbers()))
+def coloured(seeds: int) -> None:
+    true, fits, ratios = true_numbers(), [], []
+    for seed in range(1, seeds + 1):
+        fitted, numbers = found(STATED, training(truth(), seed, COLOURED), TRUE_BLOCKS)
+        fits.append(compared(numbers, true | judged(true)))
+        flights = flown(truth(), seed=1000 + seed, noise=COLOURED)
+        ours, theirs = (score([free_runs(each, own, 5) for own in flights]).sums for each in (fitted.model, truth()))
+        ratios.append(ours / theirs)
+    table("constants_coloured", COLUMNS, list(by_number(fits)))
+    print("\nplayback error on other flights over that of the true model\n")
+    sizes = zip(SYMBOLS.values(), np.median(ratios, axis=0), np.max(ratios, axis=0), strict=True)
+    table("constants_coloured_errors", "signal | median | largest", list(sizes), digits=4)
+
+
+def speeds(seeds: int) -> None:
+    each = (training(truth(), seed) for seed in range(1, seeds + 1))
+    fits = [compared(found(nothing_known(), flights, TRUE_BLOCKS)[1], true_numbers()) for flights in each]
     table("constants_speeds", COLUMNS, list(by_number(fits)))
 
 
-def search() -> None:
+def search(_seeds: int) -> None:
     """Look for the structure as well, with small settings: where speeds are logged, and once where commands are."""
     rows = []
     for seed in range(1, SEARCHES + 1):
-        flights = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
-        rows += searched(f"speeds {seed}", nothing_known(), flights, TRUE_BLOCKS, true_numbers())
+        rows += searched(f"speeds {seed}", nothing_known(), training(truth(), seed), TRUE_BLOCKS, true_numbers())
     known = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
     rows += searched("commands 1", NOMINAL, without_speeds(1), (*TRUE_BLOCKS, "thrust_law"), known)
-    table("constants_search", ("flights", "blocks too many", "missed", "number", *SINGLE), rows)
+    table("constants_search", "flights | blocks too many | missed | number | error | half interval | holds it", rows)
 
 
 def searched(
@@ -161,44 +190,42 @@ def searched(
     result = find_vehicle(vehicle, flights, SEARCH, np.random.default_rng(1), lambda *_: None)
     chosen, flew = result.choice.chosen.structure.blocks, [block for block in blocks if block not in vehicle.unknown]
     more, missed = ([b for b in one if b not in other] for one, other in ((chosen, flew), (flew, chosen)))
-    about = (", ".join(more) or "none", ", ".join(missed) or "none")
-    errors = compared(result.numbers, true)
-    return [(name, *about, number, *single(errors[number])) for number in ASKED if number in errors]
-
-
-SINGLE = ("error", "half interval", "holds it")
-
-
-def single(row: Compared) -> tuple[str, str, str]:
-    return f"{row.error:+.2f} {row.unit}", f"{row.half:.2f} {row.unit}", "yes" if row.held else "no"
+    about, errors = (", ".join(more) or "none", ", ".join(missed) or "none"), compared(result.numbers, true)
+    rows = [(number, errors[number]) for number in ASKED if number in errors]
+    return [
+        (
+            name,
+            *about,
+            number,
+            f"{row.error:+.2f} {row.unit}",
+            f"{row.half:.2f} {row.unit}",
+            "yes" if row.held else "no",
+        )
+        for number, row in rows
+    ]
 
 
 def curved() -> VehicleModel:
     """Give rotors whose thrust has a linear and a square part, and that hover at the speeds of `truth`."""
-    vehicle = truth().vehicle
+    vehicle, names = truth().vehicle, ("thrust_factor_n_s2", "drag_factor_n_m_s2")
     rotors = tuple(
-        replace(
-            rotor,
-            thrust_factor_n_s2=rotor.thrust_factor_n_s2 / (1 + LINEAR),
-            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 / (1 + LINEAR),
-        )
-        for rotor in vehicle.rotors
+        replace(rotor, **{name: getattr(rotor, name) / (1 + LINEAR) for name in names}) for rotor in vehicle.rotors
     )
     return replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
 
 
 def without_speeds(seed: int) -> list[PlaybackFlight]:
-    """Fly; logged is a share of a largest speed that nobody knows, and taken as one of the nominal speed."""
-    flights = flown(curved(), KINDS * TIMES, seed=seed, noise=NOISE_OF_COMMANDS)
+    """Fly; logged is a share of a largest speed that nobody knows, and is taken as one of the nominal speed."""
+    flights = training(curved(), seed, replace(MIDDLING, speed=0.0))
     return [replace(flight, speed=NOMINAL_SPEED / LARGEST_SPEED * flight.speed) for flight in flights]
 
 
-def commands() -> None:
+def commands(seeds: int) -> None:
     fits, curves = [], []
     true = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
-    for seed in range(1, SEEDS + 1):
+    for seed in range(1, seeds + 1):
         flights = without_speeds(seed)
-        fitted, numbers, _ = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_law"))
+        fitted, numbers = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_law"))
         fits.append(compared(numbers, true))
         speeds = np.concatenate([flight.speed for flight in flights]) / NOMINAL_SPEED
         flew = np.linspace(speeds.min(), speeds.max(), 200)
@@ -207,7 +234,7 @@ def commands() -> None:
         curves.append((flew[0], flew[-1], 100 * np.abs(away).max() / curve.max()))
     low, high, largest = np.array(curves).T
     row = (f"{low.mean():.2f} to {high.mean():.2f}", "2 %", f"{np.median(largest):.2f} %", f"{largest.max():.2f} %")
-    table("constants_curve", ("commands flown", "asked", "median of the largest deviation", "largest"), [row])
+    table("constants_curve", "commands flown | asked | median of the largest deviation | largest", [row])
     print()
     table("constants_commands", COLUMNS, list(by_number(fits)))
 
@@ -218,23 +245,19 @@ def thrust(model: VehicleModel, speed: Array) -> Array:
     return np.asarray(speed * upwards[1] + speed**2 * upwards[1 + model.rotors])
 
 
-def rotorpy() -> None:
+def rotorpy(seeds: int) -> None:
     if not (FLIGHTS / "rotorpy").exists():
         print(f"{FLIGHTS / 'rotorpy'} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
         return
     rows = []
     for name, hidden in ROTORPY_HIDDEN.items():
         flight, true = rotorpy_flight(name), stated_numbers(ROTORPY, hidden)
-
-        def errors(given: PlaybackFlight, hidden=hidden, true=true) -> dict[str, Compared]:
-            _, numbers, _ = found(nothing_known(ROTORPY), [given], [effect.name for effect in hidden])
-            return compared(numbers, true)
-
-        clean = errors(flight)
-        noisy = [errors(with_noise(flight, np.random.default_rng(seed))) for seed in range(1, SEEDS + 1)]
+        blocks = [effect.name for effect in hidden]
+        flights = [flight, *(with_noise(flight, np.random.default_rng(seed)) for seed in range(1, seeds + 1))]
+        clean, *noisy = (compared(found(nothing_known(ROTORPY), [own], blocks)[1], true) for own in flights)
         at_once = {number: f"{row.error:+.2f} {row.unit}" for number, row in clean.items()}
         rows += [(name, number, at_once.get(number, ""), *row) for number, *row in by_number(noisy)]
-    table("constants_rotorpy", ("flight", "number", "without noise", *COLUMNS[1:]), rows)
+    table("constants_rotorpy", f"flight | number | without noise{COLUMNS.removeprefix('number')}", rows)
 
 
 def with_noise(flight: PlaybackFlight, rng: np.random.Generator) -> PlaybackFlight:
@@ -253,21 +276,7 @@ def stated_numbers(vehicle: VehicleSettings, effects=()) -> dict[str, float]:
     return known | {f"com_offset.c_{axis}": value for pair in offset for axis, value in zip("xy", pair, strict=True)}
 
 
-def mujoco() -> None:
-    if find_spec("mujoco") is None:
-        print("not flown: MuJoCo is not installed; `pip install .[bench]` brings it")
-        return
-    from benchmarks.shared.mujoco_flights import LAG_S, VEHICLE, mujoco_flights
-
-    true = stated_numbers(VEHICLE) | {LAG: LAG_S}
-    fits = [
-        compared(found(nothing_known(VEHICLE), mujoco_flights(seed, TIMES), ["lag"])[1], true)
-        for seed in range(1, SEEDS + 1)
-    ]
-    table("constants_mujoco", COLUMNS, list(by_number(fits)))
-
-
-def weight() -> None:
+def weight(_seeds: int) -> None:
     """Fly as often with a weight of 5 % of the mass, 5 cm off the centre, as without."""
     name = "loaded"
     groups = (Group(name, (MASS, "com_offset", "inertia")),)
@@ -279,23 +288,13 @@ def weight() -> None:
     true |= {f"{name}: added {key.removeprefix('inertia.')}": value - own[key] for key, value in more.items()}
     fits = []
     for seed in range(1, LOADED + 1):
-        own = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
-        others = flown(loaded(), KINDS * TIMES, seed=1000 + seed, noise=MIDDLING)
-        flights = [*own, *(replace(flight, group=name) for flight in others)]
-        _, numbers, between = found(nothing_known(), flights, TRUE_BLOCKS, groups)
-        fits.append(compared([*between, *numbers], true | true_numbers()))
+        others = [replace(flight, group=name) for flight in training(loaded(), 1000 + seed)]
+        _, numbers = found(nothing_known(), [*training(truth(), seed), *others], TRUE_BLOCKS, groups)
+        fits.append(compared(numbers, true | true_numbers()))
     table("constants_weight", COLUMNS, list(by_number(fits)))
 
 
-PARTS = {
-    "speeds": speeds,
-    "search": search,
-    "commands": commands,
-    "rotorpy": rotorpy,
-    "mujoco": mujoco,
-    "weight": weight,
-}
-
+PARTS = {each.__name__: each for each in (coloured, speeds, search, commands, rotorpy, weight)}
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    program(main)

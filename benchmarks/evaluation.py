@@ -1,49 +1,28 @@
-"""One evaluation and one local search against plain references, decompositions, and what starting compiled code costs.
-
-python benchmarks/evaluation.py
-"""
+"""One evaluation and one local search against plain references."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from time import process_time
 from typing import Any
 from unittest import mock
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, ratio_of, seconds, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import Ratio, in_turn, program, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification import least_squares
-from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, Problem, decode, encode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.samples import Ready, Samples
+from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
-from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders import reference_evaluator as reference
 from tests.builders.reference_evaluator import ReferenceEvaluator
 
 CHROMOSOMES = 80
 LARGEST_CONDITION = 1e6
 TIMED = 5
-# Membership functions of each partition, for 113, 241, 417 and 1233 columns.
-FUNCTIONS = (5, 7, 9, 15)
 TOLERANCE = 1e-6
-REPEATS = 5
 
 
 def main() -> None:
@@ -55,51 +34,23 @@ def main() -> None:
         ("5487", flight, flight),
     )
     print("One evaluation, no local search:\n")
+    columns = (
+        "samples | by singular values, ms | by Gram matrix, ms | compiled, ms | times faster than the first (range) | "
+        "than the second (range) | compared | largest relative difference"
+    )
     table(
-        "evaluation",
-        (
-            "samples",
-            "by singular values, ms",
-            "by Gram matrix, ms",
-            "compiled, ms",
-            "times faster than the first (range)",
-            "than the second (range)",
-            "compared",
-            "largest relative difference",
-        ),
-        [(name, *evaluation(training, learned, settings)) for name, training, learned in cases],
+        "evaluation", columns, [(name, *evaluation(training, learned, settings)) for name, training, learned in cases]
     )
     print("\nOne local search:\n")
+    columns = (
+        "samples | 2-point, ms | variable projection, ms | times faster (range) | passes over the samples, theirs and "
+        "ours | times fewer | times by code | MSE, ours over theirs"
+    )
     table(
         "local_search",
-        (
-            "samples",
-            "2-point, ms",
-            "variable projection, ms",
-            "times faster (range)",
-            "passes over the samples, theirs and ours",
-            "times fewer",
-            "times by code",
-            "MSE, ours over theirs",
-        ),
+        columns,
         [(name, *local_search(training, learned, settings)) for name, training, learned in cases],
     )
-    print("\nDecompositions of the Gram matrix of random attitudes:\n")
-    table(
-        "decompositions",
-        (
-            "membership functions",
-            "columns",
-            "all eigenvectors, ms",
-            "the lowest, ms",
-            "times faster (range)",
-            "Lanczos, ms",
-            "times faster (range)",
-        ),
-        [decompositions(functions) for functions in FUNCTIONS],
-    )
-    print("\nStarting:\n")
-    table("start", ("what", "seconds"), starting())
 
 
 def evaluation(training, learned, settings: IdentificationSettings) -> tuple[float, float, float, str, str, int, float]:
@@ -112,8 +63,8 @@ def evaluation(training, learned, settings: IdentificationSettings) -> tuple[flo
     comparable = theirs[:, 2] < LARGEST_CONDITION
     difference = np.max(np.abs(ours[comparable] / theirs[comparable] - 1.0))
     some = genes[:TIMED]
-    by_values = in_turn(lambda: densely(slow, some, reference._solve), lambda: fast(some), REPEATS, process_time)
-    by_gram = in_turn(lambda: densely(slow, some, by_gram_matrix), lambda: fast(some), REPEATS, process_time)
+    by_values = in_turn(lambda: densely(slow, some, reference._solve), lambda: fast(some))
+    by_gram = in_turn(lambda: densely(slow, some, by_gram_matrix), lambda: fast(some))
     milliseconds = (1e3 * spent / TIMED for spent in (by_values.slow_s, by_gram.slow_s, by_gram.fast_s))
     return (*milliseconds, by_values.range, by_gram.range, int(comparable.sum()), float(difference))
 
@@ -155,10 +106,10 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
         ours = partial(refine, problem, start, products, budget)
         after, _, few = counted(ours, Samples, "products", "moved")
         passes.append((many, few))
-        times.append((slow_s, seconds(ours, process_time)))
+        times.append((slow_s, seconds(ours)))
         mse = plain(np.array([encode(before), after.genes])).objectives[:, 0]
         ends.append(mse[1] / mse[0])
-    timed, (many, few) = ratio_of(times), np.median(passes, axis=0)
+    timed, (many, few) = Ratio.of(times), np.median(passes, axis=0)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"
     told = f"{many:.0f} and {few:.0f}", many / few, timed.ratio * few / many
     return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, *told, quality
@@ -175,62 +126,11 @@ def counted(work, where, *names: str) -> tuple[Any, float, int]:
     return found, spent, sum(counter.call_count for counter in counters)
 
 
-def decompositions(functions: int) -> tuple[int, int, float, float, str, float, str]:
-    """Time what turns a Gram matrix into parameters and a condition number, in each of the three ways."""
-    settings = StructureSettings(consequents="seesaw", products="additive", membership_functions=functions)
-    structure, rng = model_structure(settings), np.random.default_rng(7)
-    samples = 20 * structure.parameters
-    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    data = TorqueData(0.01 * np.arange(samples), motion, rng.standard_normal((samples, 3)))
-    whole = Samples.of(Ready(data, rigid=False), structure, data_ranges(structure, motion.attitude))
-    gram = whole.products(uniform_breakpoints(structure)).gram[0]
-    size = np.sqrt(np.diag(gram))
-    matrix = gram / size / size[:, None]
-
-    def inverted(few: int, many: int) -> None:
-        with mock.patch.object(least_squares, "_FEW", few), mock.patch.object(least_squares, "_MANY", many):
-            found = least_squares._inverted(matrix, TOLERANCE**2)
-        assert found is not None
-        found.apply(size)
-
-    every, lowest, lanczos = partial(inverted, 10**6, 10**6), partial(inverted, 1, 10**6), partial(inverted, 1, 1)
-    some = in_turn(every, lowest, REPEATS, process_time)
-    few = in_turn(every, lanczos, REPEATS, process_time)
-    spent = 1e3 * some.slow_s, 1e3 * some.fast_s, some.range, 1e3 * few.fast_s, few.range
-    return functions, structure.parameters, *spent
-
-
 def well_conditioned(plain: Evaluator) -> np.ndarray:
     """Random chromosomes from which a local search makes sense."""
     genes = np.random.default_rng(5).integers(1, 2**16, (CHROMOSOMES, plain.structure.genes))
     return genes[plain(genes).objectives[:, 2] < LARGEST_CONDITION][:TIMED]
 
 
-def starting() -> list[tuple[str, float]]:
-    """Time starting the program, and compiling once against loading what was compiled."""
-    version = [sys.executable, "-m", "cpfls_cli", "--version"]
-    one = "from benchmarks.evaluation import evaluate_one; evaluate_one()"
-    with tempfile.TemporaryDirectory() as cache:
-        environment = dict(os.environ, NUMBA_CACHE_DIR=cache, PYTHONPATH=str(Path(__file__).resolve().parents[1]))
-
-        def run(command: list[str]) -> float:
-            return seconds(partial(subprocess.run, command, env=environment, check=True, stdout=subprocess.DEVNULL))
-
-        nothing = [sys.executable, "-c", "pass"]
-        return [
-            ("Python alone", min(run(nothing) for _ in range(5))),
-            ("`cpfls --version`", min(run(version) for _ in range(5))),
-            ("one evaluation in a new process, compiling", run([sys.executable, "-c", one])),
-            ("the same, compiled before", min(run([sys.executable, "-c", one]) for _ in range(3))),
-        ]
-
-
-def evaluate_one() -> None:
-    """Evaluate one chromosome with local search."""
-    data = paper_flight()[:200]
-    evaluator = model_evaluator(data, data, paper_study().identification)
-    evaluator(np.full((1, evaluator.structure.genes), 30000))
-
-
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,26 +1,17 @@
-"""One evaluation of an exported model in C (gcc -O2) beside the library, in a batch and one at a time; processor time.
-
-python benchmarks/export_speed.py
-"""
+"""One evaluation of an exported model in C (gcc -O2) and in the library, many and one at a time; processor time."""
 
 from __future__ import annotations
 
 import ctypes
 import subprocess
-import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, program, table
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.source import c_source
 from cpfls_cli.fuzzy.inputs import InputRange
@@ -60,24 +51,17 @@ def main() -> None:
         model = random_model(settings)
         with tempfile.TemporaryDirectory() as folder:
             write(model, Path(folder))
-            rows += [timed(name, model, Path(folder), call) for call in ("inertia", "coriolis", "torque")]
+            rows += [(name, call, *timed(model, Path(folder), call)) for call in ("inertia", "coriolis", "torque")]
             sizes.append((name, *size(model, Path(folder))))
     print("One evaluation, processor time; the library takes states in batches of 4096 or one at a time:\n")
     columns = (
-        "structure",
-        "function",
-        "C, ns",
-        "C, float, ns",
-        "library, batch, ns",
-        "over C (range)",
-        "library, one at a time, ns",
-        "one at a time over C (range)",
-        f"C, share of {BUDGET_NS // 1000} us",
+        "structure | function | C, ns | C, float, ns | library, batch, ns | over C (range) | "
+        f"library, one at a time, ns | one at a time over C (range) | C, share of {BUDGET_NS // 1000} us"
     )
     table("export_speed", columns, rows)
-    print("\nWhat is stored, and roughly the arithmetic of one torque with two rules firing along each input:\n")
-    stored = ("structure", "parameters", "tables, bytes", "the same, float", "object file, bytes", "flops of a torque")
-    table("export_size", stored, sizes)
+    print("\nWhat is stored:\n")
+    columns = "structure | parameters | tables, bytes | the same, float | object file, bytes"
+    table("export_size", columns, sizes)
 
 
 def random_model(settings: StructureSettings) -> InertiaFunctions:
@@ -105,28 +89,19 @@ def gcc(*words: str | Path) -> None:
     subprocess.run(["gcc", "-std=c99", "-O2", *words], check=True)
 
 
-def timed(name: str, model: InertiaFunctions, folder: Path, call: str) -> tuple:
+def timed(model: InertiaFunctions, folder: Path, call: str) -> tuple:
     """Time one function in C and in the library, in turn."""
     rng = np.random.default_rng(2)
     states = np.hstack([rng.uniform(-np.pi, np.pi, (BATCH, 3)), rng.normal(0, 3, (BATCH, 6))])
     double = compiled(folder / "double.so", call, states)
     single = compiled(folder / "float.so", call, states.astype(np.float32))
-    pairs = ((library(model, call, states), double), (ones(model, call, states), double), (double, single))
-    many, one, in_float = (in_turn(slow, fast, clock=process_time) for slow, fast in pairs)
-    c = 1e9 * many.fast_s / (PASSES * BATCH)
-    batch, alone = 1e9 * many.slow_s / BATCH, 1e9 * one.slow_s / SINGLES
-    shares = (scaled(many, PASSES), scaled(one, PASSES * BATCH / SINGLES))
-    return (
-        name,
-        call,
-        c,
-        1e9 * in_float.fast_s / (PASSES * BATCH),
-        batch,
-        shares[0],
-        alone,
-        shares[1],
-        f"{c / BUDGET_NS:.1%}",
-    )
+    alone = [library(model, call, states[index : index + 1]) for index in range(SINGLES)]
+    pairs = ((library(model, call, states), double), (lambda: [one() for one in alone], double), (double, single))
+    many, one, in_float = (in_turn(slow, fast) for slow, fast in pairs)
+    c, floats = (1e9 * each.fast_s / (PASSES * BATCH) for each in (many, in_float))
+    batch, single_s = 1e9 * many.slow_s / BATCH, 1e9 * one.slow_s / SINGLES
+    shares = scaled(many, PASSES), scaled(one, PASSES * BATCH / SINGLES)
+    return c, floats, batch, shares[0], single_s, shares[1], f"{c / BUDGET_NS:.1%}"
 
 
 def scaled(ratio, factor: float) -> str:
@@ -153,38 +128,21 @@ def library(model: InertiaFunctions, call: str, states: np.ndarray):
     q, qd, qdd = np.split(states, 3, axis=1)
     if call == "torque":
         return partial(model.torque, Motion(q, qd, qdd))
-    return partial(model.inertia, q) if call == "inertia" else partial(model.coriolis, q, qd)
+    if call == "inertia":
+        return partial(model.inertia, q)
+    return lambda: coriolis_matrix(model.inertia(q), qd)
 
 
-def ones(model: InertiaFunctions, call: str, states: np.ndarray):
-    """Evaluate states one after the other."""
-    calls = [library(model, call, states[i : i + 1]) for i in range(SINGLES)]
-
-    def run() -> None:
-        for one in calls:
-            one()
-
-    return run
-
-
-def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int, int]:
-    """Count numbers of the tables, the bytes of the object file and, roughly, the arithmetic of a torque."""
+def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int]:
+    """Count numbers of the tables and the bytes of the object file."""
     structure = model.structure
     used = any(block.rules > 1 for block in structure.blocks)
     numbers = structure.parameters + (sum(p.functions for p in structure.partitions) if used else 0)
     region = CELLS * CELLS // 8
     text = subprocess.run(["size", folder / "double.o"], capture_output=True, text=True, check=True).stdout
     loaded = int(text.splitlines()[1].split()[0])
-    return structure.parameters, 8 * numbers + region, 4 * numbers + region, loaded, flops(structure, used)
-
-
-def flops(structure, used: bool) -> int:
-    """Multiplications and additions of the sums over rules and features, and of a torque from D and its slopes."""
-    one = next(block.features for block in structure.blocks if len(block.partitions) == 1)
-    rules = 2 if used else 1
-    pair = 4 * one**2 + 6 * one if structure.settings.products == "tensor" else 8 * (one - 1)
-    return 2 * rules * (4 * one + 6) + 2 * rules**2 * (pair + 12) + 9 * 14 + 60
+    return structure.parameters, 8 * numbers + region, 4 * numbers + region, loaded
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,7 +1,5 @@
 """What the first use of each compiled loop takes in a new process: from nothing, and compiled before.
 
-python benchmarks/first_use.py
-
 Processor time of the first call alone; numba itself is loaded before. Compared are processes with an empty cache.
 """
 
@@ -11,24 +9,22 @@ import os
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
-from time import process_time
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from benchmarks.shared.measure import program, seconds, table
+from tests.builders.compiled_loops import LOOPS
 
 
-def main() -> None:
-    from benchmarks.shared.measure import table
-    from tests.builders.compiled_loops import LOOPS
-
+def main(one: str = "") -> None:
+    if one:
+        print(first_call(one))
+        return
     rows = []
     for name in LOOPS:
         with tempfile.TemporaryDirectory() as cache:
-            environment = dict(os.environ, NUMBA_CACHE_DIR=cache, OPENBLAS_NUM_THREADS="1")
-            command = (sys.executable, __file__, name)
+            command = (sys.executable, "-m", "benchmarks.first_use", "--one", name)
+            environment = dict(os.environ, NUMBA_CACHE_DIR=cache)
             rows.append((name, *(float(subprocess.check_output(command, env=environment)) for _ in range(2))))
-    table("first_use", ("loop", "compiling, s", "compiled before, s"), rows)
+    table("first_use", "loop | compiling, s | compiled before, s", rows)
 
 
 def first_call(name: str) -> float:
@@ -37,15 +33,9 @@ def first_call(name: str) -> float:
 
     import cpfls_cli.identification.samples
     import cpfls_cli.playback.model  # noqa: F401
-    from tests.builders.compiled_loops import LOOPS
 
-    start = process_time()
-    LOOPS[name]()
-    return process_time() - start
+    return seconds(LOOPS[name])
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        print(first_call(sys.argv[1]))
-    else:
-        main()
+    program(main)

@@ -1,7 +1,5 @@
 """Gains from one log, judged on simulated flights whose vehicle is known: margins as predicted, and as flown.
 
-    python benchmarks/gains_study.py [SEED [FLIGHTS]]
-
 Flights of `look_study.py` under the laws of four autopilots, logged at their ordinary rates: from each log come the
 vehicle and gains. The gains that are proposed fly the true vehicle in gusts and noise, with sines added to the command
 by which the loop is measured. Printed: how often the flown margins are within 5 degrees and 1.5 dB of the predicted
@@ -10,19 +8,12 @@ ones, how often inside the predicted interval, and how often the flown gains hav
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from benchmarks.look_study import GUST_S, GUST_SIZE, GUSTS, GYRO_NOISE, Case, Lanes, flights
+from benchmarks.shared.measure import program, table
 from cpfls_cli.autopilots.law import AXES, Law
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.effectiveness import effectiveness
@@ -118,6 +109,7 @@ def main(seed: int = 1, count: int = 48) -> None:
             reasons[word] = reasons.get(word, 0) + 1
         rows += judge(case, gains, rng)
     print("axes:", ", ".join(f"{name} {number}" for name, number in sorted(reasons.items())))
+    table_rows = []
     for name in (*AUTOPILOTS, "all"):
         own = [row for row in rows if name in (row[0], "all")]
         for label, gain, phase in (("true", 5, 6), ("flown", 7, 8)):
@@ -126,12 +118,11 @@ def main(seed: int = 1, count: int = 48) -> None:
             inside = [row[4].low <= row[phase] <= row[4].high for row in own]
             inside_gain = [min(row[3].low, 40) <= min(row[gain], 40) <= row[3].high for row in own]
             held = [row[phase] >= 44 for row in own]
-            print(
-                f"{name:11s} {label:5s} phase within {PHASE_DEG:g} deg {share(near)}; gain within {GAIN_DB:g} dB "
-                f"{share(near_gain)}; in its interval phase {share(inside)}, gain {share(inside_gain)}; 45 deg held "
-                f"{share(held)}"
-            )
+            table_rows.append([name, label, *map(share, (near, near_gain, inside, inside_gain, held))])
+    near = f"phase within {PHASE_DEG:g} deg | gain within {GAIN_DB:g} dB"
+    columns = f"autopilot | vehicle | {near} | phase in its interval | gain in its interval | 45 deg held"
+    table("gains", columns, table_rows)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    program(main)

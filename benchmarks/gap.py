@@ -1,26 +1,16 @@
-"""Time a diagnosis: how it grows with flight time, and what leaving out the heavier parts would save.
-
-python benchmarks/gap.py
-"""
+"""Time a diagnosis: how it grows with flight time, and what leaving out the heavier parts would save."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
 from benchmarks.blind.cases import make
 from benchmarks.blind.generator import simulate_many
 from benchmarks.blind.measure import columns, disturb
+from benchmarks.shared.measure import program, table
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
@@ -51,7 +41,7 @@ def main() -> None:
     ):
         spent = time(recordings, settings)
         rows.append((f"6 of 30 s, {what}", spent, spent / whole))
-    table("gap", ("flights", "seconds", "ratio to the first"), rows)
+    table("gap", "flights | seconds | ratio to the first", rows)
 
 
 def time(recordings: list[Recording], settings: GapSettings) -> float:
@@ -73,34 +63,23 @@ def fly(case, seconds: float, rng: np.random.Generator) -> list[Recording]:
 def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:
     """Arrange the columns of a log."""
     named = dict(zip(columns(len(vehicle.rotors)), log.T, strict=True))
-    pick = lambda names: np.column_stack([named[name] for name in names.split()])  # noqa: E731
-    return Signals(
-        time=named["t"],
-        body_rate=pick("wx wy wz"),
-        vehicle=vehicle,
-        attitude=pick("phi theta psi"),
-        velocity=pick("vx vy vz"),
-        position=pick("x y z"),
-        acceleration=pick("ax ay az"),
-        rotor_speed=pick("om1 om2 om3 om4"),
-        voltage=named["volt"],
-    )
+    names = {
+        "body_rate": "wx wy wz", "attitude": "phi theta psi", "velocity": "vx vy vz", "position": "x y z",
+        "acceleration": "ax ay az", "rotor_speed": "om1 om2 om3 om4",
+    }  # fmt: skip
+    picked = {signal: np.column_stack([named[name] for name in own.split()]) for signal, own in names.items()}
+    return Signals(time=named["t"], vehicle=vehicle, voltage=named["volt"], **picked)
 
 
 def vehicle_of(craft) -> VehicleSettings:
     """Describe the craft of the generator as a config does."""
+    factors = {"thrust_factor_n_s2": craft.thrust_factor, "drag_factor_n_m_s2": craft.torque_factor}
     rotors = tuple(
-        RotorSettings(
-            position_m=tuple(place),
-            spin=spin,
-            thrust_factor_n_s2=craft.thrust_factor,
-            drag_factor_n_m_s2=craft.torque_factor,
-            radius_m=craft.rotor_radius,
-        )
+        RotorSettings(position_m=tuple(place), spin=spin, radius_m=craft.rotor_radius, **factors)
         for place, spin in zip(craft.rotors, craft.spin, strict=True)
     )
     return VehicleSettings(mass_kg=craft.mass, inertia_kg_m2=craft.inertia, rotors=rotors)
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,7 +1,5 @@
 """What `cpfls gap` says in gusts: names, their numbers, and the gusts, by level of gusts and by instrument.
 
-    python benchmarks/gap_in_gusts.py [DRAWS]
-
 A vehicle of 45 g under an autopilot that knows no gust, four flights of 40 s a draw, the last one held out: of as many
 paths, with the position and velocity that were asked for in the log; of one path, without; or of as many, without. The
 config misses nothing, or one thing. Nothing of the package flies them.
@@ -9,20 +7,13 @@ config misses nothing, or one thing. Nothing of the package flies them.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import count, mean_and_ends, program, progress, table
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -30,7 +21,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, STORM, Flight, Truth, gusty_flights, logged
 
-DRAWS = 3
 FLIGHTS, SECONDS, REACH_HZ = 4, 40.0, 3.0
 LEVELS = {"none": CALM, "nano-drone": GUSTS, "twice": STORM}
 INSTRUMENTS = ("setpoints", "repeats", "none")
@@ -63,22 +53,21 @@ def _hidden() -> Iterator[Hidden]:
     yield Hidden(TRUE._replace(lag_s=0.03), vehicle, "motor_lag", {"time_constant_s": 0.03}, commands=True)
 
 
-def main(draws: int) -> None:
+def main(draws: int = 3) -> None:
     rows, told = [], []
     for level, gusts in LEVELS.items():
         for instrument in INSTRUMENTS:
             found: list[tuple[Hidden, list[DiagnosisRun]]] = []
             for hidden in _hidden():
-                runs = [
-                    _diagnosed(hidden, _flown(hidden, gusts, instrument, draw), instrument) for draw in range(draws)
-                ]
+                flown = [_flown(hidden, gusts, instrument, draw) for draw in range(draws)]
+                runs = [_diagnosed(hidden, own, instrument) for own in flown]
                 found.append((hidden, runs))
                 rows.append([level, instrument, hidden.name or "nothing", *_names(hidden, runs)])
-                print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
+                progress(rows[-1])
             told.append([level, instrument, *_gusts(found, gusts)])
-    table("gap_in_gusts", ["gusts", "instrument", "hidden", "right", "wrong name", "verdicts", "holds the truth"], rows)
+    table("gap_in_gusts", "gusts | instrument | hidden | right | wrong name | verdicts | holds the truth", rows)
     print()
-    header = ["gusts", "instrument", "told", "size over true", f"within {SIZE:.0%}", "memory over true", "within 2"]
+    header = f"gusts | instrument | told | size over true | within {SIZE:.0%} | memory over true | within 2"
     table("gusts_in_gap", header, told)
 
 
@@ -102,7 +91,7 @@ def _diagnosed(hidden: Hidden, flown: Sequence[PlaybackFlight], instrument: str)
 def _names(hidden: Hidden, runs: Sequence[DiagnosisRun]) -> Iterator[str]:
     named = [{effect.name for effect in run.diagnosis.effects} for run in runs]
     right = {hidden.name} - {""}
-    yield f"{sum(names == right for names in named)} of {len(runs)}"
+    yield count([names == right for names in named])
     yield f"{sum(bool(names - right) for names in named)}"
     verdicts = [str(run.diagnosis.verdict) for run in runs]
     yield ", ".join(f"{verdict} {verdicts.count(verdict)}" for verdict in sorted(set(verdicts)))
@@ -114,14 +103,14 @@ def _names(hidden: Hidden, runs: Sequence[DiagnosisRun]) -> Iterator[str]:
         for number in effect.numbers
         if number.name in hidden.numbers
     ]
-    yield f"{sum(numbers)} of {len(numbers)}" if numbers else "—"
+    yield count(numbers) if numbers else "—"
 
 
 def _gusts(found: Sequence[tuple[Hidden, Sequence[DiagnosisRun]]], gusts: tuple[float, float, float]) -> Iterator[str]:
     """Hold what is told of gusts about the axes against the truth."""
     every = [run.air for _, runs in found for run in runs]
     airs = [air for air in every if air is not None]
-    told = np.array([air.told[:3] for air in airs]).reshape(-1, 3)
+    told = np.array([air.gusts_only[:3] for air in airs]).reshape(-1, 3)
     yield f"{int(told.sum())} of {3 * len(every)}"
     if gusts == CALM or not told.any():
         yield from ["—"] * 4
@@ -129,9 +118,9 @@ def _gusts(found: Sequence[tuple[Hidden, Sequence[DiagnosisRun]]], gusts: tuple[
     sizes = np.array([air.found.size[:3] for air in airs]) / (np.array(TRUE.inertia) * gusts)
     memories = np.array([air.found.memory[:3] for air in airs]) / MEMORY_S
     for values, near in ((sizes, np.abs(sizes - 1) <= SIZE), (memories, np.abs(np.log(memories)) <= np.log(MEMORY))):
-        yield f"{values[told].mean():.2f} ({values[told].min():.2f} to {values[told].max():.2f})"
-        yield f"{near[told].sum()} of {told.sum()}"
+        yield mean_and_ends(values[told], 2)
+        yield count(near[told])
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS)
+    program(main)

@@ -1,51 +1,30 @@
 """What `identify` finds of a body in gusts, by instruments and by least squares, with the intervals of the first.
 
-    python benchmarks/identify_in_gusts.py                   four runs of each path
-    python benchmarks/identify_in_gusts.py --setpoints       each path once, with the position that was asked for
-    python benchmarks/identify_in_gusts.py --past            each path once, so that what was before has to tell
+A vehicle of 45 g, sets of four flights of 40 s of one path, whose other runs are the instrument, or with --setpoints of
+four paths and their position setpoints; six sets of each of 0.8, 3 and 5 Hz at most, in two levels of gusts, behind
+loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. A row is a level of gusts and a loop: in
+how many of its 18 sets the instruments decide, errors of the moments there as root mean squares of their logarithms,
+and how often 95 % intervals hold the truth, around either estimate. The last row is of all.
 
-A vehicle of 45 g, sets of four flights of 40 s, six of each path or of each four, of 0.8, 3 and 5 Hz at most, in two
-levels of gusts, behind loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the
-package flies them. A row is a level of gusts and a loop: in how many of its 18 sets the instruments decide, errors of
-the moments there as root mean squares of their logarithms, and how often 95 % intervals hold the truth, around either
-estimate. The last row is of all.
-
-By what was before: vehicles of 45 g and 1.5 kg, sets of three flights of three paths, eight of each, behind a loop of 6
-rad/s; a row is a vehicle, a level of gusts (or none) and the fastest motion of its paths.
+With --past: vehicles of 45 g and 1.5 kg, sets of three flights of three paths without setpoints, eight of each, behind
+a loop of 6 rad/s; a row is a vehicle, a level of gusts (or none) and the fastest motion of its paths.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Sequence
 from itertools import islice, product
-from pathlib import Path
 from typing import NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.gusty_sets import LEVELS, words
+from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.closed_loop import freed_torque
 from cpfls_cli.identification.data import TorqueSource, axis_scale, joined
 from cpfls_cli.identification.judge import fit_baselines
-from tests.builders.gusty_flights import (
-    CALM,
-    GUSTS,
-    LARGE,
-    SMALL,
-    STORM,
-    Flight,
-    Truth,
-    gusty_flights,
-    torque_samples,
-)
+from tests.builders.gusty_flights import GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights, torque_samples
 
 RUNS, PATHS, SECONDS = 4, 6, 40.0
 LOOPS, REACHES_HZ = (6.0, 8.0, 12.0), (0.0, 3.0, 5.0)
@@ -62,12 +41,8 @@ class Found(NamedTuple):
     told: bool
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--setpoints", action="store_true", help="each path once, with what was asked for")
-    parser.add_argument("--past", action="store_true", help="each path once, and nothing that was asked for")
-    chosen = parser.parse_args()
-    _past() if chosen.past else _instruments(chosen.setpoints)
+def main(*, setpoints: bool = False, past: bool = False) -> None:
+    _past() if past else _instruments(setpoints)
 
 
 def _instruments(once: bool) -> None:
@@ -83,33 +58,30 @@ def _instruments(once: bool) -> None:
     rows, every = [], []
     for gusts, loop in kinds:
         own = [_found(SMALL, joined(list(islice(flown, RUNS)))) for _ in range(len(REACHES_HZ) * PATHS)]
-        rows.append([", ".join(f"{gust:g}" for gust in gusts), f"{loop:g}", *_cells(own)])
+        rows.append([words(gusts), f"{loop:g}", *_cells(own)])
         every += own
     rows.append(["all", "", *_cells(every)])
-    name = "identify_in_gusts_asked" if once else "identify_in_gusts"
-    _table(name, ["gusts, rad/s²", "loop, rad/s"], rows)
+    _table("identify_in_gusts_asked" if once else "identify_in_gusts", "gusts, rad/s² | loop, rad/s", rows)
 
 
 def _past() -> None:
     rows, every = [], []
-    for truth, gusts, reach in product((SMALL, LARGE), (CALM, GUSTS, STORM), (0.0, 5.0)):
+    for truth, gusts, reach in product((SMALL, LARGE), LEVELS, (0.0, 5.0)):
         numbers = range(FLIGHTS * DRAWS)
         asked = [Flight(truth, gusts, number, number, bandwidth=LOOP, reach=reach) for number in numbers]
         flown = (torque_samples(each, truth) for each in gusty_flights(asked, SECONDS))
         own = [_found(truth, joined(list(islice(flown, FLIGHTS))), past=True) for _ in range(DRAWS)]
-        mass, blown = f"{1000 * truth.mass:g} g", ", ".join(f"{gust:g}" for gust in gusts)
-        rows.append([mass, blown, f"{reach or 0.8:g}", *_cells(own)])
-        print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
+        rows.append([f"{1000 * truth.mass:g} g", words(gusts), f"{reach or 0.8:g}", *_cells(own)])
+        progress(rows[-1])
         every += own
     rows.append(["all", "", "", *_cells(every)])
-    _table("identify_in_gusts_past", ["vehicle", "gusts, rad/s²", "path up to, Hz"], rows)
+    _table("identify_in_gusts_past", "vehicle | gusts, rad/s² | path up to, Hz", rows)
 
 
-def _table(name: str, of: list[str], rows: list[list[str]]) -> None:
-    by = ("by instruments", "by least squares")
-    header = [*of, "told", *(f"Ixx, Iyy {each}, %" for each in by)]
-    header += [f"95 % hold, {each}" for each in by]
-    table(name, [*header, "Izz told", *(f"Izz {each}, %" for each in by)], rows)
+def _table(name: str, of: str, rows: list[list[str]]) -> None:
+    columns = " | ".join(f"{{0}} {by}" for by in ("by instruments", "by least squares"))
+    moments, hold, yaw = (columns.replace("{0}", what) for what in ("Ixx, Iyy, %,", "95 % hold,", "Izz, %,"))
+    table(name, f"{of} | told | {moments} | {hold} | Izz told | {yaw}", rows)
 
 
 def _found(truth: Truth, source: TorqueSource, *, past: bool = False) -> Found | None:
@@ -141,4 +113,4 @@ def _cells(sets: Sequence[Found | None]) -> list[str]:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,15 +1,12 @@
 """Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
 
-python benchmarks/long_flights.py [--most 5000000] [--effects]
-
 Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
-peak memory is read at its end. Draws docs/long-flights.svg. A model with effects predicts a flight of 40 s with rotor
-speeds, tiled; with --effects that is all.
+peak memory is read at its end. A model with effects predicts a flight of 40 s with rotor speeds, tiled; with --effects
+that is all.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -19,19 +16,13 @@ from mmap import mmap
 from pathlib import Path
 from time import perf_counter
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import h5py
 import numpy as np
-from matplotlib.figure import Figure
 
 from benchmarks.blind.cases import make
 from benchmarks.blind.generator import generate, write
 from benchmarks.blind_study.fly import config as config_of
+from benchmarks.shared.measure import program, seconds, table
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
@@ -39,32 +30,23 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights.flight import MOTION, Flight
 from cpfls_cli.flights.flight_source import flight_source
-from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import Problem, decode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.report.canvas import GREY, legend_above, plot, stacked, style_of
 from cpfls_cli.store import read
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
-OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "long-flights.svg"
-AIM_MB = 600
 NOISE = 0.01
 EVALUATIONS = 3
 BUDGET = 4
 SMALL = ("--set", "identification.population=10", "--set", "identification.generations=2")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--most", type=int, default=SIZES[-1])
-    parser.add_argument("--effects", action="store_true")
-    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
-    asked = parser.parse_args()
-    if asked.one:
-        print(json.dumps(measure(asked.one)))
+def main(most: int = SIZES[-1], *, effects: bool = False, one: Path | None = None) -> None:
+    if one:
+        print(json.dumps(measure(one)))
         return
-    sizes = [size for size in SIZES if size <= asked.most]
-    if not asked.effects:
+    sizes = [size for size in SIZES if size <= most]
+    if not effects:
         of_identified_models(sizes)
     of_effects(sizes)
 
@@ -87,22 +69,10 @@ def of_identified_models(sizes: list[int]) -> None:
             rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced, *predicted, size))
             prediction.unlink()
     columns = (
-        "samples",
-        "evaluation, us per sample",
-        "local search, us per sample",
-        "peak memory, MB",
-        "`cpfls reduce` to 685, s",
-        "its peak memory, MB",
-        "`cpfls predict`, s",
-        "its peak memory, MB ",
-        "its file, MB",
+        "samples | evaluation, us per sample | local search, us per sample | peak memory, MB | "
+        "`cpfls reduce` to 685, s | its peak memory, MB | `cpfls predict`, s | its peak memory, MB  | its file, MB"
     )
     table("long_flights", columns, rows)
-    caption = "Time per sample and peak memory over the number of samples"
-    description = f"{caption}: neither grows with the flight"
-    drawn = plot("long-flights", caption, description, 4.6, lambda figure: draw(figure, rows))
-    OUTPUT.write_text(drawn.picture.svg + "\n")
-    print(f"wrote {OUTPUT}")
 
 
 def of_effects(sizes: list[int]) -> None:
@@ -123,7 +93,7 @@ def of_effects(sizes: list[int]) -> None:
             write_over_and_over(flight, samples, signals, float(flown.time[1]), origin.config, 0.0)
             predicted = by_command("predict", output, model / "extended.h5", flight, config=study)
             rows.append((samples, *predicted, output.stat().st_size / 2**20))
-    columns = ("samples", "`cpfls predict` of a model with effects, s", "its peak memory, MB", "its file, MB")
+    columns = "samples | `cpfls predict` of a model with effects, s | its peak memory, MB | its file, MB"
     table("long_flights_effects", columns, rows)
 
 
@@ -141,15 +111,8 @@ def write_over_and_over(
     """Write a flight artifact block by block: a flight over and over, with noise as a share of its scatter."""
     rng = np.random.default_rng(6)
     with h5py.File(path, "w") as file:
-        header = {
-            "format": "cpfls/flight",
-            "schema_version": SCHEMA_VERSION,
-            "cpfls_version": __version__,
-            "seed": 6,
-            "stage": "simulate",
-            "cautions": "",
-        }
-        file.attrs.update(header)
+        header = {"format": "cpfls/flight", "schema_version": SCHEMA_VERSION, "cpfls_version": __version__}
+        file.attrs.update(header | {"seed": 6, "stage": "simulate", "cautions": ""})
         file["config"] = np.bytes_(config.encode())
         file["time"] = period * np.arange(samples)
         for name, values in signals.items():
@@ -169,20 +132,16 @@ def measure(path: Path) -> dict[str, float]:
     source = flight_source(path)
     evaluator = model_evaluator(source, source, paper_study().identification)
     chromosome = np.full(evaluator.structure.genes, 30000)
-    evaluator.objectives(chromosome, fitted(evaluator, chromosome))
-    evaluation = np.median(
-        [
-            per_sample(lambda: evaluator.objectives(chromosome, fitted(evaluator, chromosome)), source)
-            for _ in range(EVALUATIONS)
-        ]
-    )
+    work = lambda: evaluator.objectives(chromosome, fitted(evaluator, chromosome))  # noqa: E731
+    work()
+    evaluation = np.median([1e6 * seconds(work, perf_counter) / len(source) for _ in range(EVALUATIONS)])
     problem = Problem(evaluator.solver, fitted(evaluator, chromosome))
     products = evaluator.solver.products(decode(evaluator.structure, chromosome.astype(float)))
     one_search = partial(refine, problem, chromosome, products, BUDGET)
     if len(source) == SIZES[0]:
         # What a first search loads counts where samples are few.
         one_search()
-    search = per_sample(one_search, source)
+    search = 1e6 * seconds(one_search, perf_counter) / len(source)
     return {"evaluation": float(evaluation), "search": search}
 
 
@@ -192,14 +151,8 @@ def fitted(evaluator, chromosome: np.ndarray):
     return fit
 
 
-def per_sample(work, source: TorqueSource) -> float:
-    start = perf_counter()
-    work()
-    return 1e6 * (perf_counter() - start) / len(source)
-
-
 def in_own_process(path: Path) -> dict[str, float]:
-    _, memory, said = beside([sys.executable, __file__, "--one", path])
+    _, memory, said = beside([sys.executable, "-m", "benchmarks.long_flights", "--one", path])
     return json.loads(said) | {"memory": memory}
 
 
@@ -226,25 +179,5 @@ def beside(call) -> tuple[float, float, str]:
     return seconds, memory, said
 
 
-def draw(figure: Figure, rows) -> None:
-    """Draw time per sample and peak memory over the number of samples."""
-    samples = [row[0] for row in rows]
-    times, memory = stacked(figure, 2)
-    for axes, curves, label in (
-        (times, {"one evaluation": 1, "one local search, 4 evaluations": 2}, "time per sample, μs"),
-        (memory, {"identification": 3, "cpfls reduce": 5, "cpfls predict": 7}, "peak memory, MB"),
-    ):
-        for index, (name, column) in enumerate(curves.items()):
-            style = {**style_of(index), "marker": "os^"[index], "markersize": 4}
-            axes.semilogx(samples, [row[column] for row in rows], label=name, **style)
-        axes.set_ylabel(label)
-        axes.grid(color="0.9")
-    memory.axhline(AIM_MB, color=GREY, label=f"aim, {AIM_MB} MB")
-    memory.set_xlabel("samples")
-    for axes in (times, memory):
-        axes.set_ylim(0, None)
-        legend_above(axes)
-
-
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,14 +1,12 @@
-"""How often the intervals of `look` on balance, hover, battery and gusts cover the truth, on simulated flights.
+"""How often the intervals of `look` on balance, hover, battery and gusts hold the truth, on simulated flights."""
 
-Prints Markdown: share of draws whose 95 % interval holds the truth, and the mean half-width. A minute.
-"""
+from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from collections.abc import Iterator
 
 import numpy as np
 
+from benchmarks.shared.measure import program, table
 from cpfls_cli.look.balance import balance_of
 from cpfls_cli.look.gusts import gusts_of
 from cpfls_cli.look.hover import hover_of
@@ -17,63 +15,51 @@ from tests.unit.look import test_gusts as gusty
 from tests.unit.look import test_hover as lifted
 from tests.unit.look.test_balance import CURVE, EVEN
 
-DRAWS = 200
+
+def main(draws: int = 200) -> None:
+    rows = []
+    for what, truth, estimates in (*_balances(range(draws)), *_hovers(range(draws)), *_gusts(range(draws // 2))):
+        known = [(each.low, each.high, each.half) for each in estimates if each is not None]
+        low, high, half = np.array(known).reshape(-1, 3).T
+        inside = np.sum((low <= truth) & (truth <= high)) / max(len(known), 1)
+        rows.append((what, float(truth), len(known), inside, np.sum(half) / max(len(known), 1)))
+    table("look_health", "what | truth | found | inside | half-width", rows)
 
 
-def row(what, estimates, truth):
-    known = [each for each in estimates if each is not None]
-    inside = np.mean([each.low <= truth <= each.high for each in known])
-    half = np.mean([each.half for each in known])
-    print(f"| {what} | {truth:.3g} | {len(known)} | {inside:.3f} | {half:.3g} |")
-
-
-def balances():
+def _balances(seeds: range) -> Iterator[tuple]:
     share = 1 / 0.9 / ((3 + 1 / 0.9) / 4)
     for seconds in (20, 60, 240):
         for gusts in (0.005, 0.02, 0.05):
-            found = [
-                balance_of(hovering(EVEN, seed, seconds, gusts=gusts, weak={2: 0.9}, **CURVE)) for seed in range(DRAWS)
-            ]
-            row(f"share of a rotor of 90 %, {seconds} s, gusts {gusts}", [b.rotors[2].share for b in found], share)
-    ahead = 0.04 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
-    turned = [
-        balance_of(hovering(1 + ahead, seed, heading=lambda t: np.pi * (t > 30), wind=(0.06, 0.03), **CURVE))
-        for seed in range(DRAWS)
-    ]
-    row("centre of mass forward, wind, half a turn", [b.fixed_forward for b in turned], 0.04)
-    row("wind, half a turn", [b.wind for b in turned], np.hypot(0.06, 0.03))
+            flights = (hovering(EVEN, seed, seconds, gusts=gusts, weak={2: 0.9}, **CURVE) for seed in seeds)
+            found = [balance_of(flight).rotors[2].share for flight in flights]
+            yield f"share of a rotor of 90 %, {seconds} s, gusts {gusts}", share, found
+    ahead = 1 + 0.04 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
+    turn = {"heading": lambda time: np.pi * (time > 30), "wind": (0.06, 0.03), **CURVE}
+    turned = [balance_of(hovering(ahead, seed, **turn)) for seed in seeds]
+    yield "centre of mass forward, wind, half a turn", 0.04, [each.fixed_forward for each in turned]
+    yield "wind, half a turn", np.hypot(0.06, 0.03), [each.wind for each in turned]
 
 
-def hovers():
+def _hovers(seeds: range) -> Iterator[tuple]:
     for memory in (0.5, 1.0, 3.0):
-        found = []
-        for seed in range(DRAWS):
-            noise = correlated(np.random.default_rng(seed), 1200, 20.0, memory)[:, 0]
-            found.append(hover_of(still_flight(60.0, 20.0, collective=0.4 + 0.02 * noise)).throttle)
-        row(f"hover throttle, 60 s, gusts of {memory} s", found, 0.4)
+        noises = (correlated(np.random.default_rng(seed), 1200, 20.0, memory)[:, 0] for seed in seeds)
+        found = [hover_of(still_flight(60.0, 20.0, collective=0.4 + 0.02 * noise)).throttle for noise in noises]
+        yield f"hover throttle, 60 s, gusts of {memory} s", 0.4, found
     for exponent in (1.0, 1.5, 2.0):
         for gusts in (0.02, 0.1):
-            shapes = [hover_of(lifted.climbing(seed, exponent, gusts=gusts)).shape for seed in range(DRAWS)]
-            row(f"exponent of thrust, gusts {gusts}", [shape and shape.exponent for shape in shapes], exponent)
-    batteries = [hover_of(lifted.battery(seed)).battery for seed in range(DRAWS)]
-    row("resistance of the battery", [each.slope for each in batteries], 0.05)
-    row("open-circuit voltage at the end", [each.open_circuit_end for each in batteries], 15.5)
+            shapes = [hover_of(lifted.climbing(seed, exponent, gusts=gusts)).shape for seed in seeds]
+            yield f"exponent of thrust, gusts {gusts}", exponent, [shape and shape.exponent for shape in shapes]
+    batteries = [hover_of(lifted.battery(seed)).battery for seed in seeds]
+    yield "resistance of the battery", 0.05, [each.slope for each in batteries]
+    yield "open-circuit voltage at the end", 15.5, [each.open_circuit_end for each in batteries]
 
 
-def gusts():
+def _gusts(seeds: range) -> Iterator[tuple]:
     for memory in (0.15, 0.3, 1.0):
-        plants = {"roll": gusty.PLANT}
-        found = [gusts_of(gusty.gusty(seed, memory=memory), plants)[0] for seed in range(DRAWS // 2)]
-        row(f"gusts of {memory} s, in the band", [each.in_band for each in found], gusty.in_band(3.0, memory))
-        row(f"gusts of {memory} s, size", [each.size for each in found], 3.0)
-
-
-def main() -> None:
-    print("| what | truth | found | inside | half-width |\n|---|---|---|---|---|")
-    balances()
-    hovers()
-    gusts()
+        found = [gusts_of(gusty.gusty(seed, memory=memory), {"roll": gusty.PLANT})[0] for seed in seeds]
+        yield f"gusts of {memory} s, in the band", gusty.in_band(3.0, memory), [each.in_band for each in found]
+        yield f"gusts of {memory} s, size", 3.0, [each.size for each in found]
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,22 +1,18 @@
 """Judge what `look` says of a vehicle's axes on simulated flights whose truth is known.
 
 Rigid axes behind rotors with lag and delay, in torque gusts, under the control laws of four autopilots that step as
-they do on board; logs at the ordinary rates of each. Usage: ``python benchmarks/look_study.py [SEED [FLIGHTS]]``;
-seed 2 is what thresholds were chosen on, seed 4 what the table in docs/look-study.md was judged on.
+they do on board; logs at the ordinary rates of each. Seed 2 is what thresholds were chosen on, seed 4 what the table in
+docs/look-study.md was judged on.
 """
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import signal
 
+from benchmarks.shared.measure import program, table
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Controller, Law, chain
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -38,11 +34,8 @@ GUST_SIZE, GUST_S = np.array([3.4, 5.1, 2.0]), np.array([0.31, 1.18, 0.5])
 WASH, WASH_S = 0.5, 0.05
 """Size over that of gusts, and time constant, of what a vehicle meets in its own wake."""
 LOGGED_HZ = {
-    "betaflight": (1000.0, 1000.0),
-    "px4": (50.0, 250.0),
-    "ardupilot": (400.0, 400.0),
-    "crazyflie": (100.0, 100.0),
-}
+    "betaflight": (1000.0, 1000.0), "px4": (50.0, 250.0), "ardupilot": (400.0, 400.0), "crazyflie": (100.0, 100.0),
+}  # fmt: skip
 """Of commands and of body rates."""
 GYRO_NOISE = 0.02
 CROSSOVER = {"betaflight": 60.0, "px4": 15.0, "ardupilot": 15.0, "crazyflie": 15.0}
@@ -165,10 +158,8 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
     sent, lagged = np.zeros((line, lanes)), np.zeros(lanes)
     pull = 1 - np.exp(-period / wide["lag"])
     gust, rate, angle, heading = size * rng.standard_normal(lanes), np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
-    kept = {
-        name: np.zeros((steps, lanes), dtype=np.float32)
-        for name in ("rate", "gyro", "asked", "angle", "wanted", "command", "acting")
-    }
+    names = ("rate", "gyro", "asked", "angle", "wanted", "command", "acting")
+    kept = {name: np.zeros((steps, lanes), dtype=np.float32) for name in names}
     command, saturated = np.zeros(lanes), np.zeros(lanes, dtype=bool)
     hold = np.repeat([case.sticks == "hold" for case in cases], 3)
     velocity = np.zeros(lanes)
@@ -191,16 +182,8 @@ def simulate(cases: list[Case], seconds: float, rng: np.random.Generator) -> lis
         gust = gust * decay + shocks * rng.standard_normal(lanes)
         wash = wash * decay_wash + shocks_wash * rng.standard_normal(lanes)
         torque = wide["gain"] * (lagged + wide["lead"] * change / period) + gust + wash
-        for name, value in (
-            ("rate", rate),
-            ("gyro", gyro),
-            ("asked", asked),
-            ("angle", angle),
-            ("wanted", target),
-            ("command", command),
-            ("acting", acting),
-        ):
-            kept[name][step] = value
+        for values, value in zip(kept.values(), (rate, gyro, asked, angle, target, command, acting), strict=True):
+            values[step] = value
         rate = rate + period * (torque - wide["damping"] * rate)
         angle = angle + period * rate
         velocity = velocity + period * (9.8 * np.sin(angle) - 0.3 * velocity)
@@ -356,42 +339,35 @@ def middle(rows: list[dict[str, object]], name: str) -> str:
     return f"{100 * np.median(values):.1f} %" if values else "-"
 
 
-def table(rows: list[dict[str, object]]) -> None:
-    """Print the table of docs/look-study.md."""
-    columns = {
-        "axes": lambda own: len(own),
-        "identified": lambda own: sum(row["verdict"] == "identified" for row in own),
-        "effectiveness inside": lambda own: share(own, "inside"),
-        "its error": lambda own: middle(own, "error"),
-        "by least squares": lambda own: middle(own, "ls error"),
-        "delay within 2 ms": lambda own: share(own, "delay", 0.002),
-        "inside": lambda own: share(own, "delay inside"),
-        "phase margin within 5°": lambda own: share(own, "phase error", 5.0),
-        "inside ": lambda own: share(own, "phase margin"),
-        "gain margin inside": lambda own: share(own, "gain margin"),
-        "disk margin inside": lambda own: share(own, "disk margin"),
-        "crossover inside": lambda own: share(own, "crossover"),
-        "overshoot within 5 points": lambda own: share(own, "overshoot", 0.05),
-        "inside  ": lambda own: share(own, "overshoot inside"),
-        "law explains": lambda own: share(own, "law"),
-        "bounds that hold": lambda own: share(own, "bound"),
-    }
-    print("| flights | " + " | ".join(map(str.strip, columns)) + " |")
-    print("|" + "---|" * (1 + len(columns)))
-    groups = [("all", rows)]
+COLUMNS = {
+    "axes": lambda own: len(own),
+    "identified": lambda own: sum(row["verdict"] == "identified" for row in own),
+    "effectiveness inside": lambda own: share(own, "inside"),
+    "its error": lambda own: middle(own, "error"),
+    "by least squares": lambda own: middle(own, "ls error"),
+    "delay within 2 ms": lambda own: share(own, "delay", 0.002),
+    "inside": lambda own: share(own, "delay inside"),
+    "phase margin within 5°": lambda own: share(own, "phase error", 5.0),
+    "inside ": lambda own: share(own, "phase margin"),
+    "gain margin inside": lambda own: share(own, "gain margin"),
+    "disk margin inside": lambda own: share(own, "disk margin"),
+    "crossover inside": lambda own: share(own, "crossover"),
+    "overshoot within 5 points": lambda own: share(own, "overshoot", 0.05),
+    "inside  ": lambda own: share(own, "overshoot inside"),
+    "law explains": lambda own: share(own, "law"),
+    "bounds that hold": lambda own: share(own, "bound"),
+}
+
+
+def main(seed: int = 4, count: int = 200) -> None:
+    rows = [row for case, log, _ in flights(seed, count) for row in rows_of(case, log)]
+    groups = {"all": rows}
     for key in ("autopilot", "gusts", "sticks", "axis"):
-        groups += [
-            (str(value), [row for row in rows if row[key] == value])
-            for value in dict.fromkeys(row[key] for row in rows)
-        ]
-    for name, own in groups:
-        print("| " + " | ".join([name, *(str(column(own)) for column in columns.values())]) + " |")
-
-
-def main() -> None:
-    seed, count = (int(each) for each in (*sys.argv[1:3], *("4", "200")[len(sys.argv) - 1 :]))
-    table([row for case, log, _ in flights(seed, count) for row in rows_of(case, log)])
+        for value in dict.fromkeys(str(row[key]) for row in rows):
+            groups[value] = [row for row in rows if str(row[key]) == value]
+    cells = [[name, *(of(own) for of in COLUMNS.values())] for name, own in groups.items()]
+    table("look", ["flights", *COLUMNS], cells)
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

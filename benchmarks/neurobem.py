@@ -1,7 +1,7 @@
-"""Print what models predict of six fast flights of NeuroBEM, each held out once, beside BEM+NN.
+"""What models predict of six fast flights of NeuroBEM, each held out once, compared with BEM+NN.
 
-    python benchmarks/neurobem.py DATA [--unknown] [--held-out NAME ...]
-    python benchmarks/neurobem.py DATA --write FOLDER         the segments as CSV, and nothing else
+    python -m benchmarks.neurobem DATA [--unknown] [--held-out NAME]...
+    python -m benchmarks.neurobem DATA --write FOLDER         the segments as CSV, and nothing else
 
 DATA is a clone of RCL-NUS/NeuroMHE (commit 64e184c), or any folder with its files bemnn*.mat in it or below it. They
 hold test segments of NeuroBEM (Bauersfeld et al. 2021) with the torques and forces that its model BEM+NN gives.
@@ -16,29 +16,22 @@ accelerations and the stated mass and inertia; a model with another inertia ente
 
 from __future__ import annotations
 
-import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.found_vehicles import constants_unknown, learned
+from benchmarks.shared.measure import program, table
 from benchmarks.shared.neurobem_files import INERTIA, MASS, VEHICLE, Segment, segments
 from benchmarks.shared.playback_scores import HORIZON, Runs, free_runs, nothing_moves, rate_stays, score
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 COLUMNS = (
     *("held out", "model", "ω sum", "of rate stays", "R sum", "v sum", "p sum", "windows", "diverged"),
@@ -46,28 +39,6 @@ COLUMNS = (
     *(f"RMSE F_{axis} N" for axis in "xyz"),
 )
 UNKNOWN = ("",) * 6
-
-
-def models(training: Sequence[PlaybackFlight], stated: VehicleSettings) -> Mapping[str, VehicleModel]:
-    """Give the models that are played back, by name; those that learn see the training segments alone."""
-    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(stated, training, baselines=False)}
-
-
-def our_rows(
-    training: Sequence[PlaybackFlight], test: Segment, stated: VehicleSettings = VEHICLE
-) -> list[list[object]]:
-    """Play the baselines, BEM+NN and the models back on the segment that is held out."""
-    flight = test.flight
-    stays = rate_stays(flight)
-    reference = float(score([stays]).sums[3])
-    rows = [
-        row("nothing moves", test, nothing_moves(flight), reference, None),
-        row("rate stays", test, stays, reference, None),
-        row("BEM+NN along the path", test, along_the_path(test), reference, test.hybrid),
-    ]
-    for name, model in models(training, stated).items():
-        rows.append(row(name, test, free_runs(model, flight), reference, wrench_of(model, flight)))
-    return rows
 
 
 def row(name: str, test: Segment, runs: Runs, reference: float, wrench: Array | None) -> list[object]:
@@ -110,27 +81,35 @@ def wrench_of(model: VehicleModel, flight: PlaybackFlight) -> Array:
     return np.hstack([stated, MASS / body.mass * force])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of the segments")
-    parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
-    parser.add_argument("--held-out", nargs="*", metavar="NAME", help="hold out these segments alone")
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the segments as CSV, and stop")
-    given = parser.parse_args()
-    stated = constants_unknown(VEHICLE) if given.unknown else VEHICLE
+def main(data: Path, *, unknown: bool = False, held_out: list[str] | None = None, write: Path | None = None) -> None:
     try:
-        found = segments(given.data)
+        found = segments(data)
     except InputError as error:
         sys.exit(f"{error}\nget them: git clone https://github.com/RCL-NUS/NeuroMHE")
-    if given.write is not None:
+    if write is not None:
         for each in found:
-            write_flight(given.write, each.flight, each.wrench[:, 3:] / MASS)
+            write_flight(write, each.flight, each.wrench[:, 3:] / MASS)
         return
-    rows = []
-    for test in found if given.held_out is None else [each for each in found if each.flight.name in given.held_out]:
-        rows += our_rows([other.flight for other in found if other is not test], test, stated)
-    table("neurobem_unknown" if given.unknown else "neurobem", COLUMNS, rows)
+    stated, rows = constants_unknown(VEHICLE) if unknown else VEHICLE, []
+    for test in [each for each in found if not held_out or each.flight.name in held_out]:
+        training = [other.flight for other in found if other is not test]
+        models = {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(stated, training, baselines=False)}
+        rows += rows_of(test, models)
+    table("neurobem_unknown" if unknown else "neurobem", COLUMNS, rows)
+
+
+def rows_of(test: Segment, models: Mapping[str, VehicleModel]) -> list[list[object]]:
+    """Play the baselines, BEM+NN and the models back on the segment that is held out."""
+    flight = test.flight
+    runs = {
+        "nothing moves": (nothing_moves(flight), None),
+        "rate stays": (rate_stays(flight), None),
+        "BEM+NN along the path": (along_the_path(test), test.hybrid),
+    }
+    runs |= {name: (free_runs(model, flight), wrench_of(model, flight)) for name, model in models.items()}
+    reference = float(score([runs["rate stays"][0]]).sums[3])
+    return [row(name, test, own, reference, wrench) for name, (own, wrench) in runs.items()]
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

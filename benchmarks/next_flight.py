@@ -1,7 +1,5 @@
 """Settle what a diagnosis leaves open by one more flight: the planned one, a random one, or the one of the advice.
 
-python benchmarks/next_flight.py [SETS]
-
 Flights of the own simulator hide one effect; those whose diagnosis is AMBIGUOUS between it and a rival are kept, half
 of the sets with each of two seeds. One more flight of 30 s goes to those that train, and the diagnosis is made again.
 """
@@ -14,19 +12,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
-from pathlib import Path
-from time import perf_counter
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
 from benchmarks.blind.vehicles import HUMMINGBIRD, SIXKG, XQUAD
 from benchmarks.gap import vehicle_of
+from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
@@ -34,7 +25,7 @@ from cpfls_cli.gap.balance.weak_flight import Preparation
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
-from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, usual
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, formulas_off
@@ -48,13 +39,8 @@ SEEDS = (31, 47)
 # A load on a cable costs as much as the rest of the catalogue, and its swing is no look-alike of a gentle flight.
 SETTINGS = GapSettings(shifts=39, ignore=("payload",))
 NOISE = {
-    "attitude": 0.003,
-    "body_rate": 0.005,
-    "position": 0.02,
-    "velocity": 0.05,
-    "acceleration": 0.1,
-    "rotor_speed": 1.0,
-}
+    "attitude": 0.003, "body_rate": 0.005, "position": 0.02, "velocity": 0.05, "acceleration": 0.1, "rotor_speed": 1.0,
+}  # fmt: skip
 LOGGED = frozenset({"attitude", "position", "velocity", "acceleration"})
 FIRST_S, NEXT_S, RATE_HZ = 20.0, 30.0, 200.0
 WAYS = ("planned", "random", "advice")
@@ -83,32 +69,30 @@ class OpenSet:
     diagnosis: DiagnosisRun
 
 
-def main(count: int) -> None:
-    rows, totals = [], {way: Counter() for way in WAYS}
-    expected = {way: [] for way in WAYS}
+def main(sets: int = 40) -> None:
+    rows, totals, expected = [], {way: Counter() for way in WAYS}, {way: [] for way in WAYS}
     with ProcessPoolExecutor(len(SEEDS)) as pool:
-        of_seeds = list(pool.map(settled, SEEDS, [count // len(SEEDS)] * len(SEEDS)))
+        of_seeds = list(pool.map(settled, SEEDS, [sets // len(SEEDS)] * len(SEEDS)))
     for hidden, rival, outcomes in chain(*of_seeds):
         for way, (outcome, sure) in outcomes.items():
             totals[way][outcome.partition(":")[0]] += 1
             expected[way].append(sure)
         rows.append((hidden, rival, *(f"{outcome} ({sure:.2f})" for outcome, sure in outcomes.values())))
     table("next-flight-sets", ("hidden", "rival", *(f"{way} (predicted)" for way in WAYS)), rows)
-    kinds = ("right", "wrong", "open")
     summary = [
-        (way, *(f"{totals[way][kind]} of {totals[way].total()}" for kind in kinds), f"{np.mean(expected[way]):.2f}")
-        for way in WAYS
+        (way, *(f"{counts[kind]} of {counts.total()}" for kind in ("right", "wrong", "open")), np.mean(expected[way]))
+        for way, counts in totals.items()
     ]
-    table("next-flight", ("one more flight of 30 s", *kinds, "predicted share right"), summary)
+    table("next-flight", "one more flight of 30 s | right | wrong | open | predicted share right", summary)
 
 
 def settled(seed: int, count: int) -> list[tuple[str, str, dict[str, tuple[str, float]]]]:
     """Settle the sets of a seed: hidden effect, its rival, and the outcome of each way."""
-    found, begin = [], perf_counter()
+    found = []
     for number, opened in enumerate(open_sets(seed, count)):
         outcomes = settle(opened, np.random.default_rng([seed, number, 1]))
         found.append((opened.hidden.candidate.effect.name, opened.rival, outcomes))
-        print(seed, number, f"{perf_counter() - begin:.0f} s", *found[-1], sep="; ", flush=True)
+        progress([seed, number, *found[-1]])
     return found
 
 
@@ -189,18 +173,14 @@ def floor_of(craft) -> np.ndarray:
 
 def fly(room: Room, path: HarmonicPath, hidden: SizedEffect, rng: np.random.Generator, name: str) -> Recording:
     """Fly a path in closed loop with the hidden effect, and log it with noise."""
-    return Recording(name, flown(room.planned(path, 0.01), room.vehicle, hidden, rng))
-
-
-def flown(planned, vehicle, hidden: SizedEffect | None, rng: np.random.Generator) -> Signals:
-    """Log a flight with noise."""
-    effects = {} if hidden is None else {hidden.candidate.effect.name: physical_values(hidden)}
+    planned = room.planned(path, 0.01)
+    effects = {hidden.candidate.effect.name: physical_values(hidden)}
     loop = SimulationSettings(
         mode="closed-loop", noise=NOISE, closed_loop=ClosedLoopSettings(effects=effects, integration_rate_hz=RATE_HZ)
     )
-    logged = measure(planned.time, vars(planned), vehicle, loop, rng).signals
-    names = ("attitude", "position", "velocity", "acceleration", "body_rate", "rotor_speed")
-    return Signals(time=planned.time, vehicle=vehicle, **{name: logged[name] for name in names})
+    logged = measure(planned.time, vars(planned), room.vehicle, loop, rng).signals
+    signals = {name: logged[name] for name in NOISE}
+    return Recording(name, Signals(time=planned.time, vehicle=room.vehicle, **signals))
 
 
 def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, float]]:
@@ -210,7 +190,7 @@ def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, fl
     weak = prepared.repaired(training)
     floor = best_floor(opened.diagnosis.hypothesis)
     off = formulas_off(opened.diagnosis.hypothesis, floor)
-    questions = questions_left(diagnosis.effects, diagnosis.alternatives, (), weak, floor, SETTINGS)
+    questions = open_questions(diagnosis.effects, diagnosis.alternatives, (), weak, floor, SETTINGS)
     asked = goal(questions, weak, opened.room, Logging(LOGGED, False, floor, SETTINGS, None, off))
     found = next_flight(asked, rng)
     paths: dict[str, HarmonicPath] = {
@@ -257,4 +237,4 @@ def advised(advice: str, room: Room) -> HarmonicPath:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)
+    program(main)

@@ -1,6 +1,4 @@
-"""Print how well thinned motors are rebuilt, and what wrong ones do to the constants that are found with them.
-
-    python benchmarks/rebuilt_motors.py [LOG...]
+"""How well thinned motors are rebuilt, and what wrong ones do to the constants that are found with them.
 
 Simulated flights under the laws of PX4, ArduPilot and Betaflight, in gusts, with commands that reach their limits.
 Their motors are thinned to what each autopilot logs by default, rebuilt, and compared with all of its steps. Then the
@@ -10,17 +8,11 @@ rebuilt ones, and with rebuilt ones that are made worse. Logs that are given are
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import program, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.rebuilt import Rebuilt, rebuilt_rotors
 from cpfls_cli.flightlog.smoothing import low_pass
@@ -31,11 +23,10 @@ from tests.builders.thinned_logs import AP, BF, CA, COPTER, Flown
 BAND_HZ = 10.0
 LAGS_S = np.arange(0.0, 0.2, 0.002)
 SEEDS = range(1, 5)
-COLUMNS = ("flight", "Hz", "roll", "pitch", "yaw", "mean", "lag, ms", "scale", "error, %", "limited, %", "refused")
+COLUMNS = "flight | Hz | roll | pitch | yaw | mean | lag, ms | scale | error, % | limited, % | refused"
 
 
-def main(logs: list[str]) -> None:
-    """Print the three tables."""
+def main(logs: list[Path] | None = None) -> None:
     rows = []
     for size in (0.25, 0.9):
         px4, copter = Flown("px4", seconds=20.0, size=size), Flown("ardupilot", AP, seconds=20.0, size=size)
@@ -47,8 +38,8 @@ def main(logs: list[str]) -> None:
             rows.append(row(f"ArduPilot, {1e3 * late:g} ms late, {size:g}", found))
         rows.append(row(f"Betaflight, {size:g}", rebuilt_rotors({"": flat.betaflight_columns()}, BF, "Betaflight 4.5")))
     table("rebuilt-motors", COLUMNS, rows)
-    table("rebuilt-constants", ("commands", "effectiveness", "lag, ms", "explained"), constants())
-    known = [(Path(name), log_contents(Path(name))) for name in logs]
+    table("rebuilt-constants", "commands | effectiveness | lag, ms | explained", constants())
+    known = [(path, log_contents(path)) for path in logs or ()]
     found = [(path.name, rebuilt_rotors(own.topics, own.parameters, own.system)) for path, own in known]
     if found:
         table("rebuilt-logs", COLUMNS, [row(name, own) for name, own in found])
@@ -57,7 +48,7 @@ def main(logs: list[str]) -> None:
 def row(name: str, found: Rebuilt | None) -> tuple[str, ...]:
     """Write a line of a flight."""
     if found is None:
-        return (name, *["-"] * (len(COLUMNS) - 2), "nothing to rebuild")
+        return (name, *["-"] * 9, "nothing to rebuild")
     shares = (*found.by_axis, found.common)
     numbers = (f"{own:.4f}" for own in shares)
     rest = (
@@ -113,4 +104,4 @@ def effectiveness(flight: Flown, stamps: Array, values: Array) -> tuple[float, f
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    program(main)

@@ -1,6 +1,4 @@
-"""Print how many signals `cpfls init` maps right in logs of others, without a hand on them.
-
-    python benchmarks/recognition.py FOLDER...
+"""How many signals `cpfls init` maps right in logs of others, without a hand on them.
 
 Folders are searched for logs of the sets below, by the names of their files; what is right is what each set says of
 itself (or PX4, ArduPilot and Betaflight of their logs), written down here. A signal counts as right where columns,
@@ -12,19 +10,15 @@ as right where all of them have their corner and their way to turn. The position
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isclose
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
+from benchmarks.shared.measure import program, table
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
+from cpfls_cli.flightlog.proposal import Proposal, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.logs.formats import log_contents
@@ -34,20 +28,10 @@ Truth = tuple[str, str, float]
 """Columns, unit, and the factor on what is logged."""
 
 SI = {
-    "attitude": "rad",
-    "quaternion": "1",
-    "body_rate": "rad/s",
-    "acceleration": "m/s^2",
-    "position": "m",
-    "velocity": "m/s",
-    "rotor_speed": "rad/s",
-    "setpoint_position": "m",
-    "setpoint_velocity": "m/s",
-    "setpoint_attitude": "1",
-    "setpoint_body_rate": "rad/s",
-    "setpoint_thrust": "1",
-    "sticks": "1",
-}
+    "attitude": "rad", "quaternion": "1", "body_rate": "rad/s", "acceleration": "m/s^2", "position": "m",
+    "velocity": "m/s", "rotor_speed": "rad/s", "setpoint_position": "m", "setpoint_velocity": "m/s",
+    "setpoint_attitude": "1", "setpoint_body_rate": "rad/s", "setpoint_thrust": "1", "sticks": "1",
+}  # fmt: skip
 FLU = {"body_frame": "FLU", "world_frame": "ENU"}
 FRD = {"body_frame": "FRD", "world_frame": "NED"}
 CRAZYFLIE = ("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)
@@ -59,19 +43,11 @@ HUMMINGBIRD = ("front left", -1), ("front right", 1), ("rear right", -1), ("rear
 
 @dataclass(frozen=True)
 class LogSet:
-    """Logs of one kind, and what is right.
+    """Logs of one kind by patterns of their names, and what is right.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Patterns of the files' names.
-    signals : mapping from signal to (columns, unit, factor) or columns
-        Columns with spaces between them, a minus before a reversed one, the name of the file as ``@``; alone they are
-        in SI.
-    rotors : tuple
-        Corner and way to turn of each; empty where the set does not say.
-    setpoints : mapping
-        As `signals`; one that is left out is none that is wrong.
+    Signals are columns with spaces between them, a minus before a reversed one, the name of the file as ``@``, alone in
+    SI or with unit and factor. Rotors are corner and way to turn of each, empty where the set does not say; a setpoint
+    that is left out is none that is wrong.
     """
 
     names: tuple[str, ...]
@@ -265,126 +241,76 @@ REFUSED = {
 """Logs of pyulog in which no multirotor flies, and a part of what has to be said."""
 
 
-@dataclass
-class Count:
-    """Signals, keys, rotors of a set, and setpoints that are mapped: how many, and how many are right."""
-
-    logs: int = 0
-    signals: int = 0
-    right: int = 0
-    guessed: int = 0
-    listed: int = 0
-    keys: int = 0
-    keys_right: int = 0
-    rotors: int = 0
-    rotors_right: int = 0
-    setpoints: int = 0
-    setpoints_right: int = 0
-    wrong: list[str] = field(default_factory=list)
-
-
-def main(folders: Sequence[Path]) -> None:
-    files = [path for folder in folders for path in sorted(folder.rglob("*")) if path.is_file()]
+def main(folders: list[Path]) -> None:
+    files = {path.name: path for folder in folders for path in sorted(folder.rglob("*")) if path.is_file()}
     rows = []
     for name, own in SETS.items():
-        count = Count()
-        for path in {path.name: path for path in files if any(path.match(pattern) for pattern in own.names)}.values():
-            judge(path, own, count)
-        if count.logs:
-            rows.append(row(name, count))
-            for wrong in count.wrong:
-                print(f"{name}: {wrong}", file=sys.stderr)
+        count: Counter[str] = Counter()
+        for path in files.values():
+            if any(path.match(pattern) for pattern in own.names):
+                for wrong in judge(path, own, count):
+                    print(f"{name}: {path.name}: {wrong}", file=sys.stderr)
+        if count["logs"]:
+            of = {what: f"{count[f'{what} right']} of {count[what]}" if count[what] else "-" for what in OF}
+            rows.append((name, count["logs"], of["signals"], count["guessed"], count["listed"], *list(of.values())[1:]))
     if not rows:
-        sys.exit("no log of a known set in these folders; call it as: python benchmarks/recognition.py FOLDER...")
-    header = (
-        "set",
-        "logs",
-        "signals right",
-        "of them guessed",
-        "wrong, the right one listed",
-        "keys right",
-        "rotors",
-        "setpoints",
-    )
-    table("recognition", header, rows)
-    for path in {path.name: path for path in files}.values():
+        sys.exit("no log of a known set in these folders")
+    columns = "set | logs | signals right | of them guessed | wrong, the right one listed | keys right"
+    table("recognition", f"{columns} | rotors | setpoints", rows)
+    for path in files.values():
         if path.name in REFUSED:
             said = refusal(path)
             print(f"\n{path.name}: {'refused as it has to be' if REFUSED[path.name] in said else 'WRONG'}: {said}")
 
 
-def row(name: str, count: Count) -> tuple[str, ...]:
-    rotors = f"{count.rotors_right} of {count.rotors}" if count.rotors else "-"
-    setpoints = f"{count.setpoints_right} of {count.setpoints}" if count.setpoints else "-"
-    return (
-        name,
-        str(count.logs),
-        f"{count.right} of {count.signals}",
-        str(count.guessed),
-        str(count.listed),
-        f"{count.keys_right} of {count.keys}",
-        rotors,
-        setpoints,
-    )
-
-
-def known(path: Path) -> KnownLog:
+def proposed(path: Path) -> Proposal:
     own = log_contents(path)
-    return known_log(path.name, own.topics, own.units, own.parameters, own.system)
+    return propose([known_log(path.name, own.topics, own.units, own.parameters, own.system)], None, None)
 
 
 def refusal(path: Path) -> str:
     try:
-        propose([known(path)], None, None)
+        proposed(path)
     except InputError as error:
         return str(error)
     return "taken for a flight"
 
 
-def judge(path: Path, own: LogSet, count: Count) -> None:
-    count.logs += 1
-    count.signals += len(own.signals)
-    count.keys += len(own.keys)
-    count.rotors += bool(own.rotors)
+def judge(path: Path, own: LogSet, count: Counter[str]) -> Iterator[str]:
+    """Count what is mapped right in a log, and say what is not."""
+    count.update({"logs": 1, "signals": len(own.signals), "keys": len(own.keys), "rotors": bool(own.rotors)})
     try:
-        proposal = propose([known(path)], None, None)
+        proposal = proposed(path)
     except InputError as error:
-        count.wrong.append(f"{path.name}: {error}")
+        yield str(error)
         return
-    guesses = {guess.signal: guess for guess in proposal.signals}
+    guesses: dict[str, Guess] = {guess.signal: guess for guess in proposal.signals}
     for signal, truth in own.signals.items():
-        judge_signal(path, signal, truth, guesses.get(signal), count)  # type: ignore[call-overload]
+        if (guess := guesses.get(signal)) is None:
+            yield f"{signal} is missing"
+        elif wrong := wrong_map(truth, signal, guess, path):
+            _, unit, factor = stated(truth, signal)
+            count["listed"] += any(rival.text in (f"unit: {unit}", f"scale: {factor:.6g}") for rival in guess.rivals)
+            yield wrong
+        else:
+            count.update({"signals right": 1, "guessed": guess.sure == "guess"})
     for key, value in own.keys.items():
-        choice = next((choice for choice in proposal.choices if choice.key == key), None)
-        right = choice is not None and choice.value == value
-        count.keys_right += right
-        count.wrong += [] if right else [f"{path.name}: {key} is {choice and choice.value}, not {value}"]
+        found = next((choice.value for choice in proposal.choices if choice.key == key), None)
+        count["keys right"] += found == value
+        yield from [] if found == value else [f"{key} is {found}, not {value}"]
     if own.rotors:
         found = tuple((rotor.name, rotor.spin) for rotor in (proposal.airframe.rotors if proposal.airframe else ()))
-        count.rotors_right += found == own.rotors
-        count.wrong += [] if found == own.rotors else [f"{path.name}: rotors {found}"]
+        count["rotors right"] += found == own.rotors
+        yield from [] if found == own.rotors else [f"rotors {found}"]
     for signal in SETPOINTS.keys() & guesses.keys() & own.setpoints.keys():
-        count.setpoints += 1
         wrong = wrong_map(own.setpoints[signal], signal, guesses[signal], path)
-        count.setpoints_right += wrong is None
-        count.wrong += [] if wrong is None else [f"{path.name}: {wrong}"]
-    extra = [signal for signal in guesses if signal not in own.signals and signal not in own.setpoints]
-    count.wrong += [f"{path.name}: {signal} is mapped, and the set has none" for signal in extra]
+        count.update({"setpoints": 1, "setpoints right": wrong is None})
+        yield from [wrong] if wrong else []
+    extra = guesses.keys() - own.signals.keys() - own.setpoints.keys()
+    yield from (f"{signal} is mapped, and the set has none" for signal in extra)
 
 
-def judge_signal(path: Path, signal: str, truth: str | Truth, guess: Guess | None, count: Count) -> None:
-    log = path.name
-    if guess is None:
-        count.wrong.append(f"{log}: {signal} is missing")
-        return
-    wrong = wrong_map(truth, signal, guess, path)
-    count.right += wrong is None
-    count.guessed += wrong is None and guess.sure == "guess"
-    if wrong is not None:
-        _, unit, factor = stated(truth, signal)
-        listed = any(rival.text in (f"unit: {unit}", f"scale: {factor:.6g}") for rival in guess.rivals)
-        count.listed += listed
-        count.wrong.append(f"{log}: {wrong}")
+OF = ("signals", "keys", "rotors", "setpoints")
 
 
 def stated(truth: str | Truth, signal: str) -> Truth:
@@ -404,6 +330,4 @@ def wrong_map(truth: str | Truth, signal: str, guess: Guess, path: Path) -> str 
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit(f"folders of logs are missing; call it as: {(__doc__ or '').split(chr(10))[2].strip()}")
-    main([Path(folder) for folder in sys.argv[1:]])
+    program(main)

@@ -1,6 +1,4 @@
-"""19,350 free runs of 50 steps by the compiled loops, beside the same in NumPy over all windows at once; one core.
-
-python benchmarks/replay.py
+"""19,350 free runs of 50 steps by the compiled loops, and the same in NumPy over all windows at once; one core.
 
 The flights are simulated (tests/builders/playback_flights.py): three of 65 s at 100 Hz, run from every sample. Times
 are processor times and hold the weights of each sample as well as the runs; code is compiled before.
@@ -8,21 +6,13 @@ are processor times and hold the weights of each sample as well as the runs; cod
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import in_turn, pin_threads, seconds, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import in_turn, program, seconds, table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
@@ -47,11 +37,11 @@ def main() -> None:
     flights = flown(truth(), KINDS, duration_s=65.0, noise=MIDDLING, seed=1)
     rows = [(name, *timed(along)) for name, along in players(flights).items()]
     print(f"{len(starts(flights[0])) * len(flights)} windows x {HORIZON} steps, processor time on one core:\n")
-    columns = ("model", "terms in use", "NumPy, s", "compiled, s", "times faster (range)", "largest difference")
+    columns = "model | terms in use | NumPy, s | compiled, s | times faster (range) | largest difference"
     table("replay", columns, rows)
     stated, model = VehicleModel(vehicle=STATED), drawn(BLOCKS)
     played = [Played(flight, player_of(model, flight), player_of(stated, flight)) for flight in flights]
-    whole = min(seconds(lambda: replay(played, HORIZON, 1), process_time) for _ in range(3))
+    whole = min(seconds(lambda: replay(played, HORIZON, 1)) for _ in range(3))
     print(f"\nAll four predictions with means and sizes, as `cpfls replay` makes them, all effects: {whole:.2f} s")
 
 
@@ -83,7 +73,7 @@ def timed(along: Along) -> tuple:
     """Time both ways in turn; the difference of their errors is a share of the largest error."""
     compiled, reference = by_loops(along), by_numpy(along)
     away = max(abs(one - other).max() for one, other in zip(compiled, reference, strict=True))
-    times = in_turn(partial(by_numpy, along), partial(by_loops, along), clock=process_time)
+    times = in_turn(partial(by_numpy, along), partial(by_loops, along))
     used, _ = along[0][0].step_weights(slice(0, 1))
     size = max(abs(errors).max() for errors in reference)
     return len(used.active), times.slow_s, times.fast_s, times.range, float(away / size)
@@ -148,4 +138,4 @@ class _NumpyRuns:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

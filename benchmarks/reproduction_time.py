@@ -1,31 +1,20 @@
 """Time of an evaluation and of the singular value decomposition in it, by the size of the training set.
 
-python benchmarks/reproduction_time.py [--out FILE]
-
-With FILE the rows go there and nowhere else, as JSON for `benchmarks/paper/report.py --times`: no artifact holds a
-time, so that equal content stays an equal file. Seconds of processor time, medians.
+With --out the rows go to a file too, as JSON for `benchmarks.paper.report --times`: no artifact holds a time, so that
+equal content stays an equal file. Seconds of processor time, medians.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
-from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
-from benchmarks.paper.claims import line_through
+from benchmarks.shared.measure import program, seconds, table
 from benchmarks.shared.studies import paper_flight, paper_study, regressor_matrix
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
@@ -35,30 +24,12 @@ SIZES = (343, 485, 685, 970, 1170, 1940, 2743, 3880, 5487)
 COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("--out", type=Path, help="write the rows here, as JSON")
-    parser.add_argument("--repeats", type=int, default=7)
-    options = parser.parse_args()
-    rows = measured(options.repeats)
-    if options.out:
+def main(out: Path | None = None, repeats: int = 7) -> None:
+    rows = measured(repeats)
+    table("reproduction_time", COLUMNS, rows)
+    if out:
         records = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
-        options.out.write_text(json.dumps(records) + "\n", encoding="utf-8")
-    else:
-        publish(rows)
-
-
-def publish(rows: list[tuple[int, float, float, float]]) -> None:
-    """Print the table and the lines through its logarithms."""
-    samples, svd, evaluation, compiled = np.log(np.array(rows)).T
-    fits = {
-        "decomposition over samples": line_through(samples, svd),
-        "evaluation over decomposition": line_through(svd, evaluation),
-        "compiled evaluation over decomposition": line_through(svd, compiled),
-    }
-    table("reproduction_time", COLUMNS, rows, fits={name: vars(fit) for name, fit in fits.items()})
-    for name, fit in fits.items():
-        print(f"\nslope of the logarithms, {name}: {fit.slope:.3f}, R2 {fit.r2:.4f}")
+        out.write_text(json.dumps(records) + "\n", encoding="utf-8")
 
 
 def measured(repeats: int) -> list[tuple[int, float, float, float]]:
@@ -91,12 +62,5 @@ def spread_samples(size: int) -> TorqueData:
     return flight[np.linspace(0, len(flight) - 1, size).round().astype(int)]
 
 
-def seconds(work: Callable[[], object]) -> float:
-    """Time something once, in seconds of processor time."""
-    start = process_time()
-    work()
-    return process_time() - start
-
-
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -1,34 +1,24 @@
 """Constants from flights of RotorPy in gusty wind, under its own controller: moments over the true ones.
 
-    python benchmarks/rotorpy_gusts.py [DRAWS]
-
 RotorPy's Crazyflie and Hummingbird on two paths with sines of up to 5 Hz, each flown four times for 40 s, or three
-paths once, with the position that was asked for or without, at 250 Hz, in wind that wanders by 1.5 m/s. The Crazyflie
+paths once, with the position setpoint or without, at 250 Hz, in wind that wanders by 1.5 m/s. The Crazyflie
 has flapping rotors here, for the wind turns no other; noise is in what the controller sees of the rates and in the
-logged speeds. Equations, rotors and controller are RotorPy's. Beside what instruments tell stands what the loop leaves
-open: bounds by regression both ways with the true model of the body. The search begins at moments twice too large.
-Needs rotorpy.
+logged speeds. Equations, rotors and controller are RotorPy's. Needs rotorpy.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
+from itertools import islice, product
 from typing import Any, NamedTuple
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from benchmarks.instruments import ends, found_moments
+from benchmarks.shared.gusty_sets import KINDS, MOMENTS, PATHS, REPEATED, RUNS, cells_of_moments
+from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
@@ -38,7 +28,6 @@ from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gusty_flights import SMALL, Flight, path_of
 from tests.builders.gusty_flights import STEP_S as PATH_STEP_S
 
-DRAWS = 4
 STRIDE, EVERY, SECONDS = 2, 2, 40.0
 """Steps of a path that RotorPy steps over at once, and how often it is logged: at 250 and 125 Hz."""
 STEP_S = STRIDE * PATH_STEP_S
@@ -47,44 +36,35 @@ RATE_NOISE, SPEED_NOISE = 0.02, 1e-3
 """rad/s, in the loop, and of the mean speed, in the log."""
 FLAPPING = 8e-9
 """Of the Crazyflie, for which RotorPy states none, N m per rad/s and m/s: a gust of 1 m/s turns it by 4 rad/s^2."""
-RUNS, REPEATED, PATHS = 4, 2, 3
 
 
 class Asked(NamedTuple):
-    """Which vehicle flies which path, in which wind, s."""
+    """Which vehicle flies which path in which wind, and whether setpoints are logged."""
 
     vehicle: str
+    setpoints: bool
     path: int
     draw: int
 
 
-def main(draws: int) -> None:
+def main(draws: int = 4) -> None:
     rows = []
     with ProcessPoolExecutor(2) as pool:
-        for vehicle in ("Crazyflie", "Hummingbird"):
-            for kind, paths, runs in (("repeats", REPEATED, RUNS), ("setpoints", PATHS, 1), ("past", PATHS, 1)):
-                asked = [
-                    Asked(vehicle, paths * draw + path, runs * draw + run)
-                    for draw in range(draws)
-                    for path in range(paths)
-                    for run in range(runs)
-                ]
-                flown = list(pool.map(_flown, asked))
-                size = paths * runs
-                sets = [flown[size * draw : size * (draw + 1)] for draw in range(draws)]
-                rows.append([vehicle, kind, *_cells(_settings(_parameters(vehicle)), kind, sets)])
-                print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
-    header = ["vehicle", "instrument", "Ixx", "Iyy", "interval ±, %", "holds the truth", "determined"]
-    table("rotorpy_gusts", [*header, "bounds without: Ixx", "Iyy"], rows)
+        for name in ("Crazyflie", "Hummingbird"):
+            for kind in KINDS:
+                paths, runs = (REPEATED, RUNS) if kind == "repeats" else (PATHS, 1)
+                each = product(range(draws), range(paths), range(runs))
+                own = name, kind == "setpoints"
+                asked = [Asked(*own, paths * draw + path, runs * draw + run) for draw, path, run in each]
+                flown, vehicle = pool.map(_flown, asked), _settings(_parameters(name))
+                sets = [list(islice(flown, paths * runs)) for _ in range(draws)]
+                rows.append([name, kind, *cells_of_moments(vehicle, kind, sets), *_bounds(vehicle, sets)])
+                progress(rows[-1])
+    table("rotorpy_gusts", f"vehicle | instrument | {MOMENTS} | bounds without: Ixx | Iyy", rows)
 
 
-def _cells(vehicle: VehicleSettings, kind: str, sets: list[list[PlaybackFlight]]) -> Iterator[str]:
-    found = [found_moments(vehicle, kind, flights) for flights in sets]
-    ratio, half, told = (np.array([each[part] for each in found]) for part in range(3))
-    yield from (ends(ratio[told[:, axis], axis]) for axis in range(2))
-    yield f"{100 * np.median(half[told]):.1f}" if told.any() else "—"
-    yield f"{int((np.abs(np.log(ratio)) <= half)[told].sum())} of {int(told.sum())}"
-    yield f"{int(told.sum())} of {told.size}"
+def _bounds(vehicle: VehicleSettings, sets: list[list[PlaybackFlight]]) -> Iterator[str]:
+    """Give what the loop leaves open: means of bounds by regression both ways with the true model of the body."""
     bounds = [loop_bounds(VehicleModel(vehicle=vehicle), flights) for flights in sets]
     for axis in range(2):
         low, high = (np.mean([each[axis] for each in pair]) for pair in zip(*(b[:2] for b in bounds), strict=True))
@@ -113,23 +93,14 @@ def _parameters(name: str) -> dict[str, Any]:
 
 def _settings(numbers: Mapping[str, Any]) -> VehicleSettings:
     """State RotorPy's vehicle; its direction of a rotor is that of the torque on the body."""
+    factors = {"thrust_factor_n_s2": float(numbers["k_eta"]), "drag_factor_n_m_s2": float(numbers["k_m"])}
     rotors = tuple(
-        RotorSettings(
-            position_m=tuple(float(x) for x in place),
-            spin=-int(direction),
-            thrust_factor_n_s2=float(numbers["k_eta"]),
-            drag_factor_n_m_s2=float(numbers["k_m"]),
-        )
+        RotorSettings(position_m=tuple(float(x) for x in place), spin=-int(direction), **factors)
         for place, direction in zip(numbers["rotor_pos"].values(), numbers["rotor_directions"], strict=True)
     )
     inertia = tuple(float(numbers[name]) for name in ("Ixx", "Iyy", "Izz"))
-    fastest = float(numbers["rotor_speed_max"])
-    return VehicleSettings(
-        mass_kg=float(numbers["mass"]),
-        inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0),
-        rotors=rotors,
-        rotor_speed_max_rad_s=fastest,
-    )
+    known = {"mass_kg": float(numbers["mass"]), "rotor_speed_max_rad_s": float(numbers["rotor_speed_max"])}
+    return VehicleSettings(inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0), rotors=rotors, **known)
 
 
 def _flown(asked: Asked) -> PlaybackFlight:
@@ -158,16 +129,12 @@ def _flown(asked: Asked) -> PlaybackFlight:
     position, velocity, turned, rate, speed = np.split(np.array(logs), [3, 6, 10, 13], axis=1)
     speed = speed + SPEED_NOISE * hover.mean() * rng.standard_normal(speed.shape)
     motion = MeasuredMotion(position, velocity, Rotation.from_quat(turned).as_matrix(), rate, STEP_S * EVERY)
-    setpoints = {"position": path[::EVERY, :3], "velocity": path[::EVERY, 3:6]}
+    setpoints = {"position": path[::EVERY, :3], "velocity": path[::EVERY, 3:6]} if asked.setpoints else {}
     return PlaybackFlight(
-        name=f"rotorpy-{asked.path}-{asked.draw}",
-        motion=motion,
-        speed=speed,
-        hold="linear",
-        stretches=(slice(0, len(speed)),),
-        setpoints=setpoints,
-    )
+        name=f"rotorpy-{asked.path}-{asked.draw}", motion=motion, speed=speed, hold="linear",
+        stretches=(slice(0, len(speed)),), setpoints=setpoints,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS)
+    program(main)

@@ -1,21 +1,16 @@
 """How long flights in closed loop take to simulate, against an older checkout: both in turn, processor time.
 
-    python benchmarks/simulation_speed.py OLD [SECONDS]
-
 OLD is a folder with a checkout and its `.venv`. A kind of flight is integrated at 1 kHz; autopilots at their own rate.
 """
 
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
+from benchmarks.shared.measure import program, table
+
 HERE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(HERE))
-
-from benchmarks.shared.measure import table
-
 KINDS = {
     "plain": ("cpfls", {}),
     "rotor drag and damping": ("cpfls", {"rotor_drag": [1e-3], "linear_damping": [0.1, 0.1, 0.1]}),
@@ -49,9 +44,9 @@ for line in sys.stdin:
 """
 
 
-def worker(checkout: Path, seconds: str) -> subprocess.Popen[str]:
+def worker(checkout: Path, seconds: float) -> subprocess.Popen[str]:
     """Start a process that flies with a checkout what it is asked for, line by line."""
-    command = [str(checkout / ".venv/bin/python"), "-c", WORKER, seconds]
+    command = [str(checkout / ".venv/bin/python"), "-c", WORKER, str(seconds)]
     return subprocess.Popen(command, cwd=checkout, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
@@ -64,8 +59,8 @@ def took(process: subprocess.Popen[str], kind: tuple[str, dict]) -> float:
     return float(process.stdout.readline())
 
 
-def main(old: Path, seconds: str) -> None:
-    sides = [worker(checkout, seconds) for checkout in (old, HERE)]
+def main(old: Path, seconds: float = 40.0) -> None:
+    sides = [worker(checkout, seconds) for checkout in (old.resolve(), HERE)]
     for side in sides:
         took(side, KINDS["plain"])
     rows = []
@@ -73,8 +68,8 @@ def main(old: Path, seconds: str) -> None:
         pairs = [[took(side, kind) for side in sides] for _ in range(REPEATS)]
         before, after = (min(each) for each in zip(*pairs, strict=True))
         rows.append([name, f"{before:.2f}", f"{after:.2f}", f"{before / after:.1f}"])
-    table("simulation_speed", ["flight", "old, s", "new, s", "old / new"], rows)
+    table("simulation_speed", "flight | old, s | new, s | old / new", rows)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) > 2 else "40")
+    program(main)

@@ -1,30 +1,22 @@
 """Vehicles exported for simulators and libraries: flown along flights beside the library, and what a step takes.
 
-    python benchmarks/simulators.py [playback] [steps]
-
-Flights: the example's kind (a vehicle with lag, damping, drag and flapping, noise in its log), RotorPy's with its own
-hidden effects, and a real Crazyflie with motor commands and a gyroscope alone, by the vehicle that its config states
-with the lag of its motors; the last two are read from CPFLS_FLIGHTS. Times are processor times, in turn.
+Parts, both if none is named: playback and steps. Flights: the example's kind (a vehicle with lag, damping, drag and
+flapping, noise in its log), RotorPy's with its own hidden effects, and a real Crazyflie with motor commands and a
+gyroscope alone, by the vehicle that its config states with the lag of its motors; the last two are read from
+CPFLS_FLIGHTS. Times are processor times, in turn.
 """
 
 from __future__ import annotations
 
 import ctypes
 import subprocess
-import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from time import process_time
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import program, seconds, table
 from cpfls_cli.config.load import load_study
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.registry import FORMS, exported
@@ -52,8 +44,8 @@ void steps(double *state, const double *rotor, long n)
 """
 
 
-def main(*asked: str) -> None:
-    for name in asked or PARTS:
+def main(parts: list[str] | None = None) -> None:
+    for name in parts or PARTS:
         print(f"\n{name}:\n")
         PARTS[name]()
 
@@ -78,9 +70,11 @@ def playback() -> None:
             found = verified(form, made, flight, (flight, player_of(model, flight)), horizon, WINDOWS)
             off = [f"{value:.2g}" for value in (*found.errors[:, 3], found.missing[3], found.step[3])]
             rows.append((name, FORMS[form].title, *off, f"{found.equations.max():.1g}"))
-    columns = ("flight", "target", "playback - measured", "target - measured", "target - playback", "not held", "step")
+    columns = (
+        "flight | target | playback - measured | target - measured | target - playback | not held | step | equations"
+    )
     print("Body rate after 0.5 s, rad/s, mean; what is not held and the step: largest; equations: largest, SI.\n")
-    table("simulators_playback", (*columns, "equations"), rows)
+    table("simulators_playback", columns, rows)
 
 
 def steps() -> None:
@@ -106,13 +100,7 @@ def steps() -> None:
                 times.append(((long - brief) / 300, fast))
             own, c = np.median(times, axis=0)
             rows.append((FORMS[form].title, f"{1e6 * own:.3g}", f"{1e6 * c:.3g}", f"{own / c:.3g}"))
-    table("simulators_step", ("target, through Python", "us a step", "C, us a step", "ratio"), rows)
-
-
-def seconds(work) -> float:
-    start = process_time()
-    work()
-    return process_time() - start
+    table("simulators_step", "target, through Python | us a step | C, us a step | ratio", rows)
 
 
 def in_c(model, folder):
@@ -136,4 +124,4 @@ def in_c(model, folder):
 PARTS = {"playback": playback, "steps": steps}
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    program(main)

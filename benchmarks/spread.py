@@ -1,28 +1,19 @@
 """How often 1000 closed-loop flights of vehicles that were drawn hold the rates of a flight that was held out.
 
-    python benchmarks/spread.py simulated
-    python benchmarks/spread.py real DATA [COUNT]
-    python benchmarks/spread.py nanobench DATA [COUNT]
-
 simulated: two vehicles of 45 g and 1.5 kg in gusts, whose truth is known. A path with sines of up to 5 Hz is flown four
-times, 20 s each; the constants, how they go together, and the gusts are found in these flights as `cpfls vehicle` does
+times, 20 s each; the constants, their correlation, and the gusts are found in these flights as `cpfls vehicle` does
 where flights repeat each other. Drawn vehicles then fly another path in closed loop, under the autopilot and with the
 motors that flew, each in gusts of its own and with the noise of the gyroscope: in JAX by one batched function of the
 export, which takes the samples as they are. Counted is how often the rates of flights that were held out, in gusts of
-their own, lie between the 2.5th and the 97.5th percentile of the 1000 at that instant.
+their own, lie between the 2.5th and the 97.5th percentile of the 1000 at that instant. Compared are vehicles drawn
+without what the model lacks; all vehicles the estimate, in gusts; vehicles drawn, in still air, with nothing lacking;
+numbers drawn from their ranges each by itself; and the truth in its true gusts, which is what can be had.
 
-Beside it: vehicles drawn without what the model lacks; all vehicles the estimate, in gusts; vehicles drawn, in still
-air, with nothing lacking; numbers drawn from their ranges each by itself; and the truth in its true gusts, which is
-what can be had.
-
-real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts are found in its training flights, each
-path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
+real: the nano-drone benchmark (see nanodrone.py for --data). Constants and gusts are found in its training flights,
+each path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
 found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
 asked: their rotors turn as logged, and answer the difference to the logged state by that law. About yaw these flights
-tell neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
-
-nanobench: the same with another vehicle (DATA: the folder datasets/dataset of syediu/nanobench-iros2026), whose log
-holds commands in place of rotor speeds, and whose moments of inertia are the published ones.
+identify neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
 
 Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
 """
@@ -33,26 +24,16 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-from benchmarks.shared.nanobench_files import VEHICLE as NANOBENCH
-from benchmarks.shared.nanobench_files import commanded_flights, playback_of
-from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
-
-pin_threads()
-
+import jax
+import jax.numpy as jnp
 import numpy as np
+import typer
 
-try:
-    import jax
-    import jax.numpy as jnp
-except ImportError:
-    if __name__ == "__main__":
-        sys.exit("needs the package jax: pip install 'cpfls[simulators]'")
-
+from benchmarks.shared.gusty_sets import VEHICLES
+from benchmarks.shared.measure import program, progress, table
+from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.registry import exported
 from cpfls_cli.export.source import jax_parameters, jax_parts
@@ -71,31 +52,21 @@ from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.flown_exports import executed
-from tests.builders.gusty_flights import (
-    EVERY,
-    GRAVITY,
-    GUSTS,
-    LARGE,
-    MEMORY_S,
-    SMALL,
-    STEP_S,
-    Flight,
-    Truth,
-    gusty_flights,
-    path_of,
-)
+from tests.builders.gusty_flights import EVERY, GRAVITY, GUSTS, MEMORY_S, STEP_S, Flight, Truth, gusty_flights, path_of
 
-COUNT, RUNS, HELD_OUT, SECONDS, REACH_HZ, SWING = 1000, 4, 5, 20.0, 5.0, 0.2
+RUNS, HELD_OUT, SECONDS, REACH_HZ, SWING = 4, 5, 20.0, 5.0, 0.2
 SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
 """Of the flights of gusty_flights: acceleration by the largest gust, and its memory."""
 ENDS, TUMBLES = (2.5, 97.5), 50.0
 """Percentiles; and a rate in rad/s that no controlled flight of these has."""
-VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 
 
-def main(part: str = "simulated", *words: str) -> None:
+def main(part: Annotated[str, typer.Argument()], data: Path = Path(), count: int = 1000) -> None:
     with jax.enable_x64(True):
-        PARTS[part](*words)
+        if part == "real":
+            real(data, count)
+        else:
+            simulated(count)
 
 
 class Found(NamedTuple):
@@ -115,7 +86,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
     if gusts is not None:
-        print(f"  of what is left comes again, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
+        print(f"  repeatable share of the residual, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts
     model = replace(solved.model, gusts=held)
     return Found(
@@ -139,13 +110,9 @@ class Fleet(NamedTuple):
     module : mapping of str
         What the export names.
     parts : array, shape (part, parameter)
-        Parameters of the model's parts alone.
-    parameters : array, shape (vehicle, parameter)
-    gusts : array, shape (vehicle, 3, 6)
+        Parameters of the model's parts alone; of all of it by vehicle in `parameters`.
     share : array, shape (vehicle, part, 6)
-    rest, memory : array, shape (vehicle, 6)
-    inertia : array, shape (vehicle, 3, 3)
-    mass : array, shape (vehicle,)
+        With `rest` and `memory`, shape (vehicle, 6): what the model lacks.
     """
 
     module: Mapping[str, Any]
@@ -157,11 +124,6 @@ class Fleet(NamedTuple):
     memory: Array
     inertia: Array
     mass: Array
-
-    def beside(self, *others: Fleet) -> Fleet:
-        """Put vehicles of the same export beside these."""
-        columns = zip(*(own[2:] for own in (self, *others)), strict=True)
-        return Fleet(self.module, self.parts, *map(np.concatenate, columns))
 
 
 def fleet(
@@ -244,10 +206,7 @@ def share_inside(flown: Array, measured: Array) -> Array:
     return np.asarray(((low <= measured) & (measured <= high)).mean(axis=-2))
 
 
-# Simulated flights
-
-
-def simulated(count: str = str(COUNT)) -> None:
+def simulated(count: int) -> None:
     rows = []
     for name, truth in VEHICLES.items():
         training = gusty_flights(
@@ -256,14 +215,14 @@ def simulated(count: str = str(COUNT)) -> None:
         told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
         aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ, swing=SWING) for run in range(HELD_OUT)]
         measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
-        for kind, own in fleets(told, truth, int(count)).items():
+        for kind, own in fleets(told, truth, count).items():
             flown = closed_loop(truth, own, aside[0])
             low, high = np.percentile(flown[~tumbled(flown)], ENDS, axis=0)
             wide = ", ".join(f"{value:.2g}" for value in (high - low).mean(axis=0))
             rows.append((*row(name, kind, share_inside(flown, measured)), wide))
-            print(rows[-1], file=sys.stderr, flush=True)
-    header = ("vehicle", "flown", "roll", "pitch", "yaw", "all", "one flight, least to most", "width, rad/s")
-    table("spread_simulated", header, rows)
+            progress(rows[-1])
+    columns = "vehicle | flown | roll | pitch | yaw | all | one flight, least to most | width, rad/s"
+    table("spread_simulated", columns, rows)
 
 
 def row(name: str, kind: str, shares: Array) -> tuple[str, ...]:
@@ -282,10 +241,6 @@ def unknown(truth: Truth) -> VehicleSettings:
 
 def fleets(told: Found, truth: Truth, count: int) -> dict[str, Fleet]:
     """Make what is flown: the spread, and what it has to be better than."""
-    for number in told.known.numbers:
-        print(
-            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
-        )
     alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
     by_itself = drawn(told.model, alone, count, np.random.default_rng(1))
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
@@ -349,80 +304,33 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     return np.asarray(jax.jit(lambda: jax.lax.scan(ten, start, chunks)[1])()).swapaxes(0, 1)
 
 
-# Real flights
-
-
-KINDS, KINDS_ASIDE = ("B2", "B3", "B6", "B7"), ("B5", "B8", "B9")
-"""Of NanoBench: circle, figure of eight, ramp and oval; helix, star and trefoil are kept aside."""
 PART = 500
 """Samples that are flown at a time."""
-AXES = ("roll", "pitch")
 ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9)}
 """What each answers of a difference of states: rotation, rate, velocity and position along the body axes."""
 
 
 class Law(NamedTuple):
-    """How thrust and torque answer a difference between two states, as accelerations.
-
-    Attributes
-    ----------
-    keep : array, shape (4,)
-        Share of an answer that is left a sample later.
-    gain : array, shape (4, 12)
-    """
+    """How thrust and torque answer a difference between two states, as accelerations: what is left later, and gains."""
 
     keep: Array
     gain: Array
 
 
-def real(folder: str, count: str = str(COUNT)) -> None:
+def real(folder: Path, count: int) -> None:
     """Find the nano-drone in its training flights, judge on a path that is not among them."""
-    training = flights(Path(folder), TRAINING)
-    told = found(VEHICLE, training)
-    judged("nano-drone", told, instruments(training), flights(Path(folder), TEST), int(count))
+    training, test = flights(folder, TRAINING), flights(folder, TEST)
+    judged(found(VEHICLE, training), instruments(training), test, count)
 
 
-def nanobench(folder: str, count: str = str(COUNT)) -> None:
-    """Find drag, flapping and what the model lacks of another vehicle in half of its paths, judge on the others.
-
-    These flights tell no moment of inertia, so the published one stands, and is not drawn.
-    """
-    flown = list(commanded_flights(Path(folder)))
-    kinds = {flight.name: flight.path.split("_")[0] for flight in flown}
-    training = [playback_of(flight) for flight in flown if kinds[flight.name] in KINDS]
-    given = instruments(training)
-    constants = find_constants(NANOBENCH, training, given, PlaybackSettings().leave_out)
-    assert constants is not None
-    solved, spread = constants.fitted, constants.spread
-    numbers = [each for each in found_numbers(solved, spread) if not each.name.startswith("inertia.")]
-    model = replace(solved.model, vehicle=NANOBENCH)
-    gusts = find_gusts(model, given)
-    assert gusts is not None
-    known = Estimates(
-        numbers=numbers,
-        correlation=np.eye(len(numbers)),
-        blocks=spread.blocks,
-        loop=np.ones((2, 3)),
-        gusts=GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
-        lack=gusts.lack,
-    )
-    model = replace(model, gusts=gusts.gusts)
-    aside = {flight.path: playback_of(flight) for flight in reversed(flown) if kinds[flight.name] in KINDS_ASIDE}
-    judged("NanoBench", Found(model, known), given, [aside[path] for path in sorted(aside)], int(count))
-
-
-def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackFlight], count: int) -> None:
+def judged(told: Found, given: Instruments, aside: Sequence[PlaybackFlight], count: int) -> None:
     """Fly the spread, and what it has to be better than, along flights kept aside; print how often they hold them."""
-    for number in told.known.numbers:
-        print(
-            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
-        )
     law = law_of(told.model, given)
     print(f"  law: {law}", file=sys.stderr)
     kinds = kinds_of(told, count)
     # Side by side, so that they are compiled once.
-    first, *others = kinds.values()
-    whole = first.beside(*others)
+    columns = zip(*(own[2:] for own in kinds.values()), strict=True)
+    whole = Fleet(*kinds["spread"][:2], *map(np.concatenate, columns))
     fly = twins(told.model, whole, law, given.flown[0].motion.period)
     rows: dict[str, list[tuple[Array, ...]]] = {kind: [] for kind in kinds}
     for flight in aside:
@@ -433,13 +341,13 @@ def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackF
             shares, lost = share_inside(own, measured), np.array([tumbled(own).sum()])
             rows[kind].append((shares[:2], off[:2], (high - low).mean(axis=0)[:2], lost))
             print(f"  {flight.name}, {kind}: {np.concatenate(rows[kind][-1]).round(3)}", file=sys.stderr, flush=True)
-    header = ("vehicle", "flown", *AXES, "all", "one flight, least to most", "median off", "width", "tumbled")
     listed = []
     for kind, each in rows.items():
         shares, off, wide, lost = (np.array(part) for part in zip(*each, strict=True))
         sizes_ = (", ".join(f"{value:.2g}" for value in part.mean(axis=0)) for part in (off, wide))
-        listed.append((*row(name, kind, shares), *sizes_, f"{lost.sum()} of {len(aside) * count}"))
-    table(f"spread_{name}", header, listed)
+        listed.append((*row("nano-drone", kind, shares), *sizes_, f"{lost.sum()} of {len(aside) * count}"))
+    columns = "vehicle | flown | roll | pitch | all | one flight, least to most | median off | width | tumbled"
+    table("spread_nano-drone", columns, listed)
 
 
 def kinds_of(told: Found, count: int) -> dict[str, Fleet]:
@@ -523,14 +431,9 @@ def about_z(angle: Any) -> Any:
 
 
 def twins(model: VehicleModel, flying: Fleet, law: Law, period: float) -> Callable[[PlaybackFlight], Array]:
-    """Make what flies all vehicles from the first logged state of a flight, asked what the flight was asked.
+    """Make what flies all vehicles from the first logged state of a flight to rates, shape (vehicle, time, 3).
 
-    About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
-
-    Returns
-    -------
-    callable
-        From a flight to rates, shape (vehicle, time, 3); it is compiled once.
+    They are asked what the flight was asked. About yaw they keep what was logged, which these flights do not identify.
     """
     module, count = flying.module, len(flying.parameters)
     unmix = np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
@@ -573,7 +476,5 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, period: float) -> Callab
     return fly
 
 
-PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real, "nanobench": nanobench}
-
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    program(main)

@@ -1,27 +1,16 @@
-"""Print how often `cpfls trend` finds a change where there is none, and where and how often it finds one of each size.
-
-    python benchmarks/trends.py [--rows 100] [--seed 2029]
+"""How often `cpfls trend` finds a change where there is none, and where and how often it finds one of each size.
 
 Numbers are drawn, not flown: those of the paper's quadrotor from day to day (loads, vibration and delays, ten numbers),
-normal, of the scatter that is usual or half, one and a half or twice that, which the program is not told. A row is
-said to have changed at p = 0.01; beside it stands what is chance for as many rows (95 %). A step is of one number,
+normal, of the scatter that is usual or half, one and a half or twice that, which the program does not know. A row
+is said to have changed at p = 0.01, against chance for as many rows (95 %). A step is of one number,
 from the flight on at two thirds of a row, in its usual deviations.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import program, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import FALSE_ALARM
 from cpfls_cli.changes.reference import Reference
@@ -31,7 +20,7 @@ from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
 SCATTERS = (0.5, 1.0, 1.5, 2.0)
 FLIGHTS = (10, 30)
 STEPS = (2.0, 3.0, 4.0, 6.0)
-MOVED = NAMES.index("late roll")
+MOVED = NAMES.index("delay roll")
 
 
 def found(count: int, rng: np.random.Generator, scatter: float = 1.0, step: float = 0.0) -> tuple[float, list[int]]:
@@ -41,25 +30,15 @@ def found(count: int, rng: np.random.Generator, scatter: float = 1.0, step: floa
     return change_points(Row.of(row, Reference.of(row[: count // 2], NAMES, QUAD), QUAD), rng)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rows", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=2029)
-    asked = parser.parse_args()
-    rng = np.random.default_rng(asked.seed)
-    rows = asked.rows
-    by_chance = rng.binomial(rows, FALSE_ALARM, 100_000) / rows
-    low, high = np.quantile(by_chance, [0.025, 0.975])
-    alarms = [
-        [
-            str(count),
-            *(f"{np.mean([found(count, rng, own)[0] <= FALSE_ALARM for _ in range(rows)]):.2%}" for own in SCATTERS),
-        ]
-        for count in FLIGHTS
-    ]
-    headers = ["flights", *(f"scatter {own:g}" for own in SCATTERS)]
+def main(rows: int = 100, seed: int = 2029) -> None:
+    rng = np.random.default_rng(seed)
+    low, high = np.quantile(rng.binomial(rows, FALSE_ALARM, 100_000) / rows, [0.025, 0.975])
+    alarms = []
+    for count in FLIGHTS:
+        each = ([found(count, rng, own)[0] <= FALSE_ALARM for _ in range(rows)] for own in SCATTERS)
+        alarms.append([str(count), *(f"{np.mean(own):.2%}" for own in each)])
     print(f"False alarms of {rows} rows each; by chance {low:.2%} to {high:.2%}.\n")
-    table("false alarms", headers, alarms)
+    table("false alarms", ["flights", *(f"scatter {own:g}" for own in SCATTERS)], alarms)
     steps = []
     for count in FLIGHTS:
         cells = [str(count)]
@@ -73,4 +52,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

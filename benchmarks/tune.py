@@ -1,7 +1,5 @@
 """Gains for autopilots: margins, overshoot and rise as predicted, and as flown by the true vehicle in gusts.
 
-    python benchmarks/tune.py [AUTOPILOT ...]
-
 Three vehicles of 35 g, 1.2 kg and 4.5 kg, each flown by the control laws of the autopilots: with their defaults, which
 is the baseline, and with gains for 45 degrees over intervals of 10 % of inertia and 20 % of the rotors' lag. Flown are
 steps of 0.1 rad in roll there and back (the mean of four), and sines that are added to the command, by which the loop
@@ -12,19 +10,12 @@ gusts are larger than what is added. A dash: predicted unstable, no such crossin
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.measure import program, table
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.gusts import Gusts
@@ -42,13 +33,15 @@ VEHICLES = {
 """Vehicles, and the lag of their rotors in s."""
 SPREAD = Spread((0.9, 1.1), (0.8, 1.2))
 GUST, MEMORY_S, NOISE = 2.0, 0.3, 0.01
+MEASURES = ("gain margin up, dB", "phase margin, °", "overshoot, %", "rise, ms")
 
 
-def main(names: list[str]) -> None:
+def main(autopilots: list[str] | None = None) -> None:
     columns = ["autopilot", "vehicle", "gains"]
-    told = ("gain margin up, dB", "phase margin, °", "overshoot, %", "rise, ms")
-    columns += [word for each in told for word in (each, "flown")]
-    table("tune", columns, [row for name in names for label in VEHICLES for row in flown(name, label)])
+    columns += [word for each in MEASURES for word in (each, "flown")]
+    table(
+        "tune", columns, [row for name in autopilots or AUTOPILOTS for label in VEHICLES for row in flown(name, label)]
+    )
 
 
 def flown(name: str, label: str) -> Iterator[list[str]]:
@@ -59,21 +52,12 @@ def flown(name: str, label: str) -> Iterator[list[str]]:
     own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
     for gains, values in (("default", autopilot.defaults()), ("tuned", own)):
         evaluation = evaluate(autopilot.law(values), hover)
-        roll = evaluation.roll
-        command = roll.command
-        predicted = (
-            upward_gain_db(evaluation.frequency, roll.loop),
-            command.phase_deg,
-            100 * roll.overshoot,
-            1e3 * roll.rise_s,
-        )
-        if not command.stable:
-            predicted = (np.nan, np.nan, np.nan, np.nan)
+        roll, command = evaluation.roll, evaluation.roll.command
+        gain = upward_gain_db(evaluation.frequency, roll.loop)
+        predicted = gain, command.phase_deg, 100 * roll.overshoot, 1e3 * roll.rise_s
         seen = _seen(name, values, vehicle, lag, gusts, command.crossover_hz)
-        pairs = [
-            entry for told_, seen_ in zip(predicted, seen, strict=True) for entry in (_number(told_), _number(seen_))
-        ]
-        yield [name, label, gains, *pairs]
+        pairs = zip(predicted if command.stable else [np.nan] * 4, seen, strict=True)
+        yield [name, label, gains, *(f"{each:.1f}" if np.isfinite(each) else "—" for pair in pairs for each in pair)]
 
 
 def gusts_of(vehicle: VehicleSettings) -> Gusts:
@@ -94,9 +78,5 @@ def _seen(
     return gain, phase, 100 * float(step.overshoot[0]), 1e3 * float(step.rise_s[0])
 
 
-def _number(value: float) -> str:
-    return f"{value:.1f}" if np.isfinite(value) else "—"
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(AUTOPILOTS))
+    program(main)

@@ -1,26 +1,19 @@
 """Time whole identifications of the paper's study, and show where the time goes.
 
-python benchmarks/whole_run.py [--full]     --full adds 500 x 200, which takes a quarter of an hour or more
+With --full a search of 500 x 200 too, which takes a quarter of an hour or more.
 """
 
 from __future__ import annotations
 
 import cProfile
 import pstats
-import sys
 from dataclasses import replace
-from pathlib import Path
 from statistics import median
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.shared.measure import pin_threads, table
-
-pin_threads()
-
 import numpy as np
 
+from benchmarks.shared.measure import program, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
@@ -42,17 +35,13 @@ PARTS = {
 REPEATS = 5
 
 
-def main() -> None:
+def main(*, full: bool = False) -> None:
     # What a first run loads and compiles is none of its time.
     run(paper_selection(), 10, 1)
-    cases = [
-        ("685 of 5487 samples, 75 x 25", paper_selection(), 75, 25),
-        ("5487 samples, 75 x 25", paper_flight(), 75, 25),
-    ]
-    if "--full" in sys.argv:
-        cases.append(("685 of 5487 samples, 500 x 200", paper_selection(), 500, 200))
-    rows, profiles = [], []
-    for name, learned, population, generations in cases:
+    names, flights = ("685 of 5487 samples", "5487 samples"), (paper_selection(), paper_flight())
+    cases = [(name, learned, 75, 25) for name, learned in zip(names, flights, strict=True)]
+    rows = []
+    for name, learned, population, generations in [*cases, (names[0], flights[0], 500, 200)] if full else cases:
         times = []
         for _ in range(REPEATS if population == 75 else 1):
             start = process_time()
@@ -61,22 +50,15 @@ def main() -> None:
         took, evaluations = median(times), int(result.history.evaluations[-1])
         spread = f"{took:.3g} ({min(times):.3g} to {max(times):.3g})"
         error = result.scores["training"]["model"].worst_relative_error
-        rows.append((name, spread, evaluations, 1e3 * took / evaluations, error))
-        if population == 75:
-            profiles.append((name, profile(learned, population, generations)))
-    print("Whole runs of `identify`, local search on, one thread:\n")
+        size = f"{name}, {population} x {generations}"
+        rows.append((size, spread, evaluations, 1e3 * took / evaluations, error))
     table(
-        "whole_run",
-        ("run", "seconds of the processor (range)", "evaluations", "ms per evaluation", "relative error"),
-        rows,
+        "whole_run", "run | seconds of the processor (range) | evaluations | ms per evaluation | relative error", rows
     )
     print("\nWhere the time goes, per cent:\n")
-    parts = list(profiles[0][1])
-    table(
-        "profile",
-        ("part", *(name for name, _ in profiles)),
-        [(part, *(shares[part] for _, shares in profiles)) for part in parts],
-    )
+    shares = [profile(*case[1:]) for case in cases]
+    columns = ("part", *(f"{name}, {p} x {g}" for name, _, p, g in cases))
+    table("profile", columns, [(part, *(each[part] for each in shares)) for part in shares[0]])
 
 
 def run(learned: TorqueData, population: int, generations: int):
@@ -99,4 +81,4 @@ def profile(learned: TorqueData, population: int, generations: int) -> dict[str,
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -65,16 +65,7 @@ LogsArgument = Annotated[
 ModelArgument = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
-ExportedArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
-        "disagreement, diagnosis or response.",
-    ),
-]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
-ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
     list[Path],
     typer.Argument(metavar="FLIGHT...", help=f"Flights, or logs ({formats_in_words()}) that the config describes."),
@@ -203,11 +194,8 @@ HoldOption = Annotated[
 
 TimeOrder = StrEnum("TimeOrder", "date name given")
 """What tells which flight came first."""
-ExportFormat = StrEnum("ExportFormat", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv")
-"""What a model is exported as."""
 AutopilotChoice = StrEnum("AutopilotChoice", "px4 ardupilot betaflight crazyflie")
 """Whose control law is meant."""
-"""What an exported vehicle is flown in."""
 
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
 SchedulerOption = Annotated[

@@ -7,8 +7,10 @@ Beside what Markdown has, a template knows
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error; those with a tone however many others there are;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
-- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page; an answer
-  that begins with a verdict, ``# NO CHANGE: nothing moved {good}``, is a box with the paragraphs behind it.
+- names, ``{#name}`` behind a heading of a section, for links, or behind the paragraph before a table, its caption;
+- ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page, ``####``
+  for a heading without one; an answer that begins with a verdict, ``# NO CHANGE: nothing moved {good}``, is a box with
+  the paragraphs behind it.
 
 Whatever ``{{ }}`` shows is data: none of it is taken for Markdown.
 """
@@ -35,7 +37,21 @@ from markdown_it.tree import SyntaxTreeNode
 from markupsafe import Markup
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Listing, Picture, Plot, Table, Text, Tone
+from cpfls_cli.report.content import (
+    STRUCK,
+    Block,
+    Box,
+    Cell,
+    Facts,
+    Folded,
+    Heading,
+    Listing,
+    Picture,
+    Plot,
+    Table,
+    Text,
+    Tone,
+)
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
@@ -46,12 +62,16 @@ Figures = Mapping[str, Callable[[], str]]
 
 TEMPLATES = Path(__file__).with_name("templates")
 TONES = ("good", "note", "warning", "unsure")
-_MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide))+)\}}(?=$|\s*\||\n)")
+_MARKS = re.compile(rf"\s*\{{((?: ?(?:{'|'.join(TONES)}|open|wide|#[\w-]+))+)\}}(?=$|\s*\||\n)")
+_TONED_CELL = re.compile(rf"(?<=\| )([^|\n]*[^|\s]) \{{(?:{'|'.join(TONES)})\}}(?= \|)")
+_CODE = re.compile("`([^`]+)`")
+_FENCE = re.compile("`{3,}")
 _FIGURE = re.compile(r"!\[(.*)\]\(([\w-]+)\)")
-_HEADING = re.compile(r"(#{1,3}) (.+)")
+_HEADING = re.compile(r"(#{1,4}) (.+)")
 _VERDICT = re.compile(r"([A-Z][A-Z ,;:-]*[A-Z]): (.+)")
+_ESCAPED_STRUCK = re.compile(r"\\~\\~([^~]*)\\~\\~(?= impossible)")
 _SPECIAL = re.compile(r"(?<![^\W_])_|_(?![^\W_])|[\\`*{}\[\]<>|#~&]|^(?:[-+=:]|\d+[.)](?=\s|$))")
-_TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
+_TABLE = re.compile(r"<table[^>]*>.*?</table>", re.DOTALL)
 _LONG = 36
 """Characters from which the words of a cell are a sentence, which a terminal breaks."""
 _NEAR = 0.1
@@ -62,8 +82,17 @@ def escaped(value: Any) -> Markup:
     """Write a value so that Markdown shows it as it is: on one line, its controls visible."""
     if isinstance(value, Markup):
         return value
-    text = UNKNOWN if value is None else visible(" ".join(str(value).split()))
-    return Markup(_SPECIAL.sub(lambda found: f"{found[0][:-1]}\\{found[0][-1]}", text))
+    return Markup(_unmarked(UNKNOWN if value is None else visible(" ".join(str(value).split()))))
+
+
+def _unmarked(text: str) -> str:
+    return _SPECIAL.sub(lambda found: f"{found[0][:-1]}\\{found[0][-1]}", text)
+
+
+def said(text: str) -> Markup:
+    """Write a sentence in which only what stands between backticks is marked, as code."""
+    parts = _CODE.split(visible(" ".join(text.split())))
+    return Markup("".join(code(part) if at % 2 else _unmarked(part) for at, part in enumerate(parts)))
 
 
 def code(text: object) -> Markup:
@@ -212,10 +241,14 @@ class Node:
 def tree(text: str) -> list[Node]:
     """Take a page apart into headings, folds, figures and what is plain Markdown between them."""
     page: list[Node] = []
-    open_nodes, verbatim = [page], False
+    open_nodes, fence = [page], ""
     for line in text.splitlines():
         into = open_nodes[-1]
-        verbatim ^= line.startswith("```")
+        verbatim = bool(fence)
+        if fence:
+            fence = "" if line == fence else fence
+        elif begins := _FENCE.match(line):
+            fence, verbatim = begins[0], True
         if not verbatim and line == ":::" and len(open_nodes) > 1:
             open_nodes.pop()
         elif not verbatim and line.startswith("::: "):
@@ -234,7 +267,9 @@ def tree(text: str) -> list[Node]:
 
 def _marked(text: str, node: Node) -> Node:
     found = _MARKS.search(text)
-    node.text, node.marks = text[: found.start()] if found else text, tuple(found[1].split()) if found else ()
+    marks = found[1].split() if found else []
+    node.text, node.marks = text[: found.start()] if found else text, tuple(own for own in marks if own[0] != "#")
+    node.name = next((own[1:] for own in marks if own[0] == "#"), "")
     return node
 
 
@@ -247,13 +282,21 @@ def _markdown() -> MarkdownIt:
 
 
 def _take_marks(state: StateCore) -> None:
-    """Make marks behind a cell or a paragraph the class of it."""
+    """Make marks behind a cell or a paragraph the class of it, and a name behind a caption that of its table."""
     table: list[Token] = []
+    caption: Token | None = None
     for before, token in zip(state.tokens, state.tokens[1:], strict=False):
         last = token.children[-1] if token.children else None
         if last is not None and last.type == "text" and (found := _MARKS.search(last.content)):
             last.content = last.content[: found.start()]
-            before.attrSet("class", found[1])
+            marks = found[1].split()
+            caption = before if marks[-1][0] == "#" else None
+            before.attrSet("class", " ".join("caption" if own[0] == "#" else own for own in marks))
+            before.attrs |= {"id": f"{marks[-1][1:]}-caption"} if caption else {}
+        elif caption is not None and token.type == "table_open":
+            name = str(caption.attrs["id"])
+            token.attrs |= {"id": name.removesuffix("-caption"), "aria-labelledby": name}
+            caption = None
         table = [] if before.type == "table_open" else [*table, before]
         if token.type == "table_close":
             _name_cells(table)
@@ -391,11 +434,12 @@ def markdown(text: str) -> str:
 def _markdown_of(nodes: Iterable[Node]) -> Iterator[str]:
     for node in nodes:
         if node.kind == "words":
-            yield _MARKS.sub("", node.text)
+            yield _ESCAPED_STRUCK.sub(r"~~\1~~", _MARKS.sub("", _TONED_CELL.sub(r"**\1**", node.text)))
         elif node.kind == "figure":
-            yield f"*Figure: {node.text}*\n"
+            yield f"*{'' if node.text.startswith('Figure') else 'Figure: '}{node.text}*\n\n"
         else:
-            yield f"{'#' * (node.level or 3)} {node.text}\n"
+            yield f'<a id="{node.name}"></a>\n\n' if node.name else ""
+            yield f"{'#' * (node.level or 3)} {node.text}\n\n"
             yield from _markdown_of(node.inner)
 
 
@@ -409,9 +453,10 @@ def html(title: str, text: str, figures: Figures) -> str:
     return made.get_template("page.html").render(
         title=visible(title),
         tone=" ".join(answer.marks) if answer else "",
-        answer=Markup(_line(answer.text if answer else title)),
+        answer=Markup(_line(answer.text if answer else escaped(title))),
         intro=Markup("".join(_html(rest[:first], figures))),
         body=Markup("".join(_sections(rest[first:], figures))),
+        contents=[(node.name, Markup(_line(node.text))) for node in rest if node.kind == "heading" and node.name],
         version=__version__,
     )
 
@@ -427,17 +472,21 @@ def _sections(nodes: Sequence[Node], figures: Figures) -> Iterator[str]:
         own = nodes[begin:end]
         if not own:
             continue
-        yield "<section>"
-        if own[0].kind == "heading" and own[0].level == 2:
-            yield f"<h2{_class(own[0])}>{_line(own[0].text)}</h2>"
+        heading = own[0] if own[0].kind == "heading" and own[0].level == 2 else None
+        yield f'<section id="{heading.name}">' if heading and heading.name else "<section>"
+        if heading:
+            yield f"<h2{_class(heading)}>{_line(heading.text)}</h2>"
             own = own[1:]
-        cards = [at for at, node in enumerate(own) if node.kind == "heading" or "open" in node.marks]
+        cards = [at for at, node in enumerate(own) if "open" in node.marks or (node.level and node.level < 4)]
         yield from _html(own[: cards[0] if cards else len(own)], figures)
         yield '<div class="cards">' if cards else ""
         for start, stop in zip(cards, [*cards, len(own)][1:], strict=True):
-            yield f'<article class="{" ".join(("card", *own[start].marks))}"><h3>{_line(own[start].text)}</h3>'
-            yield from _html([*own[start].inner, *own[start + 1 : stop]], figures)
+            card, behind = own[start], own[start + 1 : stop]
+            yield f'<article class="{" ".join(("card", *card.marks))}"><h3>{_line(card.text)}</h3>'
+            yield from _html(card.inner if card.kind == "fold" else behind, figures)
             yield "</article>"
+            if card.kind == "fold" and behind:
+                yield f'<div class="wide">{"".join(_html(behind, figures))}</div>'
         yield f"{'</div>' if cards else ''}</section>"
 
 
@@ -446,11 +495,13 @@ def _html(nodes: Iterable[Node], figures: Figures) -> Iterator[str]:
         if node.kind == "words":
             made = cast(str, _markdown().render(node.text))
             # No text can be a tag: what is wide can be scrolled, with a keyboard too.
-            yield _TABLE.sub(lambda found: f'<div class="{_shape(found[0])}" tabindex="0">{found[0]}</div>', made)
+            made = _TABLE.sub(lambda found: f'<div class="{_shape(found[0])}" tabindex="0">{found[0]}</div>', made)
+            yield STRUCK.sub(r"<s>\1</s>", made).replace("<pre>", '<pre tabindex="0">')
         elif node.kind == "heading":
-            yield f"<h4{_class(node)}>{_line(node.text)}</h4>"
+            level = 3 if node.level == 4 else 4
+            yield f"<h{level}{_class(node)}>{_line(node.text)}</h{level}>"
         elif node.kind == "fold":
-            yield f"<details><summary>{_line(node.text)}</summary>"
+            yield f"<details{' open' if 'open' in node.marks else ''}><summary>{_line(node.text)}</summary>"
             yield from _html(node.inner, figures)
             yield "</details>"
         elif drawn := figures[node.name]():

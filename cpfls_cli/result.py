@@ -234,8 +234,9 @@ def _alone(hint: Any) -> Any:
 
 def plain(given: Any) -> Any:
     """Write a result as JSON knows it: brief fields, and properties in its ``SHOWN``; what is not finite is null."""
-    if (is_dataclass(given) or hasattr(given, "_fields")) and not isinstance(given, type):
-        own = [each.name for each in described_fields(type(given)) if each.brief]
+    described = (is_dataclass(given) or hasattr(given, "_fields")) and described_fields(type(given))
+    if described or getattr(given, "SHOWN", ()):
+        own = [each.name for each in described or () if each.brief]
         return {name: plain(getattr(given, name)) for name in (*getattr(given, "SHOWN", ()), *own)}
     if isinstance(given, Mapping):
         return {name: plain(each) for name, each in given.items()}

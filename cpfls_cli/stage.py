@@ -1,7 +1,8 @@
 """A stage is one typed function: its parameters are the command line, its result the file, its template the answer.
 
 A module of `stages` holds one, made by the decorator `stage`; `templates` holds what a person reads of its result. The
-command line finds both by the name of the module (`cli/stages.py`).
+command line finds both by the name of the module (`cli/stages.py`). A result without a ``FORMAT`` has no file: it is
+only answered with, and what the stage writes are its `Run.texts`, unless the run is dry.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import picture_of
-from cpfls_cli.report.content import Box, Facts, Folded, Heading, Section, Table, Text
+from cpfls_cli.report.content import Box, Heading, Section, Text
+from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
-from cpfls_cli.report.html import figure_html
 from cpfls_cli.report.outcome import Command, Outcome, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
-from cpfls_cli.result import datasets, plain
+from cpfls_cli.result import plain
 
 PAGE = "report.html"
 """File of the page of a folder with one answer."""
@@ -123,7 +124,7 @@ class Run(Job):
         What ``--json`` says of this run beside its result.
     last_words : str
         Behind the answer.
-    texts : dict of Path to str
+    texts : dict of Path to str or bytes
         Other files that are written with the result.
     said : list of Text
         Of this run alone: its file says none of it again.
@@ -143,7 +144,7 @@ class Run(Job):
     outputs: list[Path] = field(default_factory=list)
     also: dict[str, Any] = field(default_factory=dict)
     last_words: str = ""
-    texts: dict[Path, str] = field(default_factory=dict)
+    texts: dict[Path, str | bytes] = field(default_factory=dict)
     said: list[Text] = field(default_factory=list)
     until_written: ExitStack = field(default_factory=ExitStack)
     afterwards: list[Callable[[], object]] = field(default_factory=list)
@@ -212,7 +213,7 @@ def _would(run: Run, stage: Stage) -> Outcome:
     cautions = run.cautions_of(*(stage.fills.parts if stage.fills else ()))
     return Outcome(
         {"dry_run": True, **named, **({"cautions": list(cautions)} if cautions else {})},
-        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *caution_texts(cautions)),
+        (Text(f"{where if run.writes else ''}{config}all inputs are good"), *run.said, *caution_texts(cautions)),
     )
 
 
@@ -240,7 +241,7 @@ class Stage:
     study : bool or callable
         Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
     output : object
-        Option of its output where it is another than usual; may be left out.
+        Option of its output where it is another than usual; may be left out. False of one that only answers.
     several : bool
         Whether options that may be repeated take all values that follow.
     resumes : bool
@@ -253,16 +254,16 @@ class Stage:
 
     function: Callable[..., Any]
     kind: Any
-    title: str
-    figures: Mapping[str, Callable[[Any], str]]
-    words: Mapping[str, Any]
-    folder: bool
-    fills: Filled | None
-    study: bool | Callable[[Mapping[str, Any]], bool]
-    output: Any
-    several: bool
-    resumes: bool
-    overrides: Callable[..., list[str]] | None
+    title: str = ""
+    figures: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    words: Mapping[str, Any] = field(default_factory=dict)
+    folder: bool = False
+    fills: Filled | None = None
+    study: bool | Callable[[Mapping[str, Any]], bool] = False
+    output: Any = None
+    several: bool = False
+    resumes: bool = False
+    overrides: Callable[..., list[str]] | None = None
     together: Callable[[Sequence[Source]], Sequence[Source]] = tuple
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -337,9 +338,9 @@ class Stage:
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-            if run.writes and not streamed:
+            if run.writes and not streamed and (self.fills or hasattr(self.kind, "FORMAT")):
                 self._write(run, run.output, results)
-            else:
+            elif not run.dry_run:
                 write_files(run.texts)
         for act in run.afterwards:
             act()
@@ -356,33 +357,6 @@ class Stage:
             run.exit_code,
             next=tuple(run.next),
             written=run.output if run.writes else next(iter(run.texts), None),
-        )
-
-    def info(self, path: Path) -> Outcome:
-        """Say again what a file answers, where it comes from and what it holds; of a long one no values."""
-        long = store.is_long(path, self.kind)
-        if long:
-            store.check_rows(path, self.kind, store.held_rows(path, self.kind))
-        given, origin = store.read_first(path, self.kind) if long else store.read(path, self.kind)
-        about = source_of_result(given, origin, path, path.name, "")
-        answer = "too long to be shown: its values are in the file" if long else self.text(given, about=about)
-        seed = "" if origin.seed is None else f", seed {origin.seed}"
-        made = [("made by", f"cpfls {origin.version}{seed}")]
-        made += [(role, f"{own.name} (sha256 {own.sha256[:12]})") for role, own in origin.inputs.items()]
-        rows = [(path, own.about.unit, own.about.text) for path, own in datasets(self.kind) if own.about]
-        table = Table("datasets", "", ("Dataset", "Unit", "What it holds"), rows, frozenset({0, 1, 2}), frozenset({2}))
-        inputs = {role: vars(own) for role, own in origin.inputs.items()}
-        summary = {"file": str(path), "format": self.kind.FORMAT, "cpfls_version": origin.version, "seed": origin.seed}
-        summary |= {"inputs": inputs, "cautions": list(origin.cautions)}
-        return Outcome(
-            summary if long else summary | {"result": plain(given)},
-            (
-                *page.blocks(answer),
-                *caution_texts(origin.cautions),
-                Folded("where it comes from", [Facts(made)]),
-                Folded(f"what its {len(rows)} datasets hold", [table]),
-            ),
-            next=(("cpfls", "check", path),),
         )
 
     def report(self, path: Path, form: Form) -> str:
@@ -442,10 +416,9 @@ class Stage:
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
             for name, text in fills.texts.items():
                 write_text(folder / name, text(given))
-            # Above this module: a report shows results of all stages. Without a bar of its own: that is of the whole.
-            report = import_module("cpfls_cli.commands.report")
-            quiet = replace(run, output=folder / PAGE, progress=lambda *_: None, reads=lambda _: None)
-            report.run(quiet, [folder / f"{name}.h5" for name in held])
+            # Above this module: a report shows results of all stages.
+            report = import_module("cpfls_cli.stages.report")
+            write_text(folder / PAGE, report.page_about(run.study, [folder / f"{name}.h5" for name in held]))
 
     def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
         if self.fills:
@@ -489,37 +462,9 @@ def stage_named(name: str) -> Stage:
     return loaded(stage_module({"stage": name}))
 
 
-def stage(
-    kind: Any,
-    *,
-    title: str = "",
-    figures: Mapping[str, Callable[[Any], str]] | None = None,
-    words: Mapping[str, Any] | None = None,
-    folder: bool = False,
-    fills: Filled | None = None,
-    study: bool | Callable[[Mapping[str, Any]], bool] = False,
-    output: Any = None,
-    several: bool = False,
-    resumes: bool = False,
-    overrides: Callable[..., list[str]] | None = None,
-    together: Callable[[Sequence[Source]], Sequence[Source]] = tuple,
-) -> Callable[[Callable[..., Any]], Stage]:
-    """Make a function a stage."""
-    return lambda function: Stage(
-        function,
-        kind,
-        title,
-        figures or {},
-        words or {},
-        folder,
-        fills,
-        study,
-        output,
-        several,
-        resumes,
-        overrides,
-        together,
-    )
+def stage(kind: Any, **given: Any) -> Callable[[Callable[..., Any]], Stage]:
+    """Make a function a stage; what is given are attributes of `Stage`."""
+    return lambda function: Stage(function, kind, **given)
 
 
 def unique_names(paths: Iterable[Path]) -> dict[str, Path]:

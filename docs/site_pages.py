@@ -13,8 +13,8 @@ import typer
 from mkdocs.structure.files import File, Files
 
 from cpfls_cli.cli.app import app
-from cpfls_cli.commands import formats
 from cpfls_cli.config.keys import commented_default
+from cpfls_cli.stages.info import described, formats
 
 ROOT = Path(__file__).parents[1]
 ELSEWHERE = {
@@ -99,10 +99,14 @@ def _configuration() -> str:
 
 def _formats() -> str:
     lines = []
-    for each in formats.formats():
-        lines += ["", f"### `{each.name}`{f', kind `{each.kind}`' if each.kind else ''}", "", formats.origin(each), ""]
+    for each in map(described, formats()):
+        makers = " or ".join(f"`cpfls {command}`" for command in each.commands)
+        lines += ["", f"### `{each.format}`", "", f"Made by {makers}: {each.description}.", ""]
         lines += ["| dataset | dimensions | units | frame | required | description |", "|---|---|---|---|---|---|"]
-        lines += [f"| `/{path}` | {' | '.join(rest)} |" for path, *rest in formats.rows(each)]
+        for path, own in each.datasets.items():
+            required, gaps = "yes" if own.required else "no", "; may be not finite" if own.gaps else ""
+            cells = (" x ".join(own.dimensions) or "scalar", own.units, own.frame, required, own.description + gaps)
+            lines.append(f"| `/{path}` | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -12,38 +12,37 @@ from .vehicles import GRAVITY
 class LinearDamping(Term):
     """Torque against the body rate."""
 
-    def apply(self, now):
-        now.torque[:, self.rows] -= self.damping * now.w[:, self.rows]
+    def apply(self, now, r):
+        now.torque[:, r] -= self.damping * now.w[:, r]
 
 
 class QuadraticDamping(Term):
     """Torque against the square of the body rate."""
 
-    def apply(self, now):
-        w = now.w[:, self.rows]
-        now.torque[:, self.rows] -= self.damping * np.abs(w) * w
+    def apply(self, now, r):
+        w = now.w[:, r]
+        now.torque[:, r] -= self.damping * np.abs(w) * w
 
 
 class CubicDamping(Term):
     """Torque against the cube of the body rate."""
 
-    def apply(self, now):
-        now.torque[:, self.rows] -= self.damping * now.w[:, self.rows] ** 3
+    def apply(self, now, r):
+        now.torque[:, r] -= self.damping * now.w[:, r] ** 3
 
 
 class StribeckDamping(Term):
     """Damping that is strongest at small rates, like a sticking bearing."""
 
-    def apply(self, now):
-        w = now.w[:, self.rows]
-        now.torque[:, self.rows] -= self.damping * np.tanh(w / 0.1) * (0.25 + 0.75 * np.exp(-np.abs(w) / 0.4))
+    def apply(self, now, r):
+        w = now.w[:, r]
+        now.torque[:, r] -= self.damping * np.tanh(w / 0.1) * (0.25 + 0.75 * np.exp(-np.abs(w) / 0.4))
 
 
 class ParasiticDrag(Term):
     """Fuselage drag |v|^(n-1) v at a centre of pressure."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         air = to_body(now.R[:, :, r], now.v[:, r] - now.wind[:, r])
         speed = np.sqrt((air * air).sum(0)) + 1e-9
         force = -self.drag * speed ** (self.power - 1) * air
@@ -51,11 +50,15 @@ class ParasiticDrag(Term):
         now.torque[:, r] += cross(self.centre, force)
 
 
+class ParasiticPower(ParasiticDrag):
+    """The same with another power."""
+
+
 class TorqueBias(Term):
     """A constant torque."""
 
-    def apply(self, now):
-        now.torque[:, self.rows] += self.torque
+    def apply(self, now, r):
+        now.torque[:, r] += self.torque
 
 
 class Payload(Term):
@@ -77,8 +80,8 @@ class Payload(Term):
         self.state[:3] = n
         self.state[3:] -= n * (n * self.state[3:]).sum(0)
 
-    def apply(self, now):
-        r, R = self.rows, now.R[:, :, self.rows]
+    def apply(self, now, r):
+        R = now.R[:, :, r]
         n, rate = self.state[:3], self.state[3:]
         w = now.w[:, r]
         rigid = now.acceleration[:, r] + to_world(
@@ -104,11 +107,10 @@ class FuelSlosh(Term):
 
     stage = "coupled"
 
-    def prepare(self):
-        self.state = np.zeros((4, len(self.rows)))
+    states = 4
 
-    def apply(self, now):
-        r, R = self.rows, now.R[:, :, self.rows]
+    def apply(self, now, r):
+        R = now.R[:, :, r]
         place, rate = self.state[:2], self.state[2:]
         w = now.w[:, r]
         felt = now.acceleration[:, r].copy()

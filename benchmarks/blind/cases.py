@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
@@ -54,23 +55,9 @@ class Case:
 
     def key(self):
         """Give what is hidden as plain data."""
-        told = {} if self.usual else {"gusts": self.gusts, "instruments": self.instruments, "air": self.air}
-        return told | {
-            "case": self.name,
-            "group": self.group,
-            "vehicle": self.vehicle,
-            "truth": list(self.truth),
-            "outside": list(self.outside),
-            "nearest": list(self.nearest),
-            "dominant": self.dominant,
-            "hidden": self.hidden,
-            "hover_only": self.hover_only,
-            "left_out": list(self.left_out),
-            "esc_speed": self.esc_speed,
-            "ideal_command": self.ideal_command,
-            "attack": self.attack,
-            "only": self.only,
-        }
+        plain = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+        unusual = ("gusts", "instruments", "air") if self.usual else ()
+        return {"case" if name == "name" else name: value for name, value in plain.items() if name not in unusual}
 
 
 def make(name, group, vehicle, effects, rng, level=None, **options):
@@ -166,32 +153,13 @@ TRIPLES = (
     ("inflow", "parasitic_drag", "magnetic_torque"),
 )
 BACKGROUND = (
-    "linear_damping",
-    "quadratic_damping",
-    "rotor_drag",
-    "inflow",
-    "translational_lift",
-    "parasitic_drag",
-    "ground_effect",
-    "rotor_gyroscopic",
-    "rotor_acceleration",
-    "com_offset",
-    "products_of_inertia",
-)
+    "linear_damping", "quadratic_damping", "rotor_drag", "inflow", "translational_lift", "parasitic_drag",
+    "ground_effect", "rotor_gyroscopic", "rotor_acceleration", "com_offset", "products_of_inertia",
+)  # fmt: skip
 DOMINANT = (
-    "com_offset",
-    "payload",
-    "rotor_drag",
-    "torque_bias",
-    "linear_damping",
-    "rotor_mismatch",
-    "flapping_moment",
-    "inflow",
-    "rotor_acceleration",
-    "vertical_descent",
-    "ground_effect",
-    "motor_lag",
-)
+    "com_offset", "payload", "rotor_drag", "torque_bias", "linear_damping", "rotor_mismatch", "flapping_moment",
+    "inflow", "rotor_acceleration", "vertical_descent", "ground_effect", "motor_lag",
+)  # fmt: skip
 LACKING = {
     "velocity": ("x", "y", "z", "vx", "vy", "vz"),
     "attitude": ("phi", "theta", "psi"),
@@ -199,19 +167,9 @@ LACKING = {
     "motion": VELOCITY_COLUMNS,
 }
 LIMITED = (
-    "linear_damping",
-    "rotor_drag",
-    "inflow",
-    "ground_effect",
-    "vertical_descent",
-    "parasitic_drag",
-    "wind",
-    "payload",
-    "com_offset",
-    "rotor_acceleration",
-    "products_of_inertia",
-    "rotor_mismatch",
-)
+    "linear_damping", "rotor_drag", "inflow", "ground_effect", "vertical_descent", "parasitic_drag", "wind", "payload",
+    "com_offset", "rotor_acceleration", "products_of_inertia", "rotor_mismatch",
+)  # fmt: skip
 
 
 def _singles(draws):
@@ -252,16 +210,10 @@ def _several(draws):
 
 def _background(draws):
     for effect in DOMINANT:
+        effects = (effect, *(other for other in BACKGROUND if other != effect))
+        options = {"level": dict.fromkeys(effects, -0.4) | {effect: 0.8}, "dominant": effect}
         for draw in range(max(1, draws // 2)):
-            effects = (effect, *(other for other in BACKGROUND if other != effect))
-            level = dict.fromkeys(effects, -0.4) | {effect: 0.8}
-            yield (
-                f"background-sixkg-{effect}-{draw}",
-                "background",
-                "sixkg",
-                effects,
-                {"level": level, "dominant": effect},
-            )
+            yield f"background-sixkg-{effect}-{draw}", "background", "sixkg", effects, options
 
 
 def _limited(draws):
@@ -317,22 +269,13 @@ def _pybullet(draws):
 
 
 def cases(study_seed, draws=3):
-    """List the whole study; the same seed gives the same cases.
-
-    Parameters
-    ----------
-    study_seed : int
-    draws : int
-        Repeats of each single effect on the 6 kg craft; other groups follow.
-    """
+    """List the whole study; single effects on the 6 kg craft are drawn so often, other groups follow."""
     kinds = (
         _singles, _none, _strange, _several, _background, _limited,
         _lacking, _drag_factor, _attacked, _one_sided, _pybullet,
     )  # fmt: skip
-    parts = [kind(draws) for kind in kinds]
     out = []
-    for part in parts:
-        for name, group, vehicle, effects, options in part:
-            rng = np.random.default_rng([study_seed, *name.encode()])
-            out.append(make(name, group, vehicle, effects, rng, **options))
+    for name, group, vehicle, effects, options in chain.from_iterable(kind(draws) for kind in kinds):
+        rng = np.random.default_rng([study_seed, *name.encode()])
+        out.append(make(name, group, vehicle, effects, rng, **options))
     return out

@@ -7,7 +7,6 @@ puts what is hidden into another folder.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -17,19 +16,14 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import oaconvolve
 
 from . import turning
-from .cases import INSTRUMENTS, Case, cases
+from .cases import INSTRUMENTS, Case
 from .gusts import blown
-from .measure import KINDS, NOISE, attacked, columns, disturb, observe, save
+from .measure import attacked, columns, disturb, observe, save
 from .missions import MISSIONS, mission
 from .plant import ALTERATIONS, nominal
 from .rotor_terms import LEAD_IN
 from .simulate import FlightPlan, simulate
 from .vehicles import VEHICLES, Vehicle
-
-__all__ = [
-    "KINDS", "NOISE", "VEHICLES", "Case", "Flight", "Flights", "Vehicle",
-    "cases", "generate", "residual", "simulate_in_parts", "simulate_many", "write", "write_key",
-]  # fmt: skip
 
 DURATION = 30.0
 ROLES = ("train", "held_out")
@@ -102,20 +96,9 @@ def _collect(case, plans, record, first):
 
 
 def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
-    """Fly all cases in one batch.
+    """Fly all cases in one batch, flights to train before as many held out; each depends on seed and case alone.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-    seed : int
-        The flights of a case depend on this, on the name of the case and on its air, not on its company.
-    duration, lead_in : float, s
-        Length of the log, and of the flight before it.
-
-    Returns
-    -------
-    list of Flights
-        In the order of the cases: flights to train, then as many held out.
+    The log lasts for a time in s, after a lead-in that it does not hold.
     """
     flown = {}
     for rotors in {VEHICLES[case.vehicle].count: None for case in cases}:
@@ -127,12 +110,6 @@ def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
             flown[number] = _collect(cases[number], group, record, first)
             first += len(group)
     return [flown[number] for number in range(len(cases))]
-
-
-def simulate_in_parts(cases, seed, duration=DURATION, part=60) -> Iterator[Flights]:
-    """Fly many cases, ``part`` at a time, to spare memory."""
-    for start in range(0, len(cases), part):
-        yield from simulate_many(cases[start : start + part], seed, duration)
 
 
 def generate(case: Case, rng: np.random.Generator, duration=DURATION) -> Flights:

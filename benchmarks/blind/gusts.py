@@ -43,10 +43,10 @@ class Gusts(Term):
     def prepare(self):
         self.air = np.stack([_drawn(*each) for each in zip(self.size.T, self.memory.T, self.rngs, strict=True)], axis=2)
 
-    def apply(self, now):
+    def apply(self, now, r):
         blow = at_time(self.air, now.time)
-        now.torque[:, self.rows] += blow[:3]
-        now.force[:, self.rows] += blow[3:]
+        now.torque[:, r] += blow[:3]
+        now.force[:, r] += blow[3:]
 
 
 def blown(plan, samples):

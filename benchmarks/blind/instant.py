@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,7 +43,13 @@ class Term:
     """
 
     stage = "body"
+    states = 0
     state = None
+    kinds: ClassVar = {}
+    """All of them by the name of the effect, in the order in which they act."""
+
+    def __init_subclass__(cls):
+        Term.kinds[re.sub(r"(?<!^)([A-Z])", r"_\1", cls.__name__).lower()] = cls
 
     def __init__(self, rows, parameters, vehicles, rngs):
         self.rows = np.asarray(rows)
@@ -56,8 +64,9 @@ class Term:
         return np.array([getattr(v, name) for v in self.vehicles])
 
     def prepare(self):
-        """Set up states and random sequences."""
+        """Set up states, where there are any, and random sequences."""
+        self.state = np.zeros((self.states, len(self.rows))) if self.states else None
 
-    def apply(self, now):
-        """Add to the forces of this moment; set ``self.rate`` if the term has a state."""
+    def apply(self, now, r):
+        """Add to the forces of this moment in the rows of the term; set ``self.rate`` if it has a state."""
         raise NotImplementedError

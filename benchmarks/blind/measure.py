@@ -42,21 +42,13 @@ def places(table):
 
 
 _DEGREE = np.pi / 180
+_SIZES = ("gyro", "attitude", "velocity", "position", "acceleration", "rotor", "volt")
 NOISE = {
     "none": dict.fromkeys(GROUPS, 0.0),
-    "low": {
-        "gyro": 0.001, "attitude": 0.05 * _DEGREE, "velocity": 0.01, "position": 0.005, "acceleration": 0.02,
-        "rotor": 0.3, "volt": 0.0005,
-    },
-    "mid": {
-        "gyro": 0.005, "attitude": 0.2 * _DEGREE, "velocity": 0.05, "position": 0.02, "acceleration": 0.05,
-        "rotor": 1.0, "volt": 0.001,
-    },
-    "high": {
-        "gyro": 0.02, "attitude": 0.6 * _DEGREE, "velocity": 0.15, "position": 0.05, "acceleration": 0.2,
-        "rotor": 3.0, "volt": 0.003,
-    },
-}  # fmt: skip
+    "low": dict(zip(_SIZES, (0.001, 0.05 * _DEGREE, 0.01, 0.005, 0.02, 0.3, 0.0005), strict=True)),
+    "mid": dict(zip(_SIZES, (0.005, 0.2 * _DEGREE, 0.05, 0.02, 0.05, 1.0, 0.001), strict=True)),
+    "high": dict(zip(_SIZES, (0.02, 0.6 * _DEGREE, 0.15, 0.05, 0.2, 3.0, 0.003), strict=True)),
+}
 """Standard deviations in SI units; rotor speed for the 6 kg craft."""
 KINDS = ("white", "coloured")
 _STEPS = {"gyro": 0.001, "rotor": 1.0, "attitude": 1e-4, "volt": 0.0005}

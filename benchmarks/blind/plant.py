@@ -116,21 +116,8 @@ def euler_axis_torque(plant):
     plant.euler_axis = True
 
 
-ALTERATIONS = {
-    f.__name__: f
-    for f in (
-        com_offset,
-        products_of_inertia,
-        rotor_mismatch,
-        parameter_error,
-        drag_factor,
-        quick_rotors,
-        notch_filter,
-        motor_lag,
-        lag_uneven,
-        lag_second_order,
-        command_delay,
-        battery_sag,
-        euler_axis_torque,
-    )
-}
+_ALL = (
+    com_offset, products_of_inertia, rotor_mismatch, parameter_error, drag_factor, quick_rotors, notch_filter,
+    motor_lag, lag_uneven, lag_second_order, command_delay, battery_sag, euler_axis_torque,
+)  # fmt: skip
+ALTERATIONS = {alter.__name__: alter for alter in _ALL}

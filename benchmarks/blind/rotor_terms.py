@@ -40,16 +40,14 @@ class RotorDrag(Term):
 
     stage = "hub"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         now.side[:, :, r] -= self.drag * now.speed[:, r] * now.hub_air[:2, :, r]
 
 
 class FlappingMoment(Term):
     """Hub spring moment of the flapped disc: flapping angle mu / (1 - mu^2 / 2) along the air velocity."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         vx, vy = now.hub_air[0][:, r], now.hub_air[1][:, r]
         tip = now.speed[:, r] * self.of("rotor_radius")
         grow = 1 / (1 - 0.5 * (vx * vx + vy * vy) / tip**2)
@@ -61,8 +59,7 @@ class FlappingMoment(Term):
 class RollingMoment(Term):
     """The advancing blade lifts more: a moment along the air velocity with the sign of the spin."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         roll = self.moment * now.spin[:, r] * now.speed[:, r]
         now.torque[:2, r] -= (roll * now.hub_air[:2, :, r]).sum(1)
 
@@ -72,8 +69,7 @@ class RotorPlaneDamping(Term):
 
     stage = "hub"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         lean = 16 / (self.lock_number * now.speed[:, r]) * now.thrust[:, r]
         now.side[0][:, r] -= lean * now.w[1, r]
         now.side[1][:, r] += lean * now.w[0, r]
@@ -84,8 +80,7 @@ class Inflow(Term):
 
     stage = "thrust"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         now.thrust[:, r] -= self.gain * now.speed[:, r] * now.hub_air[2][:, r]
 
 
@@ -94,8 +89,7 @@ class InflowMomentum(Term):
 
     stage = "thrust"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         axial, hover = now.hub_air[2][:, r], self.of("induced_speed")
         half = np.maximum(axial, -0.6 * hover) / 2
         change = axial + np.sqrt(half**2 + hover**2) - half - hover
@@ -107,8 +101,7 @@ class TranslationalLift(Term):
 
     stage = "thrust"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         hover = self.of("induced_speed")
         half = (now.hub_air[0][:, r] ** 2 + now.hub_air[1][:, r] ** 2) / 2
         induced = np.sqrt(np.sqrt(half**2 + hover**4) - half)
@@ -126,16 +119,16 @@ class GroundEffect(Term):
         height = now.x[2, r] + (now.R[2][:, r][:, None] * now.hubs[:, :, r]).sum(0)
         return np.maximum(height / self.of("rotor_radius"), 0.9)
 
-    def apply(self, now):
+    def apply(self, now, r):
         loss = np.minimum(self.gain / (16 * self.nearness(now) ** 2), 0.6)
-        now.thrust[:, self.rows] /= 1 - loss
+        now.thrust[:, r] /= 1 - loss
 
 
 class GroundExponential(GroundEffect):
     """A ground effect that fades like exp(-z / 1.2 R) instead."""
 
-    def apply(self, now):
-        now.thrust[:, self.rows] *= 1 + 0.25 * self.gain * np.exp(-self.nearness(now) / 1.2)
+    def apply(self, now, r):
+        now.thrust[:, r] *= 1 + 0.25 * self.gain * np.exp(-self.nearness(now) / 1.2)
 
 
 class VerticalDescent(Term):
@@ -146,8 +139,7 @@ class VerticalDescent(Term):
     def prepare(self):
         self.noise = np.stack([coloured(rng, self.vehicles[0].count, 0.05) for rng in self.rngs], axis=2)
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         hover = self.of("induced_speed")
         air = now.hub_air[:, :, r]
         x = -air[2] / hover
@@ -163,8 +155,7 @@ class RotorInterference(Term):
 
     stage = "thrust"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         air = now.hub_air[:2, :, r].mean(1)
         speed = np.sqrt((air**2).sum(0)) + 1e-9
         behind = -(now.hubs[:2, :, r] * (air / speed)[:, None]).sum(0) / self.of("arm")
@@ -177,8 +168,7 @@ class ThrustTilt(Term):
 
     stage = "hub"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         now.side[:, :, r] += self.lean * now.thrust[:, r]
 
 
@@ -191,8 +181,8 @@ class LooseArm(Term):
         self.state = np.zeros((2, len(self.rows)))
         self.which = self.rotor.astype(int)
 
-    def apply(self, now):
-        r, (angle, rate) = self.rows, self.state
+    def apply(self, now, r):
+        angle, rate = self.state
         hub = now.hubs[:2, self.which, r] / self.of("arm")
         driven = (hub * now.w[:2, r]).sum(0) + 0.5 * now.w[2, r]
         natural = 2 * np.pi * self.frequency
@@ -206,8 +196,7 @@ class LooseArm(Term):
 class RotorGyroscopic(Term):
     """Spinning rotors resist being turned: -w x h."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         momentum = np.zeros((3, len(r)))
         momentum[2] = self.inertia * (now.spin[:, r] * now.speed[:, r]).sum(0)
         now.torque[:, r] -= cross(now.w[:, r], momentum)
@@ -216,6 +205,5 @@ class RotorGyroscopic(Term):
 class RotorAcceleration(Term):
     """Speeding a rotor up turns the body the other way."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         now.torque[2, r] -= self.inertia * (now.spin[:, r] * now.speed_rate[:, r]).sum(0)

@@ -82,14 +82,14 @@ class Fleet:
         now = self.instant(time, y, speed, speed_rate)
         for stage in ("thrust", "hub", "body"):
             for term in self.terms[stage]:
-                term.apply(now)
+                term.apply(now, term.rows)
         self.add_rotors(now)
         now.acceleration = turning.to_world(now.R, now.force) / self.mass
         now.acceleration[2] -= GRAVITY
         stiff = turning.cross(now.w, np.einsum("ijn,jn->in", self.inertia, now.w))
         now.spin_up = np.einsum("ijn,jn->in", self.inverse, now.torque - stiff)
         for term in self.terms["coupled"]:
-            term.apply(now)
+            term.apply(now, term.rows)
         return np.concatenate((now.v, now.acceleration, turning.quaternion_rate(now.q, now.w), now.spin_up)), now
 
     def add_rotors(self, now):

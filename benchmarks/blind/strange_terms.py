@@ -12,8 +12,7 @@ from .turning import cross, to_body
 class MagneticTorque(Term):
     """Torque that varies over the place, like a compass near iron."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         x, y = now.x[0, r] / self.length, now.x[1, r] / self.length
         now.torque[:, r] += self.torque * np.stack((np.sin(x + 0.4), np.cos(y), np.sin(x - y)))
 
@@ -21,8 +20,7 @@ class MagneticTorque(Term):
 class YawCogging(Term):
     """Torque periodic in five times the yaw angle."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         yaw = np.arctan2(now.R[1, 0, r], now.R[0, 0, r])
         now.torque[:, r] += self.torque * np.stack((np.sin(5 * yaw), np.cos(5 * yaw + 1), np.sin(5 * yaw + 2)))
 
@@ -33,18 +31,16 @@ class GustTurbulence(Term):
     def prepare(self):
         self.noise = np.stack([coloured(rng, 3, 0.4) for rng in self.rngs], axis=2)
 
-    def apply(self, now):
-        now.torque[:, self.rows] += self.torque * at_time(self.noise, now.time)
+    def apply(self, now, r):
+        now.torque[:, r] += self.torque * at_time(self.noise, now.time)
 
 
 class StickSlipGimbal(Term):
     """A gimballed mass held by dry friction: it turns along until it slips."""
 
-    def prepare(self):
-        self.state = np.zeros((6, len(self.rows)))
+    states = 6
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         angle, rate = self.state[:3], self.state[3:]
         slip = now.w[:, r] - rate
         grip = 1 + 0.8 * np.exp(-((slip / 0.15) ** 2))
@@ -57,15 +53,14 @@ class StickSlipGimbal(Term):
 class ThermalDrift(Term):
     """Torque that grows with the square of time."""
 
-    def apply(self, now):
-        now.torque[:, self.rows] += self.torque * (max(now.time, 0.0) / 30) ** 2
+    def apply(self, now, r):
+        now.torque[:, r] += self.torque * (max(now.time, 0.0) / 30) ** 2
 
 
 class AttitudeProduct(Term):
     """Torque from products of roll and pitch."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         lean_x, lean_y = now.R[2, 0, r], now.R[2, 1, r]
         now.torque[:, r] += self.torque * np.stack((lean_x * lean_y, lean_y**2 - lean_x**2, lean_x**2)) / 0.03
 
@@ -73,8 +68,7 @@ class AttitudeProduct(Term):
 class WallEffect(Term):
     """Pull towards walls that stand along x, fading with the distance."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         distance = np.abs((now.x[0, r] - self.place + 6) % 12 - 6)
         direction = np.stack((np.zeros(len(r)), np.ones(len(r)), np.zeros(len(r))))
         body = to_body(now.R[:, :, r], direction)
@@ -88,8 +82,7 @@ class SlidingBattery(Term):
         self.state = np.zeros((2, len(self.rows)))
         self.side = np.ones((2, len(self.rows)))
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         push = now.w[[1, 0]][:, r]
         flips = np.abs(push) > 0.45
         self.side = np.where(flips, np.sign(push), self.side)
@@ -100,8 +93,7 @@ class SlidingBattery(Term):
 class CyclicSwirl(Term):
     """The swirl of the rotors' wakes, carried aside, meets one arm after the other as the flow turns."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         air = now.hub_air[:2, :, r].mean(1)
         aside = np.sqrt((air**2).sum(0))
         angle = 4 * np.arctan2(air[1], air[0])
@@ -112,8 +104,7 @@ class CyclicSwirl(Term):
 class WakeOnBody(Term):
     """Sideways flow carries the rotors' wakes over the body, so that their download moves off the centre."""
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         air = now.hub_air[:2, :, r].mean(1)
         aside = np.sqrt((air**2).sum(0))
         force = np.zeros((3, len(r)))
@@ -129,11 +120,9 @@ class FlexibleArm(Term):
 
     stage = "coupled"
 
-    def prepare(self):
-        self.state = np.zeros((6, len(self.rows)))
+    states = 6
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         angle, rate = self.state[:3], self.state[3:]
         natural = 2 * np.pi * self.frequency
         spring = natural**2 * angle + 2 * self.damping * natural * rate
@@ -148,8 +137,7 @@ class DragOverHeight(Term):
 
     stage = "hub"
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         height = np.maximum(now.x[2, r], 0.0)
         now.side[:, :, r] -= self.drag * height / (height + 60.0) * now.speed[:, r] * now.hub_air[:2, :, r]
 
@@ -164,8 +152,7 @@ class GustField(Term):
         low, high = [[0.3], [0.0], [0.0]], [[1.0], [2 * np.pi], [2 * np.pi]]
         self.waves = np.stack([rng.uniform(low, high, (3, 4)) for rng in self.rngs], axis=2)
 
-    def apply(self, now):
-        r = self.rows
+    def apply(self, now, r):
         number, way, phase = self.waves
         along = number * (np.cos(way) * now.x[0, r] + np.sin(way) * now.x[1, r])
         blow = np.sqrt(0.5) * self.gust * np.sin(along + phase)
@@ -182,5 +169,5 @@ class PropellerChange(Term):
     def prepare(self):
         self.which = self.rotor.astype(int)
 
-    def apply(self, now):
-        now.thrust[self.which, self.rows] *= 1 - self.loss * (now.time > self.when)
+    def apply(self, now, r):
+        now.thrust[self.which, r] *= 1 - self.loss * (now.time > self.when)

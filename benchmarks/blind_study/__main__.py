@@ -8,11 +8,11 @@ from pathlib import Path
 from benchmarks.blind.cases import INSTRUMENTS
 from benchmarks.blind.gusts import GUSTS
 from benchmarks.blind.vehicles import VEHICLES
+from benchmarks.blind_study.air_tables import air_tables
 from benchmarks.blind_study.fly import flown, fly
 from benchmarks.blind_study.run import CASES_AT_ONCE, judge_all, run
 from benchmarks.blind_study.score import scored
 from benchmarks.blind_study.sets import GROUPS, LEVELS, Size, sets
-from benchmarks.blind_study.short import short
 from benchmarks.blind_study.tables import tables
 
 _QUICK = {
@@ -34,11 +34,12 @@ def main():
     if told.command == "judge":
         judge_all(told.out, told.processes)
     if told.command == "run":
-        run(sets(size), told.out, told.processes, lambda each: each.level in told.baselines, told.keep)
+        run(sets(size), told.out, told.processes, told.keep)
     if told.command == "quick":
         _quick(told)
-    if told.command in ("run", "score"):
-        text = tables(scored(told.out))
+    if told.command in ("run", "score", "quick"):
+        judged = scored(told.out)
+        text = tables(judged, air_tables(judged))
         (told.out / "tables.md").write_text(text, encoding="utf-8")
         print(text)
 
@@ -57,9 +58,6 @@ def _quick(told):
     for start in range(0, len(left), CASES_AT_ONCE):
         fly(left[start : start + CASES_AT_ONCE], told.out)
     judge_all(told.out, told.processes, [own[0].name for own in chosen])
-    text = short(scored(told.out))
-    (told.out / "short.md").write_text(text, encoding="utf-8")
-    print(text)
 
 
 def _arguments():
@@ -74,8 +72,7 @@ def _arguments():
     parser.add_argument("--vehicles", type=_list, default=tuple(VEHICLES), help=",".join(VEHICLES))
     parser.add_argument("--none", type=int, help="number of sets that hide nothing, over all vehicles and noises")
     parser.add_argument("--sets", type=int, help="largest number of cases of each group")
-    parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")
-    parser.add_argument("--gusts", type=_levels, default=GUSTS[:1], help="levels of gusts: 0,1,2")
+    parser.add_argument("--gusts", type=_numbers, default=GUSTS[:1], help="levels: 0,1,2")
     parser.add_argument("--instruments", type=_list, default=("none",), help=",".join(INSTRUMENTS))
     parser.add_argument("--in-turn", action="store_true", help="each case in one of these airs, dealt out by chance")
     parser.add_argument("--processes", type=int, default=2)
@@ -83,12 +80,12 @@ def _arguments():
     return parser.parse_args()
 
 
+def _numbers(text):
+    return tuple(map(int, text.split(",")))
+
+
 def _list(text):
     return tuple(part for part in text.split(",") if part)
-
-
-def _levels(text):
-    return tuple(int(part) for part in _list(text))
 
 
 if __name__ == "__main__":

@@ -4,52 +4,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.blind_study.number_tables import coefficients_of, inside
 from benchmarks.blind_study.score import RIGHT, VISIBLE, exact
-from benchmarks.blind_study.text import NONE_TRIED, percent, table
+from benchmarks.blind_study.tables import NONE_TRIED, coefficients_of, grouped, of, percent, several, table
 
 _SIZE, _MEMORY = 0.3, 2.0
 """Relative error of a size, and ratio of memories, that are good enough."""
 _CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
-_AIR = frozenset({"gust_turbulence"})
-"""What is hidden outside the catalogue and is gusts, too."""
+
+
+def air_tables(judged):
+    """Write the tables of a study in gusts by title; none for a study in still air alone."""
+    if all(each.usual for each in judged):
+        return {}
+    return {
+        "In gusts": air_totals(judged),
+        "Intervals in gusts": _coverage(judged),
+        "Gusts by channel": air_by_channel(judged),
+    }
 
 
 def air_totals(judged):
     """Write what a study in gusts is held against, one column for each air; nothing for a study in still air alone."""
-    rows = [
-        ("sets", str, len, ""),
-        ("nothing hidden: false name", percent, _empty, "1 in 300"),
-        (f"one effect of {VISIBLE} floors or more: exactly right", percent, _visible, "96 % in still air"),
-        ("one effect above the air's share: exactly right", percent, _above, "96 %"),
-        ("any group: wrong name", percent, lambda own: [each.wrong_name for each in own], "0"),
-        ("any group but outside: a false name", percent, _false, "1 in 300"),
-        ("outside the catalogue: NAMED", percent, _outside, "at most 2 %"),
-        ("two or three effects: all named", percent, _several, "92 %"),
-        ("95 % intervals that hold the hidden value", percent, _held, "90 to 98 %"),
-        ("channels in gusts: told to be all that is left", percent, _told, ""),
-        ("channels in gusts: told how large", percent, _sized, ""),
-        (f"of these: size within {100 * _SIZE:.0f} %", percent, lambda own: _near(own, "size"), "all"),
-        (f"of these: memory within a factor of {_MEMORY:.0f}", percent, lambda own: _near(own, "memory"), "all"),
-        ("of these: size in its interval", percent, lambda own: _within(own, ""), "90 to 98 %"),
-        ("of these: memory in its interval", percent, lambda own: _within(own, "memory_"), "90 to 98 %"),
-        ("channels without gusts: told to be all that is left", percent, _told_in_vain, "0"),
-    ]
-    airs = _airs(judged)
     if all(each.usual for each in judged):
         return ""
-    cells = [(name, [form(measure(own)) for own in airs.values()], target) for name, form, measure, target in rows]
-    return table(("", *airs, "target"), [(name, *own, target) for name, own, target in cells if {*own} != {NONE_TRIED}])
+    airs = grouped(sorted(judged, key=lambda each: each.key.get("gusts", 0)), lambda each: each.air)
+    rows = [("sets", *map(len, airs.values()), "")]
+    for name, target, measure in _MEASURES:
+        cells = [percent(measure(own)) for own in airs.values()]
+        rows += [(name, *cells, target)] if {*cells} != {NONE_TRIED} else []
+    return table(" | ".join(["", *airs, "target"]), rows)
 
 
-def air_coverage(judged):
+def _coverage(judged):
     """Write how many coefficients of an effect lie in their intervals, one column for each air."""
-    if all(each.usual for each in judged):
-        return ""
     airs = {name: coefficients_of(own) for name, own in _airs(judged).items()}
-    effects = sorted({number.effect for own in airs.values() for number in own})
-    rows = [(name, *(_short(inside(own, name)) for own in airs.values())) for name in effects]
-    return table(("effect: in the interval", *airs), rows)
+    rows = []
+    for effect in sorted({number.effect for own in airs.values() for number in own}):
+        flags = [[number.inside for number in own if number.effect == effect] for own in airs.values()]
+        rows.append((effect, *(f"{sum(own)} of {len(own)}" if own else "" for own in flags)))
+    return table(" | ".join(["effect: in the interval", *airs]), rows)
 
 
 def air_by_channel(judged):
@@ -58,52 +51,16 @@ def air_by_channel(judged):
     for name, own in _airs(judged).items():
         for channel, told in enumerate(_CHANNELS):
             found = [one for one in _channels(own) if one[1] == channel]
-            sizes, memories = (
-                [_ratio(*one, what, what) for one in found if _is_sized(*one)] for what in ("size", "memory")
-            )
-            if sizes:
-                rows.append((name, told, f"{len(sizes)} of {len(found)}", _spread(sizes), _spread(memories)))
-    return table(("air", "channel", "told how large", "size, found over true", "memory, found over true"), rows)
+            sized = [one for one in found if _is_sized(*one)]
+            ratios = [[_ratio(*one, what, what) for one in sized] for what in ("size", "memory")]
+            cells = (f"{np.median(each):.2f}, {min(each):.2f} to {max(each):.2f}" for each in ratios if each)
+            rows += [(name, told, f"{len(sized)} of {len(found)}", *cells)] if sized else []
+    return table("air | channel | told how large | size, found over true | memory, found over true", rows)
 
 
 def _airs(judged):
     """Group sets by their air, still air first."""
-    airs = {}
-    for each in sorted(judged, key=lambda each: each.key.get("gusts", 0)):
-        airs.setdefault(each.air, []).append(each)
-    return airs
-
-
-def _of(own, *groups):
-    return [each for each in own if each.key["group"] in groups]
-
-
-def _empty(own):
-    return [bool(each.names) for each in _of(own, "none")]
-
-
-def _visible(own):
-    return [each.outcome == RIGHT for each in _of(own, "single") if each.visible >= VISIBLE]
-
-
-def _above(own):
-    return [each.outcome == RIGHT for each in _of(own, "single") if each.over_air >= 1]
-
-
-def _false(own):
-    return [each.false_name for each in own if not each.key["outside"]]
-
-
-def _outside(own):
-    return [each.verdict == "NAMED" for each in _of(own, "outside") if each.key["outside"]]
-
-
-def _several(own):
-    return [each.outcome == RIGHT for each in _of(own, "pair", "triple") if not each.key["outside"]]
-
-
-def _held(own):
-    return [number.inside for number in coefficients_of(own) if exact(number)]
+    return grouped(sorted(judged, key=lambda each: each.key.get("gusts", 0)), lambda each: each.air)
 
 
 def _channels(own):
@@ -115,42 +72,51 @@ def _is_told(each, channel):
     return bool(each.said.get("air")) and each.said["air"]["told"][channel]
 
 
-def _told(own):
-    return [_is_told(*one) for one in _channels(own)]
-
-
 def _is_sized(each, channel):
     return bool(each.said.get("air")) and each.said["air"]["size"][channel] is not None
 
 
-def _sized(own):
-    return [_is_sized(*one) for one in _channels(own)]
-
-
 def _told_in_vain(own):
-    still = [each for each in own if not each.key.get("gusts") and not _AIR & {*each.key["hidden"]}]
+    still = [each for each in own if not each.key.get("gusts") and "gust_turbulence" not in each.key["hidden"]]
     return [_is_told(each, channel) for each in still for channel in range(len(_CHANNELS))]
 
 
 def _ratio(each, channel, said, what):
+    """Give a number over the true one; what is told with no bound is infinite."""
     found = each.said["air"][said][channel]
     return np.inf if found is None else found / each.key["air"][what][channel]
 
 
-def _near(own, what):
-    low, high = (1 - _SIZE, 1 + _SIZE) if what == "size" else (1 / _MEMORY, _MEMORY)
+def _near(own, what, low, high):
     return [low <= _ratio(*one, what, what) <= high for one in _channels(own) if _is_sized(*one)]
 
 
-def _within(own, prefix):
-    what, told = "memory" if prefix else "size", [one for one in _channels(own) if _is_sized(*one)]
-    # What is told with no bound is infinite.
-    return [_ratio(*one, f"{prefix}low", what) <= 1 <= _ratio(*one, f"{prefix}high", what) for one in told]
+def _within(own, what, prefix):
+    sized = [one for one in _channels(own) if _is_sized(*one)]
+    return [_ratio(*one, f"{prefix}low", what) <= 1 <= _ratio(*one, f"{prefix}high", what) for one in sized]
 
 
-def _spread(ratios):
-    return f"{np.median(ratios):.2f}, {min(ratios):.2f} to {max(ratios):.2f}"
-
-
-def _short(flags):
-    return f"{sum(flags)} of {len(flags)}" if flags else ""
+_RARE = "1 in 300"
+_MEASURES = (
+    ("nothing hidden: false name", _RARE, lambda own: [bool(e.names) for e in of(own, "none")]),
+    (f"one effect of {VISIBLE} floors or more: exactly right", "96 % in still air",
+     lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.visible >= VISIBLE]),
+    ("one effect above the air's share: exactly right", "96 %",
+     lambda own: [e.outcome == RIGHT for e in of(own, "single") if e.over_air >= 1]),
+    ("any group: wrong name", "0", lambda own: [e.wrong_name for e in own]),
+    ("any group but outside: a false name", _RARE, lambda own: [e.false_name for e in own if not e.key["outside"]]),
+    ("outside the catalogue: NAMED", "at most 2 %",
+     lambda own: [e.verdict == "NAMED" for e in of(own, "outside") if e.key["outside"]]),
+    ("two or three effects: all named", "92 %", lambda own: [e.outcome == RIGHT for e in several(own)]),
+    ("95 % intervals that hold the hidden value", "90 to 98 %",
+     lambda own: [number.inside for number in coefficients_of(own) if exact(number)]),
+    ("channels in gusts: told to be all that is left", "", lambda own: [_is_told(*one) for one in _channels(own)]),
+    ("channels in gusts: told how large", "", lambda own: [_is_sized(*one) for one in _channels(own)]),
+    (f"of these: size within {100 * _SIZE:.0f} %", "all", lambda own: _near(own, "size", 1 - _SIZE, 1 + _SIZE)),
+    (f"of these: memory within a factor of {_MEMORY:.0f}", "all",
+     lambda own: _near(own, "memory", 1 / _MEMORY, _MEMORY)),
+    ("of these: size in its interval", "90 to 98 %", lambda own: _within(own, "size", "")),
+    ("of these: memory in its interval", "90 to 98 %", lambda own: _within(own, "memory", "memory_")),
+    ("channels without gusts: told to be all that is left", "0", _told_in_vain),
+)  # fmt: skip
+"""Name, target, and what gives the flags of sets in one air."""

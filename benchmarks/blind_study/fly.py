@@ -19,19 +19,7 @@ _COLUMNS_OF = Path(__file__).parents[2] / "configs" / "gap" / "sixkg.yaml"
 def fly(group, folder, duration=DURATION):
     """Fly cases, write the logs of each set to ``flights/NAME`` and what is hidden to ``keys/NAME``.
 
-    A case of which a flight tumbles until its numbers are none is left out, and said.
-
-    Parameters
-    ----------
-    group : list of list of Set
-        One list for each case.
-    folder : Path
-    duration : float, s
-
-    Returns
-    -------
-    list of Path
-        Folders with logs.
+    A case of which a flight tumbles until its numbers are none is left out, and said. Gives the folders with logs.
     """
     written = []
     seed = group[0][0].seed
@@ -50,13 +38,7 @@ def fly(group, folder, duration=DURATION):
 
 
 def flown(each, folder):
-    """Tell whether the logs of a set lie in a folder, with what is hidden in it today.
-
-    Parameters
-    ----------
-    each : Set
-    folder : Path
-    """
+    """Tell whether the logs of a set lie in a folder, with what is hidden in it today."""
     key = Path(folder) / "keys" / each.name / "key.json"
     if not key.exists() or not (Path(folder) / "flights" / each.name / "study.yaml").exists():
         return False
@@ -65,19 +47,7 @@ def flown(each, folder):
 
 
 def config(vehicle_file, asked=()):
-    """Describe a vehicle and the columns of its logs as a config.
-
-    Parameters
-    ----------
-    vehicle_file : Path
-    asked : sequence of str
-        What they hold of what was asked of it.
-
-    Returns
-    -------
-    str
-        YAML; everything else is left at its default.
-    """
+    """Describe a vehicle and the columns of its logs as YAML, what was asked of it among them."""
     told = json.loads(vehicle_file.read_text(encoding="utf-8"))
     factors = {
         "drag_factor_n_m_s2": told["torque_factor"],

@@ -5,47 +5,32 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from benchmarks.blind_study.baselines import baselines
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.report.outcome import as_json
+from cpfls_cli.result import plain
 
 
-def judge(folder, compared=False):
-    """Diagnose the flights of a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds ``study.yaml``, ``train_*.csv`` and ``held_out_*.csv``.
-    compared : bool
-        Tell what simpler procedures would name, too.
-
-    Returns
-    -------
-    dict
-        Plain data.
-    """
+def judge(folder):
+    """Diagnose the flights of a folder: ``study.yaml``, ``train_*.csv`` and ``held_out_*.csv``; give plain data."""
     folder = Path(folder)
     started = time.monotonic()
     try:
-        told = _judged(folder, compared)
+        told = _judged(folder)
     except CpflsError as error:
         told = {"verdict": "ERROR", "error": str(error), "effects": []}
-    return {"set": folder.name, **as_json(told), "seconds": round(time.monotonic() - started, 2)}
+    return {"set": folder.name, **plain(told), "seconds": round(time.monotonic() - started, 2)}
 
 
-def _judged(folder, compared):
+def _judged(folder):
     study = load_study(folder / "study.yaml")
     logs = [sorted(folder.glob(f"{role}_*.csv")) for role in ("train", "held_out")]
     read = read_flights([*logs[0], *logs[1]], study).recordings
     training, held = read[: len(logs[0])], read[len(logs[0]) :]
     run = diagnose(training, held, study.gap, generator(study, "diagnose"))
     found = run.diagnosis
-    simpler = {"baselines": baselines(training, study.gap)} if compared else {}
     return {
         "verdict": str(found.verdict),
         "effects": [_effect(effect) for effect in found.effects],
@@ -60,14 +45,13 @@ def _judged(folder, compared):
         "gap_after": {"value": found.gap.after.tolist(), "floors": found.gap.after_floors.tolist()},
         "floor": found.gap.floor.tolist(),
         "air": None if run.air is None else _air(run.air),
-        **simpler,
     }
 
 
 def _air(air):
     """Tell gusts by channel, N m, N and s, and of which channels they are all that is left."""
     names = ("size", "low", "high", "memory", "memory_low", "memory_high")
-    return {"told": air.told.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
+    return {"told": air.gusts_only.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
 
 
 def _effect(effect):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import sys
 import time
@@ -29,69 +28,50 @@ class Progress:
         left = spent / (self.done - self.first) * (self.total - self.done)
         end = "\n" if self.done == self.total or not sys.stderr.isatty() else ""
         if sys.stderr.isatty() or self.done % 20 == 0 or self.done == self.total:
-            print(f"\r{self.done} of {self.total} sets, {_clock(left)} left ", end=end, file=sys.stderr, flush=True)
+            print(
+                f"\r{self.done} of {self.total} sets, {left // 3600:.0f} h {left // 60 % 60:02.0f} min left ",
+                end=end,
+                file=sys.stderr,
+                flush=True,
+            )
 
 
-def run(groups, folder, processes, compared=lambda _: False, keep=False):
-    """Fly and judge a study.
-
-    Parameters
-    ----------
-    groups : list of list of Set
-        One list for each case.
-    folder : Path
-        Holds ``results.jsonl``, ``keys`` and, where they are kept, ``flights``.
-    processes : int
-    compared : callable
-        Takes a Set and tells whether simpler procedures judge it, too.
-    keep : bool
-        Keep the logs.
-    """
+def run(groups, folder, processes, keep=False):
+    """Fly and judge a study, a list of sets for each case; what is said goes to ``results.jsonl`` of its folder."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     done = judged(folder)
     progress = Progress(sum(each.name in done for own in groups for each in own), sum(map(len, groups)))
     left = [own for own in ([each for each in own if each.name not in done] for own in groups) if own]
-    with_others = {each.name for own in left for each in own if compared(each)}
     parts = [left[start : start + CASES_AT_ONCE] for start in range(0, len(left), CASES_AT_ONCE)]
-    # Several threads in each of several processes would be in each other's way.
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
         coming = [pool.submit(fly, part, folder) for part in parts[:1]]
         for place in range(len(parts)):
             logs = coming.pop().result()
             # The next flights are flown while these are judged.
             coming = [pool.submit(fly, part, folder) for part in parts[place + 1 : place + 2]]
-            asked = {pool.submit(judge, path, path.name in with_others): path for path in logs}
-            for future in as_completed(asked):
-                print(json.dumps(future.result()), file=results, flush=True)
-                progress.step()
-                if not keep:
-                    shutil.rmtree(asked[future])
+            _judge_in(pool, logs, results, progress, keep)
 
 
 def judge_all(folder, processes, again=()):
-    """Judge all flights of a folder that are not judged yet; or those of some sets alone, and again.
-
-    Parameters
-    ----------
-    folder : Path
-    processes : int
-    again : sequence of str
-        Names of sets.
-    """
+    """Judge all flights of a folder that are not judged yet; or those of some sets alone, by their names, and again."""
     folder = Path(folder)
     if again:
         (folder / "results.jsonl").unlink(missing_ok=True)
     done = judged(folder)
     names = again or sorted(path.name for path in (folder / "flights").iterdir())
     logs = [folder / "flights" / name for name in names if name not in done]
-    progress = Progress(len(done), len(done) + len(logs))
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
-        for future in as_completed([pool.submit(judge, path) for path in logs]):
-            print(json.dumps(future.result()), file=results, flush=True)
-            progress.step()
+        _judge_in(pool, logs, results, Progress(len(done), len(done) + len(logs)), keep=True)
+
+
+def _judge_in(pool, logs, results, progress, keep):
+    asked = {pool.submit(judge, path): path for path in logs}
+    for future in as_completed(asked):
+        print(json.dumps(future.result()), file=results, flush=True)
+        progress.step()
+        if not keep:
+            shutil.rmtree(asked[future])
 
 
 def judged(folder):
@@ -104,8 +84,3 @@ def judged(folder):
     if whole != text:
         path.write_text(whole, encoding="utf-8")
     return {json.loads(line)["set"] for line in whole.splitlines()}
-
-
-def _clock(seconds):
-    minutes = round(seconds / 60)
-    return f"{minutes // 60} h {minutes % 60:02d} min"

@@ -28,10 +28,6 @@ _CANCELS = 0.3
 """Share of the gap beyond all of it, or below none, from which on effects work against one another."""
 
 CERTAIN = ("NAMED", "AMBIGUOUS")
-OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
-
-NOT_COLUMNS = frozenset({"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay", "parameter_error"})
-"""Effects that are not found by a search among columns."""
 
 
 @dataclass(frozen=True)
@@ -101,14 +97,10 @@ class Scored:
     @property
     def unphysical(self):
         """Whether a certain verdict has numbers at or beyond their bounds, or effects that cancel one another."""
-        return self.verdict in CERTAIN and (self._at_bounds() or self._cancelling())
-
-    def _at_bounds(self):
-        numbers = [number for effect in self.said["effects"] for number in effect["coefficients"].values()]
-        return any(_at_bound(number["value"], *number["possible"]) for number in numbers)
-
-    def _cancelling(self):
-        return any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in self.said["effects"])
+        effects = self.said["effects"] if self.verdict in CERTAIN else []
+        numbers = [number for effect in effects for number in effect["coefficients"].values()]
+        cancel = any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in effects)
+        return cancel or any(_at_bound(number["value"], *number["possible"]) for number in numbers)
 
     @property
     def visible(self):
@@ -177,16 +169,7 @@ def _at_bound(value, low, high):
 
 
 def scored(folder):
-    """Join keys and results.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    list of Scored
-    """
+    """Join keys and results."""
     folder = Path(folder)
     out = []
     for line in (folder / "results.jsonl").read_text(encoding="utf-8").splitlines():
@@ -211,19 +194,7 @@ def _over_flights(sizes, only):
 
 
 def outcome(key, said):
-    """Compare the names given with those hidden.
-
-    Wind acts through rotor drag, so a wind includes its drag.
-
-    Parameters
-    ----------
-    key, said : dict
-
-    Returns
-    -------
-    str
-        One of ``OUTCOMES``.
-    """
+    """Compare the names given with those hidden; wind acts through rotor drag, so a wind includes its drag."""
     if said["verdict"] == "ERROR":
         return ERROR
     truth, names = set(key["truth"]), {effect["name"] for effect in said["effects"]}
@@ -256,22 +227,13 @@ def _nothing_named(key, said):
 def _with_rivals(said, names, truth):
     """Tell whether a listed rival, with what it needs beside it, makes the answer right in the place of a name."""
     return any(
-        names - {rival["instead_of"]} | {rival["name"], rival.get("beside") or rival["name"]} == truth
+        names - {rival["instead_of"]} | {rival["name"], rival.get("jointly_with") or rival["name"]} == truth
         for rival in said["alternatives"]
     )
 
 
 def numbers(each):
-    """Compare the coefficients of rightly named effects with the hidden ones.
-
-    Parameters
-    ----------
-    each : Scored
-
-    Returns
-    -------
-    list of Number
-    """
+    """Compare the coefficients of rightly named effects with the hidden ones."""
     true = coefficients(each.key)
     return [
         number

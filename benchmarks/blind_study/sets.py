@@ -66,17 +66,7 @@ class Set:
 
 
 def sets(size):
-    """List the sets of a study, those of a case together.
-
-    Parameters
-    ----------
-    size : Size
-
-    Returns
-    -------
-    list of list of Set
-        One list for each case in each air.
-    """
+    """List the sets of a study, those of a case in one air together."""
     own = [case for case in cases(size.seed, size.draws) if case.group in size.groups and case.vehicle in size.vehicles]
     noises = [(level, kind) for level in size.levels for kind in size.kinds]
     if size.none is not None and "none" in size.groups:

@@ -18,18 +18,7 @@ _HELD = 1e-3
 
 
 def coefficients(key):
-    """Give the true value of each coefficient that the catalogue has for what is hidden.
-
-    Parameters
-    ----------
-    key : dict
-        As in ``key.json``.
-
-    Returns
-    -------
-    dict of str to dict of str to float
-        By effect, then by coefficient.
-    """
+    """Give the true value of each coefficient that the catalogue has for what is hidden, by effect and coefficient."""
     hidden, vehicle = key["hidden"], VEHICLES[key["vehicle"]]
     known = {NAMES.get(name, name): _OF[name](values, vehicle) for name, values in hidden.items() if name in _OF}
     # The rotors always lag; a log without their speeds shows it.

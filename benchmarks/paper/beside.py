@@ -173,13 +173,7 @@ _PRINTED_ROWS = {
 
 
 def printed_beside(settings: Settings) -> list[PrintedColumn | None]:
-    """Find the column of the paper that each setting repeats.
-
-    Returns
-    -------
-    list of PrintedColumn or None
-        Of equal structure and samples; of those of equal population and generations too, else the first in order.
-    """
+    """Find the column of the paper that each setting repeats: of equal size too where there is one, else the first."""
     columns: dict[int, PrintedColumn] = {}
     for exact in (True, False):
         for index, setting in enumerate(settings):

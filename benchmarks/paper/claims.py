@@ -36,19 +36,7 @@ Searches = Sequence[Settings]
 
 @dataclass(frozen=True)
 class EvaluationTime:
-    """Duration of an evaluation on a number of samples.
-
-    Attributes
-    ----------
-    samples : int
-        Learned from and judged on.
-    svd_s : float, s
-        Singular value decomposition of the regressor.
-    evaluation_s : float, s
-        Evaluation as the paper does it.
-    compiled_s : float, s
-        Evaluation by the compiled code.
-    """
+    """Duration of an evaluation on so many samples, s: of the decomposition in it, as the paper does it, compiled."""
 
     samples: int
     svd_s: float
@@ -58,13 +46,7 @@ class EvaluationTime:
 
 @dataclass(frozen=True)
 class PaperSources(Sources):
-    """Everything that a report on the paper is about.
-
-    Attributes
-    ----------
-    times : sequence of EvaluationTime
-        Measured beside the artifacts, of which none holds a time.
-    """
+    """Everything that a report on the paper is about; times are measured, for no artifact holds one."""
 
     times: Sequence[EvaluationTime] = ()
 
@@ -80,15 +62,7 @@ class ClaimVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured for a claim of the paper.
-
-    Attributes
-    ----------
-    ours : str
-        The number beside that of the paper.
-    why : str
-        One or two sentences.
-    """
+    """What was measured for a claim of the paper: a verdict, the number, and why in one or two sentences."""
 
     verdict: ClaimVerdict
     ours: str
@@ -97,24 +71,10 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper.
+    """One claim of the paper, in its own words.
 
-    Attributes
-    ----------
-    name : str
-        In a few words.
-    where : str
-        Section of the paper.
-    words : str
-        The paper's own.
-    rule : str
-        What is measured, and what counts as a pass; stated without the outcome.
-    paper : str
-        The paper's number.
-    measure : callable
-        Measures it on the artifacts of a report.
-    of_searches : callable or None
-        Measures it on searches alone, those of one reading of the paper; None for a claim about other things.
+    `rule` states what is measured and what counts as a pass, without the outcome. `of_searches` measures the claim on
+    searches alone, those of one reading of the paper; None for a claim about other things.
     """
 
     name: str
@@ -223,24 +183,13 @@ class Line:
 
 
 def line_through(x: Array, y: Array) -> Line:
-    """Fit a straight line by least squares.
-
-    Parameters
-    ----------
-    x, y : array, shape (points,)
-    """
+    """Fit a straight line by least squares."""
     slope = float(np.polyfit(x, y, 1)[0])
     return Line(slope, float(np.corrcoef(x, y)[0, 1] ** 2))
 
 
 def _times(sources: PaperSources) -> dict[str, Array] | None:
-    """Gather the times of evaluations.
-
-    Returns
-    -------
-    dict of str to array, shape (sizes,), or None
-        By attribute of `EvaluationTime`; None for too few sizes.
-    """
+    """Gather the times of evaluations by attribute of `EvaluationTime`; None for too few sizes."""
     times = sources.times
     if len({time.samples for time in times}) < _FEWEST_SIZES:
         return None

@@ -12,13 +12,7 @@ PRINTED_DURATION_S = "55"
 
 @dataclass(frozen=True)
 class PrintedSet:
-    """One column of Table 4 as printed.
-
-    Attributes
-    ----------
-    change : float
-        Against the full set.
-    """
+    """One column of Table 4 as printed, with its change against the full set."""
 
     samples: int
     condition_number: int
@@ -36,17 +30,7 @@ TABLE_4 = (
 
 @dataclass(frozen=True)
 class PrintedColumn:
-    """One column of Table 5 as printed.
-
-    Attributes
-    ----------
-    structure : str
-        As the config calls it.
-    mse, max_error, condition_number : str
-        Of the selected model.
-    mse_of_runs, max_error_of_runs, condition_number_of_runs : tuple of (str, str)
-        Mean and "variance" of ten runs.
-    """
+    """One column of Table 5 as printed: the selected model, and mean and "variance" of ten runs."""
 
     system: str
     structure: str

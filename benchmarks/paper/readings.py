@@ -45,18 +45,8 @@ Verdicts = Sequence[Sequence[Measurement]]
 class Reading:
     """One way to read the paper, and the searches that follow it.
 
-    Attributes
-    ----------
-    flight : str
-        The path in words.
-    noise : float
-        Of the torque, as a share of its standard deviation.
-    criterion : str
-        What chose the samples.
-    judged_on : str
-        What errors are taken over, as the config calls it.
-    settings : sequence of Setting
-        All samples among them.
+    The path in words, the noise of the torque as a share of its standard deviation, what chose the samples, and what
+    errors are taken over, as the config calls it.
     """
 
     flight: str
@@ -135,13 +125,7 @@ def _median(runs: Array) -> float:
 
 
 def readings(sources: Sources) -> list[Reading]:
-    """Tell the readings of the paper apart that the sweeps of a report follow.
-
-    Returns
-    -------
-    list of Reading
-        By flight, noise, criterion and what is judged on.
-    """
+    """Tell the readings of the paper apart that the sweeps of a report follow, in order of flight and noise."""
     found: dict[tuple[str, float, str, str], Reading] = {}
     for sweep in joined_sweeps(sources.sweeps):
         for reading in _of_sweep(sweep):
@@ -177,20 +161,7 @@ def _noise(share: float) -> str:
 
 
 def readings_blocks(sources: Sources, claims: Sequence[Claim]) -> tuple[list[Block], list[Block]]:
-    """Show how each claim fares in each reading, where a report has more than one.
-
-    Parameters
-    ----------
-    claims : sequence of Claim
-        Those about other things than searches are left out.
-
-    Returns
-    -------
-    list of Block
-        The answer.
-    list of Block
-        Its grounds.
-    """
+    """Show how each claim about searches fares in each reading, where a report has several: answer, and details."""
     found = readings(sources)
     if len(found) < 2:
         return [], []

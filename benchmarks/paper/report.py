@@ -1,28 +1,25 @@
-"""The report on the paper: the page of `cpfls report`, the paper's figures beside ours, and its claims one by one.
-
-python benchmarks/paper/report.py CONFIG ARTIFACT... -o report.html [--times times.json]
-"""
+"""The report on the paper: the page of `cpfls report`, the paper's figures beside ours, and its claims one by one."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import typer
 
 from benchmarks.paper.beside import with_the_paper
 from benchmarks.paper.claims import EvaluationTime, PaperSources, compares_readings
 from benchmarks.paper.reproduction import reproduction_section
+from benchmarks.shared.measure import program
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.commands.report import read_sources
 from cpfls_cli.config.load import load_study
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.page import Page, page_of, sections_of
 from cpfls_cli.report.content import Section
+from cpfls_cli.stages.report import read_sources
 from cpfls_cli.version import __version__
 
 _BEFORE = {"summary", "comparison", "models"}
@@ -30,13 +27,7 @@ _BEFORE = {"summary", "comparison", "models"}
 
 
 def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[EvaluationTime] = ()) -> Page:
-    """Write a report on the paper.
-
-    Parameters
-    ----------
-    times : sequence of EvaluationTime
-        Measured beside the artifacts, of which none holds a time.
-    """
+    """Write a report on the paper; times are measured, for no artifact holds one."""
     study = load_study(config)
     given = read_sources(artifacts, [read_content(path).sha256 for path in artifacts])
     sources = PaperSources(given, study.vehicle, study.report, times)
@@ -55,18 +46,17 @@ def _without_readings(section: Section, sources: PaperSources) -> Section | None
     return next((each for each in sections_of(others) if each.name == section.name), None)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("config", type=Path)
-    parser.add_argument("artifacts", type=Path, nargs="+")
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--times", type=Path, help="written by benchmarks/reproduction_time.py --out")
-    options = parser.parse_args()
-    measured = json.loads(options.times.read_text(encoding="utf-8")) if options.times else []
-    page = paper_page(options.config, options.artifacts, [EvaluationTime(**row) for row in measured])
-    write_text(options.output, page.text)
+def main(
+    config: Path,
+    artifacts: list[Path],
+    output: Annotated[Path, typer.Option("--output", "-o")],
+    times: Path | None = None,
+) -> None:
+    measured = json.loads(times.read_text(encoding="utf-8")) if times else []
+    page = paper_page(config, artifacts, [EvaluationTime(**row) for row in measured])
+    write_text(output, page.text)
     print(f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables")
 
 
 if __name__ == "__main__":
-    main()
+    program(main)

@@ -86,12 +86,7 @@ _Measured = Sequence[tuple[Claim, Measurement]]
 
 
 def reproduction_section(sources: PaperSources) -> Section:
-    """Check the claims of the paper and compare its figures.
-
-    References
-    ----------
-    Sections 8, 10 and 11 and Figures 1 to 7 of the paper.
-    """
+    """Check the claims of sections 8, 10 and 11 of the paper and compare its Figures 1 to 7."""
     measured = [(claim, claim.measure(sources)) for claim in CLAIMS]
     answer, grounds = readings_blocks(sources, CLAIMS)
     blocks: list[Block] = [
@@ -145,16 +140,9 @@ def _rules() -> Folded:
 
 @dataclass(frozen=True)
 class ComparedFigure:
-    """A figure of the paper beside ours.
+    """A figure of the paper and ours: what the paper's text says of it in numbers, and the same of ours.
 
-    Attributes
-    ----------
-    title : str
-        Number and subject.
-    paper, ours : str
-        What the paper's text says of it in numbers, and the same of ours.
-    agreement : {"agrees", "differs", "read as printed", "cannot be compared", "not shown"}
-        Read as printed: the paper's own numbers, decoded as here, agree with each other. It says nothing of any model.
+    Read as printed: the paper's own numbers, decoded as here, agree with each other. It says nothing of any model.
     """
 
     title: str
@@ -165,13 +153,7 @@ class ComparedFigure:
 
 
 def compared_figures(sources: PaperSources) -> list[ComparedFigure]:
-    """Compare the figures of a report with what the paper's text says of its own.
-
-    Returns
-    -------
-    list of ComparedFigure
-        Figures 1 to 7.
-    """
+    """Compare Figures 1 to 7 with what the paper's text says of its own."""
     return [
         seesaw_compared(),
         _derivatives_compared(sources),
@@ -321,12 +303,7 @@ def _error_compared(sources: PaperSources) -> ComparedFigure:
 
 
 def seesaw_figure(name: str) -> Plot:
-    """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
-
-    References
-    ----------
-    Figure 1 and equation (11) of the paper.
-    """
+    """Draw Figure 1: the piecewise linear seesaw of equation (11) over two turns, with the values that are printed."""
     half_turns = np.linspace(-1.0, 3.0, 801)
 
     def draw(figure: Figure) -> None:

@@ -38,20 +38,10 @@ _RULE = (
 
 @dataclass(frozen=True)
 class PairedRatio:
-    """How many times larger an error is with one setting than with another.
+    """How many times larger an error is with one setting than with another, over pairs of equal seeds.
 
-    Attributes
-    ----------
-    seeds : int
-        Pairs.
-    failed, reference_failed : int
-        Pairs in which the setting, or the reference, found no model.
-    ratio, low, high : float
-        Ratio of geometric means over the pairs with two models, and its 95 % interval; the interval is NaN for fewer
-        than two such pairs. All are infinite where the setting failed and the reference did not: no model is an
-        infinite error.
-    p_value : float
-        Of Wilcoxon's signed-rank test that neither setting is better; NaN for fewer than two pairs.
+    The ratio of geometric means over the pairs with two models, its 95 % interval (NaN for fewer than two such pairs)
+    and the p-value of Wilcoxon's signed-rank test. All are infinite where the setting failed and the reference did not.
     """
 
     seeds: int
@@ -98,13 +88,7 @@ def _half_width(logs: Array) -> float:
 
 
 def _as_good(setting: Setting, reference: Setting, reason: str) -> Measurement | None:
-    """Judge whether a setting is as good as another; None where they have no finished runs of equal seeds.
-
-    Parameters
-    ----------
-    reason : str
-        Of a failure.
-    """
+    """Judge whether a setting is as good as another; None where they have no finished runs of equal seeds."""
     paired = paired_ratio(setting, reference)
     if not paired.seeds:
         return None
@@ -148,19 +132,7 @@ _Lacking = Callable[[Searches], str]
 def _claim(
     name: str, words: str, paper: str, pairs: _Pairs, lacking: _Lacking, command: str, reason: str, rule: str = ""
 ) -> Claim:
-    """State a claim about two settings, judged on the first pair that can; the larger search comes first.
-
-    Parameters
-    ----------
-    lacking : callable
-        Names what is missing where no pair is found.
-    command : str
-        What makes it.
-    reason : str
-        Of a failure.
-    rule : str
-        What is asked beside the rule for pairs.
-    """
+    """State a claim about two settings, judged on the first pair that can; the larger search comes first."""
 
     def of_searches(found: Searches) -> Measurement:
         for pair in chain.from_iterable(map(pairs, found)):

@@ -256,7 +256,33 @@ def _remembered(rng: np.random.Generator, samples: int, memory_s: Array) -> Arra
     return np.stack([lfilter([1.0], [1.0, -k], column) for k, column in zip(keep, drawn.T, strict=True)], axis=1)
 
 
-def _flies(
+@compiled
+def _in_body(turn: Array, vector: Array) -> Array:
+    return np.array([turn[0, a] * vector[0] + turn[1, a] * vector[1] + turn[2, a] * vector[2] for a in range(3)])
+
+
+@compiled
+def _in_world(turn: Array, vector: Array) -> Array:
+    return np.array([turn[a, 0] * vector[0] + turn[a, 1] * vector[1] + turn[a, 2] * vector[2] for a in range(3)])
+
+
+@compiled
+def _cross(a: Array, b: Array) -> Array:
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@compiled
+def _turned(turn: Array, angle: Array) -> Array:
+    """Turn about body axes by a small angle, to second order."""
+    columns = np.zeros((3, 3))
+    for row in range(3):
+        across = _cross(turn[row], angle)
+        columns[row] = turn[row] + across + 0.5 * _cross(across, angle)
+    return columns
+
+
+@compiled
+def _fly(
     path: Array, push: Array, shove: Array, noise: Array,
     mass: float, inertia: Array, places: Array, thrust: Array, drag: Array, spins: Array, lag: float, late: int,
     air: float, wind: Array, turn_bias: Array, turn_gain: Array, charge: float, sag: float, by_voltage: float,
@@ -270,40 +296,21 @@ def _flies(
     speed, phase, squared = np.full(rotors, hover**0.5), np.zeros(rotors), np.full(rotors, hover)
     asked = np.full((late + 1, rotors), hover)
     stiff, damped = bandwidth**2 * np.array([1.0, 1.0, 0.16]), 1.4 * bandwidth * np.array([1.0, 1.0, 0.4])
-    wrench, error, wanted, summed = np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3)
-    measured, torque, force, spin_up = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    wrench, summed, torque = np.zeros(4), np.zeros(3), np.zeros(3)
     for now in range(samples):
-        load = 0.0
-        for rotor in range(rotors):
-            load += (speed[rotor] ** 2 / hover) ** 1.5 / rotors
-        voltage = charge - sag * load - 0.0005 * now * 2e-3
-        for axis in range(3):
-            measured[axis] = turn_gain[axis] * rate[axis] + turn_bias[axis] + noise[now, axis]
-            pull = 4.0 * (path[now, axis] - position[axis]) + 3.2 * (path[now, 3 + axis] - velocity[axis])
-            wanted[axis] = min(max(path[now, 6 + axis] + pull, -6.0), 6.0)
+        voltage = charge - sag * ((speed**2 / hover) ** 1.5).sum() / rotors - 0.0005 * now * 2e-3
+        measured = turn_gain * rate + turn_bias + noise[now]
+        pull = 4.0 * (path[now, :3] - position) + 3.2 * (path[now, 3:6] - velocity)
+        wanted = np.minimum(np.maximum(path[now, 6:9] + pull, -6.0), 6.0)
         wanted[2] += 9.81
-        size = np.sqrt((wanted**2).sum())
-        up = wanted / size
-        lean = np.array(
-            [
-                up[1] * turn[2, 2] - up[2] * turn[1, 2],
-                up[2] * turn[0, 2] - up[0] * turn[2, 2],
-                up[0] * turn[1, 2] - up[1] * turn[0, 2],
-            ]
-        )
-        for axis in range(3):
-            error[axis] = -(turn[0, axis] * lean[0] + turn[1, axis] * lean[1] + turn[2, axis] * lean[2])
+        up = wanted / np.sqrt((wanted**2).sum())
+        error = -_in_body(turn, _cross(up, turn[:, 2]))
         error[2] = -turn[1, 0]
-        wrench[0] = known_mass * (wanted[0] * turn[0, 2] + wanted[1] * turn[1, 2] + wanted[2] * turn[2, 2])
-        for axis in range(3):
-            summed[axis] += integral * 2e-3 * error[axis]
-            angle_left = error[axis] + summed[axis]
-            wrench[1 + axis] = known_inertia[axis] * (stiff[axis] * angle_left - damped[axis] * measured[axis])
+        summed += integral * 2e-3 * error
+        wrench[0] = known_mass * (wanted * turn[:, 2]).sum()
+        wrench[1:] = known_inertia * (stiff * (error + summed) - damped * measured)
         for rotor in range(rotors):
-            total = 0.0
-            for column in range(4):
-                total += unmix[rotor, column] * wrench[column]
-            squared[rotor] = min(max(total, 0.05 * hover), 4.0 * hover)
+            squared[rotor] = min(max((unmix[rotor] * wrench).sum(), 0.05 * hover), 4.0 * hover)
         if now % 5 == 0:
             row = log[now // 5]
             row[:3], row[3:6], row[15:18], row[18:21], row[21] = position, velocity, felt, rate, voltage
@@ -324,41 +331,14 @@ def _flies(
             torque[0] += places[rotor, 1] * lift
             torque[1] -= places[rotor, 0] * lift
             torque[2] -= spins[rotor] * drag[rotor] * mean
-        momentum = inertia * rate
-        torque[0] -= rate[1] * momentum[2] - rate[2] * momentum[1]
-        torque[1] -= rate[2] * momentum[0] - rate[0] * momentum[2]
-        torque[2] -= rate[0] * momentum[1] - rate[1] * momentum[0]
-        spin_up[:] = torque / inertia + push[now]
-        through = velocity.copy()
-        through[0] -= wind[0]
-        through[1] -= wind[1]
-        for axis in range(3):
-            along = turn[0, axis] * through[0] + turn[1, axis] * through[1] + turn[2, axis] * through[2]
-            shoved = turn[0, axis] * shove[now, 0] + turn[1, axis] * shove[now, 1] + turn[2, axis] * shove[now, 2]
-            force[axis] = (-air * along if axis < 2 else pushed) / mass
-            felt[axis] = force[axis] + shoved
-        for axis in range(3):
-            faster = turn[axis, 0] * felt[0] + turn[axis, 1] * felt[1] + turn[axis, 2] * felt[2]
-            faster -= 9.81 if axis == 2 else 0.0
-            position[axis] += 2e-3 * (velocity[axis] + 1e-3 * faster)
-            velocity[axis] += 2e-3 * faster
-        angle = 2e-3 * (rate + 1e-3 * spin_up)
-        small = np.array([[0.0, -angle[2], angle[1]], [angle[2], 0.0, -angle[0]], [-angle[1], angle[0], 0.0]])
-        turned = np.zeros((3, 3))
-        square = np.zeros((3, 3))
-        for row_ in range(3):
-            for column in range(3):
-                for inner in range(3):
-                    square[row_, column] += 0.5 * small[row_, inner] * small[inner, column]
-        for row_ in range(3):
-            for column in range(3):
-                for inner in range(3):
-                    unit = 1.0 if inner == column else 0.0
-                    turned[row_, column] += turn[row_, inner] * (unit + small[inner, column] + square[inner, column])
-        # The first axis of unit length, the others at right angles to it.
-        turn[:] = turned
+        spin_up = (torque - _cross(rate, inertia * rate)) / inertia + push[now]
+        through = _in_body(turn, velocity - np.array([wind[0], wind[1], 0.0]))
+        force = np.array([-air * through[0], -air * through[1], pushed]) / mass
+        felt = force + _in_body(turn, shove[now])
+        faster = _in_world(turn, felt)
+        faster[2] -= 9.81
+        position += 2e-3 * (velocity + 1e-3 * faster)
+        velocity += 2e-3 * faster
+        turn = _turned(turn, 2e-3 * (rate + 1e-3 * spin_up))
         rate += 2e-3 * spin_up
     return log
-
-
-_fly = compiled(_flies)

@@ -18,15 +18,7 @@ _SENSED = ("sfx", "sfy", "sfz")
 
 
 def write_flight(folder: Path, flight: PlaybackFlight, specific_force: Array | None = None) -> None:
-    """Write a flight in SI: world ENU, body FLU, the quaternion from body to world, rotor speeds as logged.
-
-    Parameters
-    ----------
-    folder : Path
-        Made where it is not there.
-    flight : PlaybackFlight
-    specific_force : array, shape (time, 3), m/s^2, body frame
-    """
+    """Write a flight in SI: world ENU, body FLU, the quaternion from body to world, rotor speeds, and what is felt."""
     motion = flight.motion
     quaternion = Rotation.from_matrix(motion.rotation).as_quat()
     # One sign throughout: q and -q are the same rotation.

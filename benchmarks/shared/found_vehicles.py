@@ -40,21 +40,10 @@ def constants_unknown(vehicle: VehicleSettings) -> VehicleSettings:
 def learned(
     vehicle: VehicleSettings,
     training: Sequence[PlaybackFlight],
-    settings: PlaybackSettings | None = None,
     baselines: bool = True,
 ) -> dict[str, VehicleModel]:
-    """Find a vehicle with the settings of the program, and fit the baselines of the choice; what was found is printed.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    training : sequence of PlaybackFlight
-    settings : PlaybackSettings, optional
-    baselines : bool
-        Whether to fit all blocks, and those added one by one.
-    """
-    used, start = settings or PlaybackSettings(), perf_counter()
+    """Find a vehicle with the program's settings, and fit the baselines of the choice; what was found is printed."""
+    used, start = PlaybackSettings(), perf_counter()
     found = find_vehicle(vehicle, training, used, np.random.default_rng(SEED), _shown)
     choice = found.choice
     print(f"\nfound in {perf_counter() - start:.0f} s, {choice.evaluated} structures judged on flights kept aside:")
@@ -62,44 +51,33 @@ def learned(
         judged = getattr(choice, name)
         worse, uncertain = judged.worse_than(choice.best)
         blocks = " ".join(judged.structure.blocks)
-        print(
-            f"  {name}: error {judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f}), {judged.numbers} numbers: {blocks}"
-        )
+        size = f"{judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f})"
+        print(f"  {name}: error {size}, {judged.numbers} parameters: {blocks}")
     for number in found.numbers:
         weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
     # Where flights repeat each other the model is the constants, and no forecast.
-    models = {f"vehicle, {choice.chosen.numbers} numbers": found.forecast or found.model}
+    models = {f"vehicle, {choice.chosen.numbers} parameters": found.forecast or found.model}
     for name in ("greedy", "everything") if baselines else ():
         judged = getattr(choice, name)
         clock = perf_counter()
         fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fit)
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
-        models[f"{name}, {judged.numbers} numbers"] = fitted.model
+        models[f"{name}, {judged.numbers} parameters"] = fitted.model
     return models
 
 
 def fitted_blocks(
     vehicle: VehicleSettings, training: Sequence[PlaybackFlight], blocks: Sequence[str], past_s: float
 ) -> tuple[VehicleModel, Observer]:
-    """Fit a forecast of given blocks, and its observer; without a search, as `learned` fits what it has chosen.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    training : sequence of PlaybackFlight
-    blocks : sequence of str
-    past_s : float, s
-        How much of the past the observer uses.
-    """
+    """Fit a forecast of given blocks and its observer, which uses so much of the past, as `learned` fits its choice."""
     used, clock = PlaybackSettings(), perf_counter()
     held = Structure(tuple(block for block in blocks if block != INERTIA))
     windows = [each for part in parts_of(training, used) for each in part]
     # On the body as it is first, as in a search.
     first = fit(held.free(vehicle), windows, {}, 12, 1e-3)
     fitted, windows = fitted_to_all(Structure(tuple(blocks)), vehicle, training, used, first)
-    print(f"{len(fitted.values)} numbers fitted in {perf_counter() - clock:.0f} s, loss {fitted.loss:.4f}")
+    print(f"{len(fitted.values)} parameters fitted in {perf_counter() - clock:.0f} s, loss {fitted.loss:.4f}")
     clock = perf_counter()
     observer = fit_observer(fitted, windows, past_s)
     print(f"observer fitted in {perf_counter() - clock:.0f} s: {observer}\n")

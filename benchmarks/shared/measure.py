@@ -1,18 +1,28 @@
-"""Two things timed in turn, tables in Markdown, and the same as JSON."""
+"""Command lines of the benchmarks, two things timed in turn, and tables in Markdown and JSON."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import process_time
 from typing import Any
 
+import numpy as np
+import typer
+
 RESULTS = Path(__file__).resolve().parents[1] / "results"
+
+
+def program(main: Callable[..., None]) -> None:
+    """Call the main function of a module with what the command line says; its parameters are the options."""
+    main.__doc__ = sys.modules[main.__module__].__doc__
+    typer.run(main)
 
 
 @dataclass(frozen=True)
@@ -25,6 +35,13 @@ class Ratio:
     lowest: float
     highest: float
 
+    @classmethod
+    def of(cls, times: Sequence[tuple[float, float]]) -> Ratio:
+        """Compare pairs of times, the slow one first."""
+        ratios = [one / other for one, other in times]
+        both = (median(time[index] for time in times) for index in (0, 1))
+        return cls(*both, median(ratios), min(ratios), max(ratios))
+
     @property
     def range(self) -> str:
         return f"{self.ratio:.3g} ({self.lowest:.3g} to {self.highest:.3g})"
@@ -34,36 +51,23 @@ def in_turn(
     slow: Callable[[], object],
     fast: Callable[[], object],
     repeats: int = 5,
-    clock: Callable[[], float] = perf_counter,
+    clock: Callable[[], float] = process_time,
 ) -> Ratio:
     """Time two things in turn, each once unmeasured before; medians, and the range of the ratio."""
     slow(), fast()
-    return ratio_of([(seconds(slow, clock), seconds(fast, clock)) for _ in range(repeats)])
+    return Ratio.of([(seconds(slow, clock), seconds(fast, clock)) for _ in range(repeats)])
 
 
-def ratio_of(times: Sequence[tuple[float, float]]) -> Ratio:
-    """Compare pairs of times, the slow one first."""
-    ratios = [one / other for one, other in times]
-    both = (median(time[place] for time in times) for place in (0, 1))
-    return Ratio(*both, median(ratios), min(ratios), max(ratios))
-
-
-def seconds(work: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
-    """Time something once; the processor's clock (`process_time`) is the one that other programs disturb least."""
+def seconds(work: Callable[[], object], clock: Callable[[], float] = process_time) -> float:
+    """Time something once, by the processor's clock, which other programs disturb least."""
     start = clock()
     work()
     return clock() - start
 
 
-def pin_threads() -> None:
-    """Limit linear algebra to one thread; call it before anything numerical is imported."""
-    from cpfls_cli.cli.main import use_one_thread
-
-    use_one_thread()
-
-
-def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 3, **more: Any) -> None:
-    """Print a Markdown table and write it, with the machine in words, to ``benchmarks/results/NAME.json``."""
+def table(name: str, columns: str | Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 3, **more: Any) -> None:
+    """Print a Markdown table and write it to ``benchmarks/results``; columns are one text, or a sequence."""
+    columns = columns.split(" | ") if isinstance(columns, str) else columns
     print("| " + " | ".join(columns) + " |")
     print("|" + "---|" * len(columns))
     for row in rows:
@@ -74,10 +78,25 @@ def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], digi
     (RESULTS / f"{name}.json").write_text(json.dumps(content, indent=1, default=float) + "\n", encoding="utf-8")
 
 
+def progress(row: Sequence[object]) -> None:
+    """Show a row of a long table on stderr as soon as it is known."""
+    print(*row, sep=" | ", file=sys.stderr, flush=True)
+
+
+def count(flags: Any) -> str:
+    """Write how many of an array are true."""
+    return f"{int(np.sum(flags))} of {np.size(flags)}"
+
+
+def mean_and_ends(values: Any, digits: int = 3) -> str:
+    """Write the mean and the ends of an array; a dash where it is empty."""
+    ends = f"{np.min(values):.2f} to {np.max(values):.2f}" if len(values) else ""
+    return f"{np.mean(values):.{digits}f} ({ends})" if len(values) else "—"
+
+
 def machine() -> str:
     """Describe the machine in words."""
     import numba
-    import numpy as np
     from llvmlite.binding import get_host_cpu_name
 
     versions = f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}"

@@ -48,20 +48,9 @@ HUBS = (((ARM, -ARM), 1), ((-ARM, -ARM), -1), ((-ARM, ARM), 1), ((ARM, ARM), -1)
 
 
 def _vehicle(drag_factor: float, yaw: int) -> VehicleSettings:
-    return VehicleSettings(
-        mass_kg=MASS,
-        inertia_kg_m2=INERTIA,
-        rotor_speed_max_rad_s=3500.0,
-        rotors=tuple(
-            RotorSettings(
-                position_m=(*hub, 0.0),
-                spin=1 if yaw * spin > 0 else -1,
-                thrust_factor_n_s2=THRUST_FACTOR,
-                drag_factor_n_m_s2=drag_factor,
-            )
-            for hub, spin in HUBS
-        ),
-    )
+    factors = {"thrust_factor_n_s2": THRUST_FACTOR, "drag_factor_n_m_s2": drag_factor}
+    rotors = tuple(RotorSettings(position_m=(*hub, 0.0), spin=yaw * spin, **factors) for hub, spin in HUBS)
+    return VehicleSettings(mass_kg=MASS, inertia_kg_m2=INERTIA, rotor_speed_max_rad_s=3500.0, rotors=rotors)
 
 
 STATED = _vehicle(STATED_DRAG_FACTOR, -1)
@@ -71,7 +60,7 @@ VEHICLE = _vehicle(DRAG_FACTOR, 1)
 
 _POLE_PAIRS = 6.0
 _JUMP, _LARGEST = 1e5, 3e5
-_MOTORS = ("m1", "m2", "m3", "m4")
+_MOTORS, _SPIKY = ("m1", "m2", "m3", "m4"), ("erpm", "thrust")
 _STATE = ("x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "qx", "qy", "qz", "qw")
 _SMALL = 1e-6
 PREPARED_SPEED = tuple(f"{motor}_rads" for motor in _MOTORS)
@@ -79,29 +68,17 @@ NUMBERS = ("double", "float", "int64", "int32")
 
 
 def flights(folder: Path, names: Iterable[str]) -> list[PlaybackFlight]:
-    """Read and prepare flights of the benchmark.
-
-    Parameters
-    ----------
-    folder : Path
-        The repository, or a folder with the raw and the simulated files.
-    names : iterable of str
-        See `TRAINING` and `TEST`.
-
-    Raises
-    ------
-    InputError
-        If a file is not there.
-    """
+    """Read flights that are published prepared, or prepare them; see `TRAINING` and `TEST`."""
     return [flight(folder, name) for name in names]
 
 
 def flight(folder: Path, name: str) -> PlaybackFlight:
-    """Read a flight that is published prepared, or prepare it."""
+    """Read one flight of the repository, or of a folder with all its files."""
     ready = _path(folder, WHERE_PREPARED, f"{name}.csv")
     if ready is not None:
         return published(name, ready)
-    return prepared(name, columns(folder, name), columns(folder, _plan(name)))
+    kind, day, _ = name.split("_")
+    return prepared(name, columns(folder, name), columns(folder, f"{PLANS.get(kind, kind)}_{day}"))
 
 
 def columns(folder: Path, name: str) -> dict[str, Array]:
@@ -129,22 +106,8 @@ def _path(folder: Path, inside: Iterable[str], name: str) -> Path | None:
     return next((path for place in inside if (path := folder / place / name).is_file()), None)
 
 
-def _plan(name: str) -> str:
-    kind, day, _ = name.split("_")
-    return f"{PLANS.get(kind, kind)}_{day}"
-
-
 def prepared(name: str, raw: Mapping[str, Array], planned: Mapping[str, Array]) -> PlaybackFlight:
-    """Make a flight of raw columns: spikes removed, clocks aligned, cut, offsets removed, filtered.
-
-    Parameters
-    ----------
-    name : str
-    raw : mapping of str to array
-        Columns of the flight.
-    planned : mapping of str to array
-        Columns of its simulated path.
-    """
+    """Make a flight of raw columns and of its simulated path: no spikes, clocks aligned, cut, no offsets, filtered."""
     logged = {column: backfilled(values) for column, values in raw.items()}
     speed = rotor_speed(logged)
     speed = shifted(speed, lag_of(_thrust_felt(logged), (speed**2).sum(axis=1)))
@@ -174,20 +137,12 @@ def _flight(
 
 
 def rotor_speed(logged: Mapping[str, Array]) -> Array:
-    """Convert electric revolutions per minute to rad/s, with samples beside a spike taken from the next.
-
-    Returns
-    -------
-    array, shape (time, 4), rad/s
-    """
+    """Convert electric revolutions per minute to rad/s, with samples beside a spike taken from the next, (time, 4)."""
     spikes = np.zeros(len(logged["m1_erpm"]), dtype=bool)
-    for column in (
-        f"{motor}_{kind}" for motor in _MOTORS for kind in ("erpm", "thrust") if f"{motor}_{kind}" in logged
-    ):
-        jumps = np.flatnonzero(np.abs(np.diff(logged[column])) > _JUMP)
-        around = (jumps[:, None] + [-1, 0, 1]).ravel()
+    for values in (logged[name] for motor in _MOTORS for kind in _SPIKY if (name := f"{motor}_{kind}") in logged):
+        around = (np.flatnonzero(np.abs(np.diff(values)) > _JUMP)[:, None] + [-1, 0, 1]).ravel()
         spikes[around[around >= 0]] = True
-        spikes |= np.abs(logged[column]) > _LARGEST
+        spikes |= np.abs(values) > _LARGEST
     electric = np.stack([logged[f"{motor}_erpm"] for motor in _MOTORS], axis=1)
     electric[spikes] = np.nan
     return forward_filled(backfilled(electric)) * 2 * np.pi / (_POLE_PAIRS * 60)

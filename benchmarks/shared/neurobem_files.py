@@ -23,19 +23,12 @@ THRUST_FACTOR, TORQUE_OVER_THRUST = 1.5625e-6, 0.022
 # The files do not say which rotor is which. In a regression of torque on the squared speeds, torque of the motion and
 # of BEM+NN alike, each column pulls about roll and pitch like a rotor in one of the corners, and about yaw like these.
 HUBS = (((-0.075, -0.1), -1), ((0.075, -0.1), 1), ((-0.075, 0.1), 1), ((0.075, 0.1), -1))
+_FACTORS = {"thrust_factor_n_s2": THRUST_FACTOR, "drag_factor_n_m_s2": TORQUE_OVER_THRUST * THRUST_FACTOR}
 VEHICLE = VehicleSettings(
     mass_kg=MASS,
     inertia_kg_m2=INERTIA,
     rotor_speed_max_rad_s=4000.0,
-    rotors=tuple(
-        RotorSettings(
-            position_m=(*hub, 0.0),
-            spin=spin,
-            thrust_factor_n_s2=THRUST_FACTOR,
-            drag_factor_n_m_s2=TORQUE_OVER_THRUST * THRUST_FACTOR,
-        )
-        for hub, spin in HUBS
-    ),
+    rotors=tuple(RotorSettings(position_m=(*hub, 0.0), spin=spin, **_FACTORS) for hub, spin in HUBS),
 )
 NAMES = {
     "20210218170320seg2": "Figure_8_1",
@@ -55,15 +48,9 @@ _FORCE, _TORQUE = slice(29, 32), slice(32, 35)
 
 @dataclass(frozen=True)
 class Segment:
-    """A segment, and what is known of its wrench.
+    """A segment; what its motion takes by the stated mass and inertia, without weight, and what BEM+NN gives.
 
-    Attributes
-    ----------
-    flight : PlaybackFlight
-    wrench : array, shape (time, 6), N m and N, body frame
-        Torque and force that its motion takes, by the stated mass and inertia; without weight.
-    hybrid : array, shape (time, 6), N m and N, body frame
-        Torque and force of BEM+NN, which is given the measured state at every sample.
+    Torque and force, shape (time, 6), N m and N, body frame. BEM+NN is given the measured state at every sample.
     """
 
     flight: PlaybackFlight
@@ -72,13 +59,7 @@ class Segment:
 
 
 def segments(folder: Path) -> list[Segment]:
-    """Find and read the six segments in a folder and the folders below it, in order of their time.
-
-    Raises
-    ------
-    InputError
-        If one is not there, or does not hold the columns.
-    """
+    """Find and read the six segments in a folder and the folders below it, in order of their time."""
     found = {path.stem.removeprefix("bemnn"): path for path in folder.rglob("bemnn*.mat")}
     missing = [f"bemnn{key}.mat" for key in NAMES if key not in found]
     if missing:
@@ -107,13 +88,7 @@ def segment(path: Path, name: str) -> Segment:
     inertia = np.array(INERTIA)
     torque = inertia * table[:, _ACCELERATION] + np.cross(rate, inertia * rate)
     return Segment(
-        PlaybackFlight(
-            name=name,
-            motion=motion,
-            speed=speed,
-            hold="linear",
-            stretches=(slice(0, len(speed)),),
-        ),
+        PlaybackFlight(name=name, motion=motion, speed=speed, hold="linear", stretches=(slice(0, len(speed)),)),
         np.hstack([torque, MASS * table[:, _SPECIFIC_FORCE]]),
         np.hstack([table[:, _TORQUE], table[:, _FORCE]]),
     )

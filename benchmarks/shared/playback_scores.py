@@ -23,14 +23,9 @@ SYMBOLS = dict(zip(SIGNALS, ("p", "v", "R", "ω"), strict=True))
 
 
 class Score(NamedTuple):
-    """What free runs miss.
+    """Means of the norms of errors of free runs, how many runs there are, and how many diverged.
 
-    Attributes
-    ----------
-    mae : array, shape (horizon, 4), m, m/s, rad, rad/s
-        Means of the norms of the errors; of position, velocity, attitude (geodesic), body rate.
-    windows, diverged : int
-        Runs, and those that were stopped because they left every flight behind.
+    Shape (horizon, 4), m, m/s, rad, rad/s: of position, velocity, attitude (geodesic), body rate.
     """
 
     mae: Array
@@ -44,13 +39,9 @@ class Score(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """Free runs along one flight.
+    """Predicted less measured position, velocity, rotation vector and rate along one flight, and how many diverged.
 
-    Attributes
-    ----------
-    errors : array, shape (run, horizon, 4, 3)
-        Predicted less measured position, velocity, rotation vector (body frame of the measured attitude), rate.
-    diverged : int
+    Shape (run, horizon, 4, 3); the rotation vector in the body frame of the measured attitude.
     """
 
     errors: Array
@@ -93,14 +84,12 @@ def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horiz
 
 def nothing_moves(flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
     """Let all stay as it is at the start: position, velocity, attitude, rate."""
-    starts = flight.starts(horizon, every)
-    return Runs(_less_measured(flight, starts, horizon, np.zeros(3), np.zeros(3)))
+    return Runs(_less_measured(flight, flight.starts(horizon, every), horizon, np.zeros(3), np.zeros(3)))
 
 
 def rate_stays(flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
     """Let rate and velocity stay, so that the body goes on turning and moving."""
-    starts = flight.starts(horizon, every)
-    motion = flight.motion
+    starts, motion = flight.starts(horizon, every), flight.motion
     return Runs(_less_measured(flight, starts, horizon, motion.velocity[starts], motion.rate[starts]))
 
 
@@ -123,12 +112,6 @@ def as_published(flights: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> lis
 
     It lays the windows of all flights end to end before it looks for the sample h steps later, so that the last windows
     of a flight meet the beginning of the next; of the last flight they meet nothing and are left out (NaN).
-
-    Parameters
-    ----------
-    flights : sequence of PlaybackFlight
-    runs : sequence of Runs
-        From every sample of each flight.
     """
     held = [Runs(run.errors.copy(), run.diverged) for run in runs]
     for index, run in enumerate(held):

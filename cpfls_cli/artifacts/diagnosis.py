@@ -16,7 +16,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
 from cpfls_cli.gap.naming.results import Conclusion, GapSize
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
-from cpfls_cli.gap.residual.repeated import ComesAgain
+from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.inertia import six_parameters
@@ -51,10 +51,10 @@ class Diagnosis(Conclusion):
     """Which physical effect a model misses, judged on flights that the fit did not see."""
 
     FORMAT: ClassVar = "cpfls/diagnosis"
-    SHOWN: ClassVar = ("where", "gap_before", "gap_after", "comes_again", "disturbance", "parameters")
+    SHOWN: ClassVar = ("where", "gap_before", "gap_after", "repeatability", "disturbance", "parameters")
 
-    again_before: ComesAgain | None = part(None, brief=False)
-    again_after: ComesAgain | None = part(None, brief=False)
+    repeatability_before: Repeatability | None = part(None, brief=False)
+    repeatability_after: Repeatability | None = part(None, brief=False)
     air: FoundGusts | None = part(None, brief=False)
     playback: PlaybackChange | None = part(None)
     worst: tuple[GapStretch, ...] = part((), brief=False)
@@ -88,9 +88,9 @@ class Diagnosis(Conclusion):
         air = diagnosed.air
         return cls(
             **vars(diagnosed.diagnosis),
-            again_before=change.again_before,
-            again_after=change.again_after,
-            air=None if air is None else replace(air.found, alone=air.told),
+            repeatability_before=change.repeatability_before,
+            repeatability_after=change.repeatability_after,
+            air=None if air is None else replace(air.found, alone=air.gusts_only),
             playback=change.playback,
             worst=change.stretches,
             residual=change.residual,
@@ -150,11 +150,11 @@ class Diagnosis(Conclusion):
         return GapSize(self.gap.after, self.gap.after_floors).as_summary
 
     @property
-    def comes_again(self) -> dict[str, ComesAgain] | None:
-        """What of the gap comes again, before and after; None where no flight repeats another."""
-        if self.again_before is None or self.again_after is None:
+    def repeatability(self) -> dict[str, Repeatability] | None:
+        """The repeatable part of the gap, before and after; None where no flight repeats another."""
+        if self.repeatability_before is None or self.repeatability_after is None:
             return None
-        return {"before": self.again_before, "after": self.again_after}
+        return {"before": self.repeatability_before, "after": self.repeatability_after}
 
     @property
     def disturbance(self) -> dict[str, Any] | None:
@@ -196,12 +196,12 @@ class Diagnosis(Conclusion):
 
     @property
     def gusts(self) -> tuple[GustAxis, ...]:
-        """Gusts that are all that is left of the flights, by axis; none where nothing tells."""
+        """Gusts that are all of the residual, by axis; none where they are not identified."""
         return self._gusts(alone=True)
 
     @property
-    def gusts_beside(self) -> tuple[GustAxis, ...]:
-        """Gusts beside which something else is left, by axis; none where nothing tells."""
+    def partial_gusts(self) -> tuple[GustAxis, ...]:
+        """Gusts that are a part of the residual, by axis; none where they are not identified."""
         return self._gusts(alone=False)
 
     def _gusts(self, *, alone: bool) -> tuple[GustAxis, ...]:
@@ -212,9 +212,9 @@ class Diagnosis(Conclusion):
 
     @property
     def only_gusts(self) -> bool:
-        """Whether a gap is left of which it is known that it does not come again."""
+        """Whether a gap remains that is known not to be repeatable."""
         left = (self.gap.after_floors > CLEAR).any() and not self.contradictions
-        return bool(left) and self.again_after is not None and self.again_after.nothing
+        return bool(left) and self.repeatability_after is not None and self.repeatability_after.nothing
 
     @property
     def numbers_take_off(self) -> bool:

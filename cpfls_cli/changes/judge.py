@@ -1,4 +1,4 @@
-"""Whether flights of today are those of an unchanged vehicle, and which change they tell of."""
+"""Whether flights of today are those of an unchanged vehicle, and which change they show."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.changes.causes import Cause, causes
-from cpfls_cli.changes.numbers import FlightNumbers, unit_of
+from cpfls_cli.changes.numbers import KINDS, FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
     FALSE_ALARM,
@@ -29,32 +29,20 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.result import Estimate
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-NAMED = 0.95
-"""Share of the belief from which on a change is named; below, it is one of several that look alike."""
-
-LISTED = 0.03
-"""Share of the belief from which on a change is told to look alike."""
-
-_MOST = 3
-"""Changes at once."""
-
-_LOSES = 0.95
-"""Probability that what is damaged pulls less, and not more."""
-
-_NEARER = 0.5
-"""Share of the usual ratio below which one is likelier nothing, whatever its error is."""
-
-_ANY = 10.0
-"""Times what is usual: a prior so wide says nothing of a size."""
-
+NAMED = 0.95  # Share of the belief from which on a change is named; below, it is one of several that look alike.
+LISTED = 0.03  # Share of the belief from which on a change is said to look alike.
+_MOST = 3  # Changes at once.
+_LOSES = 0.95  # Probability that what is damaged pulls less, and not more.
+_NEARER = 0.5  # Share of the usual ratio below which one is likelier nothing, whatever its error is.
+_ANY = 10.0  # Times what is usual: a prior so wide says nothing of a size.
 _WIDTHS = ((1.0, 0.9), (_ANY, 0.1))
 """Times what is usual, and how probable a size is drawn so wide. With the usual width alone a change would count the
 less the larger it is, for large numbers of an unchanged vehicle, a t, are rare by a power of their size alone."""
 
 _DRAWS, _POWER = 2000, 0.9
 _SHOWN, _SIZES = 100, np.geomspace(0.05, 3.0, 28)
-"""Draws and sizes, in what is usual of a change, that tell which one shows: neighbours differ by a sixth. One of which
-three times what is usual does not show cannot be told."""
+"""Draws and sizes, in what is usual of a change, for the smallest that shows: neighbours differ by a sixth. One of
+which three times what is usual does not show is not found."""
 
 _IN_COMMON = 0.8
 """Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
@@ -63,28 +51,19 @@ starts find as much by chance, or less."""
 _NODES, _MOST_NODES = 8, 256
 """Of the scatter of one kind, and at most so many of kinds that go together: densities within 3 %."""
 
-_FARTHEST = 20.0
-"""Deviations up to which they tell how improbable numbers are."""
-
+_FARTHEST = 20.0  # Deviations up to which densities are right.
 _NONE = np.arange(0)
 _HALF_WIDTH = 1.96
 
 
 class Judged(NamedTuple):
-    """What flights say against a reference, as `Changed`, with their numbers as arrays.
+    """What flights say against a reference, as `Changed`, with their numbers as arrays."""
 
-    Attributes
-    ----------
-    apart : array, shape (flight, number)
-        Numbers of each of today's flights less those of the reference, loads at its voltage.
-    deviation : array, shape (number,)
-    limit : array, shape (number,)
-        In deviations.
-    """
-
+    # Shape (flight, number): numbers of each of today's flights less those of the reference, shares of thrust at its
+    # voltage.
     apart: Array
-    deviation: Array
-    limit: Array
+    deviation: Array  # Shape (number,).
+    limit: Array  # Shape (number,): in deviations.
     p: float
     by_flight: Array
     since: int
@@ -93,33 +72,22 @@ class Judged(NamedTuple):
 
 
 def changed(
-    today: Sequence[FlightNumbers],
-    before: Sequence[FlightNumbers],
-    vehicle: VehicleSettings,
-    rng: np.random.Generator,
+    today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], vehicle: VehicleSettings, rng: np.random.Generator
 ) -> Changed:
     """Hold flights of today against reference flights.
 
-    Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
+    Each change that is possible is a normal distribution of its sizes against that of unchanged flights, a multivariate
     t; its evidence is the ratio of both densities. It may be there from any flight of today on. The largest evidence
-    counts, against the largest that unchanged flights have, searched alike. Beside that each number is held against its
+    counts, against the largest that unchanged flights have, searched alike. Besides, each number is held against its
     own limit, whatever is known to change it. The only threshold is the rate of false alarms, half of it for each test.
 
-    Parameters
-    ----------
-    today, before : sequence of FlightNumbers
-        At least one each; today's of one day.
-
-    Raises
-    ------
-    InputError
-        If the flights have no number in common.
+    `today`, `before`: at least one each; today's of one day. Raises InputError if the flights have no number in common.
     """
     names = common_numbers([*before, *today])
     if not names:
-        raise InputError("flights of today and of the reference tell no number in common; import the same signals")
+        raise InputError("flights of today and of the reference have no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
-        names = tuple(name for name in names if not name.startswith("load "))
+        names = tuple(name for name in names if not name.startswith("thrust "))
     reference = Reference.of(before, names, vehicle)
     own = judged(today, reference, vehicle, rng, range(len(today)))
     lost = [name for name in common_numbers(before) if not all(name in flight.values for flight in today)]
@@ -154,19 +122,19 @@ def changed(
 
 
 def _in_common(reference: Reference, today: Sequence[FlightNumbers]) -> tuple[float, float]:
-    """Compute what the loads of all rotors have in common today, less the reference, and its standard deviation."""
-    loads = np.array([name.startswith("load ") for name in reference.names])
-    if not loads.any():
+    """Compute the mean share of thrust today less that of the reference, logarithm, and its standard deviation."""
+    shares = np.array([name.startswith("thrust ") for name in reference.names])
+    if not shares.any():
         return np.nan, np.nan
     apart, covariance = reference.apart(today)
-    mean = loads / loads.sum()
+    mean = shares / shares.sum()
     return float((apart @ mean).mean()), float(np.sqrt(mean @ covariance @ mean))
 
 
 def _likelier_nothing(name: str, flight: FlightNumbers, before: Sequence[FlightNumbers]) -> bool:
-    """Tell whether a ratio that may be zero is nearer to that than to what it is in the reference.
+    """Check whether a ratio that may be zero is nearer to that than to what it is in the reference.
 
-    One that is only told badly, as in a quiet hover, agrees with the reference as well as with zero.
+    One that is badly identified, as in a quiet hover, agrees with the reference as well as with zero.
     """
     usual = float(np.mean([own.values[name] for own in before]))
     # The scale of a gyroscope is the inverse of the ratio that is fitted.
@@ -183,10 +151,8 @@ def judged(
 ) -> Judged:
     """Hold flights of today against a reference, as `changed`.
 
-    Parameters
-    ----------
-    starts : sequence of int
-        Flights from which on it may be changed, up to the last: the most telling one counts, as it does in chance.
+    `starts`: flights from which on it may be changed, up to the last: the clearest one counts, as it does in
+    chance.
     """
     names = reference.names
     apart, covariance = reference.apart(today)
@@ -195,9 +161,9 @@ def judged(
 
     def held(flights: Sequence[FlightNumbers], asked: int) -> _Held:
         """Hold flights against what they, and no others of today, can be off by."""
-        beside, own = reference.apart(flights)
+        rows, own = reference.apart(flights)
         space = _Space(own, reference.freedom, listed, kinds)
-        mean = space.whitened(beside.mean(axis=0))
+        mean = space.whitened(rows.mean(axis=0))
         return _Held(
             space,
             mean,
@@ -241,7 +207,7 @@ def drawn_by_chance(
 
     Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
     """
-    _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+    _, first, kind = np.unique([list(KINDS).index(each) for each in kinds], return_index=True, return_inverse=True)
     scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (draws, len(first))))[:, kind]
     day, own = rng.normal(size=(2, draws, len(kind)))
     means, total, flights = [], np.zeros_like(own), 0
@@ -254,7 +220,7 @@ def drawn_by_chance(
 
 
 def beyond_chance(chance: Array, value: float) -> float:
-    """Tell how probable a value of at least this size is, held against draws of chance."""
+    """Compute how probable a value of at least this size is, held against draws of chance."""
     return float((1 + (chance >= value).sum()) / (1 + len(chance)))
 
 
@@ -288,46 +254,40 @@ class _Space:
         """Compute the logarithm of the largest evidence of a change, shape (row,)."""
         return np.asarray((self.evidence(rows, self.searched) + self.searched_prior[:, None]).max(axis=0))
 
-    def evidence(self, rows: Array, of: Sequence[int], beside: Array | None = None) -> Array:
+    def evidence(self, rows: Array, of: Sequence[int], given: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of changes, without what was believed before, shape (cause, row).
 
-        Parameters
-        ----------
-        rows : array, shape (number, row)
-            Whitened.
-        beside : array, shape (number, size), or None
-            Whitened directions of changes that are there anyway.
+        `rows`, shape (number, row): whitened.
+        `given`, shape (number, size): whitened directions of changes that are there anyway.
         """
-        base = rows[:, :0] if beside is None else beside
-        told: dict[tuple[bytes, ...], Array] = {}
+        base = rows[:, :0] if given is None else given
+        known: dict[tuple[bytes, ...], Array] = {}
 
         def density(own: Array, losses: int) -> Array:
-            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), told)
+            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), known)
 
         widths = np.log([[share] for _, share in _WIDTHS])
         each = [
             _total(widths + [density(width * self.white[index], self.listed[index].losses) for width, _ in _WIDTHS])
             for index in of
         ]
-        return np.array(each) - self._density(rows, base, _NONE, told)
+        return np.array(each) - self._density(rows, base, _NONE, known)
 
-    def _density(self, rows: Array, directions: Array, losses: IntArray, told: dict[tuple[bytes, ...], Array]) -> Array:
+    def _density(
+        self, rows: Array, directions: Array, losses: IntArray, known: dict[tuple[bytes, ...], Array]
+    ) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
-        Parameters
-        ----------
-        losses : array, shape (loss,)
-            Directions whose sizes are nearly always above 0.
-        told : dict
-            Densities of parts, which changes have in common; what is not there is added.
+        `losses`, shape (loss,): directions whose sizes are nearly always above 0.
+        `known`: densities of parts, which changes have in common; what is not there is added.
         """
         total = np.zeros(rows.shape[1])
         for kinds, columns in self._parts(directions):
             own, lost = directions[:, columns], np.flatnonzero(np.isin(columns, losses, assume_unique=True))
             key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
-            if key not in told:
-                told[key] = _total(self._posterior(rows, own, kinds, lost)[0])
-            total += told[key]
+            if key not in known:
+                known[key] = _total(self._posterior(rows, own, kinds, lost)[0])
+            total += known[key]
         return total
 
     def _parts(self, directions: Array) -> list[tuple[list[IntArray], IntArray]]:
@@ -349,23 +309,16 @@ class _Space:
     def _posterior(
         self, rows: Array, directions: Array, kinds: Sequence[IntArray], losses: IntArray
     ) -> tuple[Array, Array, Array]:
-        """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
+        """Integrate over sizes, at nodes of how far each kind scatters relative to what was learned.
 
-        Each kind is a multivariate t of its own: that the others scatter little tells nothing of it.
+        Each kind is a multivariate t of its own: it is independent of how the others scatter.
 
-        Parameters
-        ----------
-        rows : array, shape (number, row)
-            Whitened.
-        losses : array, shape (loss,)
-            Directions whose sizes are nearly always above 0.
-
-        Returns
-        -------
-        logarithm : array, shape (node, row)
-            Of the density, with the weight of the node, but for what all have in common.
-        mean : array, shape (node, size, row)
-        covariance : array, shape (node, size, size)
+        `rows`, shape (number, row): whitened.
+        `losses`, shape (loss,): directions whose sizes are nearly always above 0.
+        Result `logarithm`, shape (node, row): of the density, with the weight of the node, but for what all have in
+        common.
+        Result `mean`: shape (node, size, row).
+        Result `covariance`: shape (node, size, size).
         """
         scales, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
         precision = np.eye(directions.shape[1]) + np.tensordot(
@@ -384,17 +337,17 @@ class _Space:
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Estimate, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
 
-        What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
+        Any reported size counts as as likely; a prior of what is usual would draw large ones in.
         """
         first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
-        told = np.arange(first, first + self.listed[of].told)
+        own = np.arange(first, first + self.listed[of].reported)
         directions = np.hstack([self.white[index] for index in chosen])
-        directions[:, told] *= _ANY
-        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(told, columns).any()]
+        directions[:, own] *= _ANY
+        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(own, columns).any()]
         logarithm, means, covariance = self._posterior(row[:, None], directions, list(chain(*moved)), _NONE)
         share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
-        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
+        means, variances = means[:, own, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, own]
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
@@ -411,34 +364,24 @@ class _Space:
 
         def is_enough(size: float) -> bool:
             rows = drawn + size * self.white[index][:, :1]
-            told = self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold
+            clear = self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold
             beyond = (np.abs(self.deviations(rows)) > limit[:, None]).any(axis=0)
-            return bool(np.mean(told | beyond) >= _POWER)
+            return bool(np.mean(clear | beyond) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
 
 
 class _Held(NamedTuple):
-    """Flights that are held against what they can be off by.
-
-    Attributes
-    ----------
-    mean : array, shape (number,)
-        Whitened.
-    evidence : float
-        Logarithm of the largest evidence of a change.
-    furthest : float
-        At most how probable it is that any number is as far off.
-    """
+    """Flights that are held against what they can be off by."""
 
     space: _Space
-    mean: Array
-    evidence: float
-    furthest: float
+    mean: Array  # Shape (number,): whitened.
+    evidence: float  # Logarithm of the largest evidence of a change.
+    furthest: float  # At most how probable it is that any number is as far off.
 
     def p_value(self, chance: Array) -> float:
-        """Tell how probable it is that an unchanged vehicle looks as much changed, by either test."""
+        """Compute how probable it is that an unchanged vehicle looks as much changed, by either test."""
         return either(beyond_chance(chance, self.evidence), self.furthest)
 
 
@@ -469,13 +412,9 @@ def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
 def _losing(mean: Array, variance: Array) -> Array:
     """Compute the logarithm of what the sign of losses adds to a density, shape (scale, row).
 
-    Of two losses as if neither told of the other.
+    Of two losses as if they were independent.
 
-    Parameters
-    ----------
-    mean : array, shape (scale, loss, row)
-    variance : array, shape (scale, loss)
-        Of the size of each.
+    `mean`: shape (scale, loss, row); `variance`, shape (scale, loss): of the size of each.
     """
     from scipy.special import ndtr
 
@@ -484,7 +423,7 @@ def _losing(mean: Array, variance: Array) -> Array:
 
 
 def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]]:
-    """Name one change after another while each explains more than chance beside the others.
+    """Name one change after another while each is significant conditional on the others.
 
     Where something is off and no change by itself explains it, the first counts on credit: two at once hide each
     other.
@@ -492,7 +431,7 @@ def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]
     space, row, _, _ = held
     chosen: list[int] = []
     while len(chosen) < _MOST:
-        evidence = _beside(space, row, space.searched, chosen) + space.searched_prior
+        evidence = _evidence_given(space, row, space.searched, chosen) + space.searched_prior
         best = int(np.argmax(evidence))
         if chosen and beyond_chance(chance, float(evidence[best])) > EACH_TEST:
             break
@@ -538,8 +477,8 @@ def _by_name(space: _Space, beliefs: Array) -> dict[str, float]:
 
 
 def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
-    """Compute the belief in each change beside those that are there, shape (cause,)."""
-    evidence = _beside(space, row, range(len(space.listed)), there) + space.prior
+    """Compute the belief in each change given those that are there, shape (cause,)."""
+    evidence = _evidence_given(space, row, range(len(space.listed)), there) + space.prior
     share = np.exp(evidence - evidence.max())
     return np.asarray(share / share.sum())
 
@@ -547,9 +486,9 @@ def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
 def _since(space: _Space, apart: Array, found: Sequence[Cause], starts: Sequence[int]) -> int:
     """Find the flight before which flights are nearest to the reference, and from which on to each other.
 
-    Along what was found: what else flights of a day have in common tells nothing of it.
+    Along what was found: what else flights of a day have in common says nothing of it.
     """
-    along = np.hstack([space.whitened(cause.directions[:, : cause.told]) for cause in found])
+    along = np.hstack([space.whitened(cause.directions[:, : cause.reported]) for cause in found])
     shown = space.whitened(apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
 
     def apart_from(start: int) -> float:
@@ -559,11 +498,11 @@ def _since(space: _Space, apart: Array, found: Sequence[Cause], starts: Sequence
     return min(starts, key=apart_from)
 
 
-def _beside(space: _Space, row: Array, of: Sequence[int], there: Sequence[int]) -> Array:
-    """Compute the logarithm of the evidence of changes beside those that are there, shape (cause,)."""
-    beside = np.hstack([space.white[index] for index in there]) if there else None
+def _evidence_given(space: _Space, row: Array, of: Sequence[int], there: Sequence[int]) -> Array:
+    """Compute the logarithm of the evidence of changes given those that are there, shape (cause,)."""
+    given = np.hstack([space.white[index] for index in there]) if there else None
     names = {space.listed[index].name for index in there}
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
     causes_of = [space.listed[index] for index in of]
     known = [cause.name in names or bool(cause.rotors & rotors) for cause in causes_of]
-    return np.where(known, -np.inf, space.evidence(row[:, None], of, beside)[:, 0])
+    return np.where(known, -np.inf, space.evidence(row[:, None], of, given)[:, 0])

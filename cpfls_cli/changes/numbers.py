@@ -1,6 +1,4 @@
-"""What one flight tells of its vehicle in numbers that another flight of the same vehicle tells alike."""
-
-from __future__ import annotations
+"""Numbers of one flight that are alike in another flight of the same vehicle."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,105 +23,72 @@ _LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.nam
 _SHAPES = {shape.name: shape for shape in _LOAD.shapes}
 _CABLES = _SHAPES["length_m"].grid
 _MASS = [each.name for each in _LOAD.coefficients].index("mass")
-(_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried
-"""Of a load on a cable: lengths that are tried, m, and a damping, 1/s."""
+(_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried  # Of a load on a cable: lengths that are tried, m, and a damping, 1/s.
 
 _AXES, _ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of numbers.
+    """One kind of numbers."""
 
-    Attributes
-    ----------
-    unit : str
-        Of a number; 1 for logarithms of ratios.
-    apart, together : float
-        Standard deviations from day to day of a vehicle that nobody changed: of each number by itself, and of all
-        numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
-    agile : float
-        By how much numbers differ in flights that are flown e times as agile: standard deviation, half of its variance
-        in common.
-    """
-
-    unit: str
+    unit: str  # Of a number; 1 for logarithms of ratios.
+    # `apart`, `together`: Standard deviations from day to day of a vehicle that nobody changed: of each number by
+    # itself, and of all numbers of the kind alike. What is usual where reference flights are too few.
     apart: float
     together: float
+    # By how much numbers differ in flights that are flown e times as agile: standard deviation, half of its variance in
+    # common.
     agile: float
 
 
 KINDS: dict[str, Kind] = {
-    # Thrust that a rotor is asked for over its share of the weight, logarithm.
-    "load": Kind("1", 0.02, 0.02, 0.01),
-    # Squared speed of a rotor over what it is commanded, logarithm.
-    "turn": Kind("1", 0.02, 0.02, 0.01),
-    # Time by which a rotor's speed follows its command.
-    "answer": Kind("s", 0.002, 0.002, 0.001),
-    # Root mean square above 20 Hz, logarithm.
-    "vibration": Kind("1", 0.1, 0.25, 0.3),
-    # Acceleration that turns with a rotor, amplitude, logarithm.
-    "unbalance": Kind("1", 0.3, 0.2, 0.2),
-    # Angular acceleration over that of the rotors' torque, logarithm.
-    "follow": Kind("1", 0.1, 0.1, 1.0),
-    # Time by which the body's rotation follows the rotors.
-    "late": Kind("s", 0.002, 0.003, 0.03),
-    # Angular acceleration that the rotors do not explain, root mean square, logarithm.
-    "gusts": Kind("1", 0.2, 0.6, 0.6),
-    # Mean horizontal thrust over mass, world axes.
-    "lean": Kind("m/s^2", 0.3, 0.0, 0.1),
-    # Mean of the accelerometer, along z less gravity.
-    "felt": Kind("m/s^2", 0.05, 0.0, 0.05),
-    # Mean rate of the gyroscope beside the attitude's.
-    "drift": Kind("rad/s", 0.01, 0.0, 0.005),
-    # Mass that swings on a cable over that of the vehicle.
-    "swing": Kind("1", 0.02, 0.0, 0.02),
-    # Voltage that flight draws from the battery, share of a full one.
-    "battery": Kind("1", 0.02, 0.0, 0.01),
-    # Rate of the gyroscope over that of the attitude, logarithm.
-    "scale": Kind("1", 0.01, 0.01, 0.02),
+    "lag": Kind("s", 0.002, 0.002, 0.001),  # Of a rotor's speed behind its command.
+    "battery": Kind("1", 0.02, 0.0, 0.01),  # Voltage that flight draws, share of a full one.
+    "drift": Kind("rad/s", 0.01, 0.0, 0.005),  # Mean rate of the gyroscope less the attitude's.
+    "felt": Kind("m/s^2", 0.05, 0.0, 0.05),  # Mean of the accelerometer, along z less gravity.
+    "gain": Kind("1", 0.1, 0.1, 1.0),  # Angular acceleration over that of the rotors' torque, logarithm.
+    "gusts": Kind("1", 0.2, 0.6, 0.6),  # Angular acceleration that rotors do not explain, RMS, logarithm.
+    "delay": Kind("s", 0.002, 0.003, 0.03),  # Of the body's rotation behind the rotors.
+    "lean": Kind("m/s^2", 0.3, 0.0, 0.1),  # Mean horizontal thrust over mass, world axes.
+    "thrust": Kind("1", 0.02, 0.02, 0.01),  # Of a rotor over its share of the weight, logarithm.
+    "scale": Kind("1", 0.01, 0.01, 0.02),  # Rate of the gyroscope over that of the attitude, logarithm.
+    "swing": Kind("1", 0.02, 0.0, 0.02),  # Mass on a cable over that of the vehicle.
+    "turn": Kind("1", 0.02, 0.02, 0.01),  # Squared speed of a rotor over its command, logarithm.
+    "unbalance": Kind("1", 0.3, 0.2, 0.2),  # Acceleration that turns with a rotor, amplitude, logarithm.
+    "vibration": Kind("1", 0.1, 0.25, 0.3),  # Root mean square above 20 Hz, logarithm.
 }
-"""Of each number the first word of its name."""
+"""By the first word of a number's name; chance is drawn in this order."""
 
-_SHORTEST_S = 4.0
-"""Of flight, below which it tells nothing."""
-
-_BLOCKS = 8
-"""That errors are told by."""
-
+_SHORTEST_S = 4.0  # Of flight, below which it has no numbers.
+_BLOCKS = 8  # Of a flight, for errors.
 _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
 
 _TURNS_S, _ALIKE = 1.0, 0.03
-"""Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are told apart. Of those that turn more alike
+"""Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are separated. Of those that turn more alike
 each has its share, by the squared size below which a difference of theirs counts as none."""
 
 _WINDOW_S, _SWING_S = 0.12, 0.4
 """Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
 answers gusts, and only above it does torque drive the body."""
 
-_LATEST_S = 0.12
-"""Of rotors and autopilot."""
-
+_LATEST_S = 0.12  # Of rotors and autopilot.
 _STEP_S = 0.002
 _DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
-
-_CLEARLY = 3.0
-"""Standard errors beyond which a ratio is said to be below 0."""
-
+_CLEARLY = 3.0  # Standard errors beyond which a ratio is said to be below 0.
 _ABOVE = 1.96
 """Standard errors by which a ratio is above 0 that has a logarithm: of exchanged rotors hardly any is left."""
 
-_COLLINEAR = 1e-9
-"""Squared share of a signal of its own below which it goes with the others."""
+_COLLINEAR = 1e-9  # Squared share of a signal of its own below which it goes with the others.
 
 
 @result
 class NumberOfFlight:
     """A number of one flight."""
 
-    name: str = about("its kind, and the rotor, axis or sensor that it is of: load M3")
+    name: str = about("its kind, and the rotor, axis or sensor that it is of: thrust M3")
     unit: str = about("its unit; 1 of the logarithm of a ratio")
     value: float = about("in its unit")
     error: float = about("its standard error, over blocks of the flight, in its unit", least=0)
@@ -154,7 +119,7 @@ class FlightNumbers:
     name: str = about("of the flight")
     duration_s: float = about("time that it flies, away from take-off and landing", unit="s")
     voltage: float = about("mean of the battery in flight, V, or share of a full one where the log has that", gaps=True)
-    commanded: bool = about("whether loads are of commands, and not of speeds that were measured")
+    commanded: bool = about("whether shares of thrust are of commands, and not of speeds that were measured")
     cable_m: float = about(
         "length of the cable that fits best what swings, if anything does", unit="m", gaps=True, default=np.nan
     )
@@ -210,17 +175,9 @@ def unit_of(name: str) -> str:
 def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
     """Compute the numbers of a flight.
 
-    Parameters
-    ----------
-    full_voltage : float
-        What its voltage is a share of, V; 1 for shares.
-    has_gyroscope : bool
-        Whether the log holds body rates, though they never move.
-
-    Raises
-    ------
-    InputError
-        If the flight has no speeds or commands of single rotors, or flies for less than four seconds.
+    `full_voltage`: what its voltage is a share of, V; 1 for shares.
+    `has_gyroscope`: whether the log holds body rates, though they never move.
+    Raises InputError if the flight has no speeds or commands of single rotors, or flies for less than four seconds.
     """
     signals, name = recording.signals, recording.name
     if signals.rotor_speed is None:
@@ -235,14 +192,14 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyros
     if duration < _SHORTEST_S:
         raise InputError(
             f"{name}: flies for {duration:.2g} s of {len(signals) * signals.period:.3g} s, and {_SHORTEST_S:g} s are"
-            f" the least that tell anything{''.join(f'; {why}' for why in flown(signals).cut)}"
+            f" the least{''.join(f'; {why}' for why in flown(signals).cut)}"
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
     below, unsure = [], {}
     cable, swing = _swing(signals, flies)
-    for names, told, error, *ratios in (*_told(signals, flies, has_gyroscope), swing):
-        for index, (each, value, apart) in enumerate(zip(names, told, error, strict=True)):
+    for names, estimates, error, *ratios in (*_estimates(signals, flies, has_gyroscope), swing):
+        for index, (each, value, apart) in enumerate(zip(names, estimates, error, strict=True)):
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
             elif np.isinf(value):
@@ -275,7 +232,7 @@ def in_flight(signals: Signals) -> BoolArray:
 
 
 def _agility(signals: Signals, flies: BoolArray) -> float:
-    """Tell how a flight is flown: the acceleration beside its mean that its attitude and thrust ask for.
+    """Compute how agile a flight is: acceleration that attitude and thrust ask for, about its mean.
 
     Of windows, so that noise counts little.
     """
@@ -301,9 +258,9 @@ _Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array
 """Names, values, errors, and of logarithms that a flight may lack the ratios that they are of."""
 
 
-def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
+def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
     rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
-    yield _averaged([f"load {name}" for name in rotors], _loads(signals), flies, np.log)
+    yield _averaged([f"thrust {name}" for name in rotors], _thrust_shares(signals), flies, np.log)
     if signals.rotor_command is not None:
         # Squares, as thrust and drag are.
         both = np.stack([signals.speed**2, signals.rotor_command**2], axis=2)
@@ -311,7 +268,8 @@ def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_
             [f"turn {name}" for name in rotors], both, flies, lambda means: np.log(means[:, 0] / means[:, 1])
         )
         yield _answer(signals, flies, rotors)
-    turns, feels = has_gyroscope or bool(signals.body_rate.any()), _felt(signals)
+    turns, feels = has_gyroscope or bool(signals.body_rate.any()), signals.specific_force
+    feels = signals.acceleration if feels is None else feels
     across = _ACROSS_HZ if signals.specific_force is not None else _ABOVE_HZ
     for sensor, values, above in (
         ("gyroscope", signals.body_rate if turns else None, (_ABOVE_HZ,) * 3),
@@ -321,7 +279,7 @@ def _told(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_
             names = [f"vibration {sensor} {axis}" for axis in _AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
     if signals.specific_force is not None:
-        yield _averaged([f"felt {axis}" for axis in _AXES], _beside_gravity(signals), flies, lambda means: means)
+        yield _averaged([f"felt {axis}" for axis in _AXES], _less_gravity(signals), flies, lambda means: means)
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
@@ -343,7 +301,7 @@ def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[A
         return names, of(flown.mean(axis=0)), jackknife_error(left_out)
 
 
-def _loads(signals: Signals) -> Array:
+def _thrust_shares(signals: Signals) -> Array:
     """Give what each rotor is asked for over its share of what carries the vehicle, shape (time, rotor)."""
     vehicle = signals.vehicle
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
@@ -352,10 +310,6 @@ def _loads(signals: Signals) -> Array:
     if signals.attitude is not None:
         carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
     return np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
-
-
-def _felt(signals: Signals) -> Array | None:
-    return signals.acceleration if signals.specific_force is None else signals.specific_force
 
 
 def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None:
@@ -370,7 +324,7 @@ def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None
 
 
 def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
-    """Tell the amplitude of what turns with each rotor, m/s^2, whatever the log's rate makes of its frequency.
+    """Estimate the amplitude of what turns with each rotor, m/s^2, whatever the log's rate makes of its frequency.
 
     An unbalanced rotor pulls once a turn. Between samples it turns many times, but by its measured speed it is known
     where it stands at each sample (synchronous averaging).
@@ -394,7 +348,7 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
 
 
-def _beside_gravity(signals: Signals) -> Array:
+def _less_gravity(signals: Signals) -> Array:
     """Take gravity from what the accelerometer feels: on average a flight that ends where it began feels nothing else.
 
     With an attitude along axes that are level and turn with the heading, where no wind shows: it leans against it.
@@ -410,14 +364,14 @@ def _beside_gravity(signals: Signals) -> Array:
 
 
 def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
-    """Tell how late each rotor's speed follows its command, which no gust disturbs."""
+    """Estimate the lag of each rotor's speed behind its command, which no gust disturbs."""
     own, inside = _windows(signals, flies, _WINDOW_S)
     if inside.sum() < FEWEST_WINDOWS:
         return [], np.zeros(0), np.zeros(0)
     assert signals.rotor_command is not None, "asked for"
     found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
-    told = _STEP_S * found[:, 1]
-    return [f"answer {name}" for name in rotors], told[0], _delay_error(told[1:])
+    delays = _STEP_S * found[:, 1]
+    return [f"lag {name}" for name in rotors], delays[0], _delay_error(delays[1:])
 
 
 def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
@@ -428,7 +382,7 @@ def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windo
 
 
 def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
-    """Tell how rotation follows the rotors' torque: how much, how late, and what is left of it."""
+    """Estimate how rotation follows the rotors' torque: tracking gain, delay and residual."""
     own, inside = _windows(signals, flies, _WINDOW_S)
     if inside.sum() < FEWEST_WINDOWS:
         return
@@ -441,15 +395,17 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     moments = np.diag(inertia)
     with np.errstate(divide="ignore"):
         gusts = np.log(found[:, 2] / moments)
-    told = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
-    for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
+    estimates = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
+    for kind, values in zip(("gain", "delay", "gusts"), estimates.transpose(1, 0, 2), strict=True):
         with np.errstate(invalid="ignore"):
-            error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
+            error = _delay_error(values[1:]) if kind == "delay" else jackknife_error(values[1:])
         names = [f"{kind} {axis}" for axis in _ROTATIONS]
-        yield (names, values[0], error, found[0, 0]) if kind == "follow" else (names, values[0], error)
+        yield (names, values[0], error, found[0, 0]) if kind == "gain" else (names, values[0], error)
     if signals.attitude is not None:
         turns = _of_attitude(signals)
-        yield _drift(signals, turns, flies)
+        # Of the gyroscope in the middle of two samples, for the attitude turns from one to the other.
+        apart = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:]) - turns[1:]
+        yield _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
         yield _scale(signals, turns, flies)
 
 
@@ -487,20 +443,17 @@ def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, per
 
 
 def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
-    """Fit what follows to what drives it at each delay: gain, best delay in steps, what is left, shape (3, column).
+    """Fit what follows to what drives it at each delay: gain, best delay in steps, residual, shape (3, column).
 
     A delay at the end of what is tried is not known.
 
-    Beside what goes with the other columns, and with those that nothing follows: of a weak rotor thrust turns the body
-    too, and so does each torque about all axes.
+    Conditional on the other columns, and on those that nothing follows: of a weak rotor thrust turns the body too, and
+    so does each torque about all axes.
 
-    Parameters
-    ----------
-    count : int
-        Of windows.
-    sums : array, shape (delay, drive and column)
-    products : array, shape (delay, drive and column, drive and column)
-        Over them of what drives and of what follows, the last of them.
+    `count`: of windows.
+    `sums`: shape (delay, drive and column).
+    `products`, shape (delay, drive and column, drive and column): over them of what drives and of what follows, the
+    last of them.
     """
     products = products - sums[:, :, None] * sums[:, None, :] / count
     drives = products.shape[1] - columns
@@ -534,13 +487,6 @@ def _of_attitude(signals: Signals) -> Array:
     return np.concatenate([vector[:1], vector]) / signals.period
 
 
-def _drift(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
-    """Compare the gyroscope's rate with that of the attitude, which turns by the body rate."""
-    middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
-    apart = middle - turns[1:]
-    return _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
-
-
 def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
     """Fit the attitude's rate, which is noisier, to the gyroscope's: its scale, a logarithm.
 
@@ -562,8 +508,8 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     """Regress the horizontal force on the pull of a load that swings under the vehicle, on the cable that fits best.
 
-    Beside a constant force and a drag. What drives the swing is the vehicle's own motion, so a load shows by what comes
-    a period later. The length of the cable, m, comes with it.
+    Jointly with a constant force and a drag. What drives the swing is the vehicle's own motion, so a load shows by what
+    comes a period later. The length of the cable, m, comes with it.
     """
     # Slow to load, and who reads a record computes nothing.
     from scipy.optimize import minimize
@@ -573,7 +519,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
     assert signals.thrust is not None, "rotor speeds are there"
-    # Beside the vehicle's own mass, for a load's is a share of that.
+    # Over the vehicle's own mass, for a load's is a share of that.
     drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
@@ -595,11 +541,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     possible = [_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]
     bounds = [(float(np.log(low)), float(np.log(high))) for low, high in possible]
     found = minimize(
-        unexplained,
-        start,
-        method="Nelder-Mead",
-        bounds=bounds,
-        options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60},
+        unexplained, start, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60}
     )
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)
@@ -608,7 +550,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
 
 
 def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, float]:
-    """Fit a pull beside a constant and a drag along each axis: its size, and the squares that it explains."""
+    """Fit a pull jointly with a constant and a drag along each axis: its size, and the squares that it explains."""
     sides = []
     for axis in range(2):
         known = np.column_stack([np.ones(len(left)), drag[:, axis]])

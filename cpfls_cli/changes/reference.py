@@ -1,4 +1,4 @@
-"""What flights of an unchanged vehicle differ by among themselves: the floor that a change has to stand above."""
+"""What flights of an unchanged vehicle differ by among themselves: the floor that a change has to exceed."""
 
 from __future__ import annotations
 
@@ -12,77 +12,47 @@ from cpfls_cli.changes.numbers import KINDS, FlightNumbers
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-FEWEST = 3
-"""Reference flights that tell their scatter; of fewer, what is usual has to stand for it."""
-
-_DAYS = 6.0
-"""Reference flights that what is usual counts as."""
-
+FEWEST = 3  # Reference flights that identify their scatter; of fewer, what is usual replaces it.
+_DAYS = 6.0  # Reference flights that what is usual counts as.
 _SCALE_ERROR = 0.8
-"""By how much numbers of a kind scatter beside what is usual, from vehicle to vehicle: deviation of the logarithm, of
-loads, vibration and batteries of four."""
+"""By how much numbers of a kind scatter relative to what is usual, from vehicle to vehicle: deviation of the logarithm,
+of shares of thrust, vibration and batteries of four."""
 
 _FEWEST_LEFT = 4.0
-"""Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more: one kind of numbers in
+"""Degrees of freedom of what is usual of vehicles, where there is hardly any reference flight: one kind of numbers in
 a hundred then scatters by more than 3.7 times what is usual. Of four vehicles none did by more than one and a half."""
 
-FALSE_ALARM = 0.01
-"""Probability at which flights of an unchanged vehicle are said to have changed."""
-
+FALSE_ALARM = 0.01  # Probability at which flights of an unchanged vehicle are said to have changed.
 EACH_TEST = FALSE_ALARM / 2
 """The same of each of the two tests, of which either says so: of known changes, and of each number by itself."""
 
-_OFFSET_M = 0.001
-"""By which the centre of mass lies elsewhere from day to day: a battery put back."""
-
-_BY_VOLTAGE, _VOLTAGE_ERROR = {"load": -1.0, "turn": 1.0}, 1.0
-"""Power of the voltage that numbers of commands go with, and how far that is off, before any flight tells: none where
+_OFFSET_M = 0.001  # By which the centre of mass lies elsewhere from day to day: a battery put back.
+_BY_VOLTAGE, _VOLTAGE_ERROR = {"thrust": -1.0, "turn": 1.0}, 1.0
+"""Power of the voltage that numbers of commands go with, and how far that is off, before any flight: none where
 the autopilot makes up for the battery, the square where it does not."""
 
 
-_CALM = 1.0
-"""Acceleration below which flights are flown alike, m/s^2."""
+_CALM = 1.0  # Acceleration below which flights are flown alike, m/s^2.
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Numbers of reference flights: their mean and covariance.
+    """Numbers of reference flights: their mean and covariance."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Numbers that all flights tell, today's too.
-    mean : array, shape (number,)
-    covariance : array, shape (number, number)
-        Of the mean of flights of one other day beside that of the reference.
-    freedom : array, shape (number,)
-        Degrees of freedom of the covariance; of numbers of a kind the same.
-    measured : array, shape (number,)
-        Mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
-    by_voltage, voltage_error : array, shape (number,)
-        Power of the voltage that a number goes with, and its error, which all of a kind have in common; 0 where it goes
-        with none.
-    voltage : float
-        Of the mean; NaN where it does not count.
-    by_agility : array, shape (number,)
-        By how much a number goes with the logarithm of how agile a flight is flown.
-    agility_error : array, shape (number,)
-        Its standard error; 0 where it does not count.
-    agility : float
-        That logarithm of the mean; NaN where it does not count.
-    """
-
-    names: tuple[str, ...]
-    mean: Array
-    covariance: Array
-    freedom: Array
+    names: tuple[str, ...]  # Numbers that all flights have, today's too.
+    mean: Array  # Shape (number,).
+    covariance: Array  # Shape (number, number): of the mean of flights of one other day less that of the reference.
+    freedom: Array  # Shape (number,): degrees of freedom of the covariance; of numbers of a kind the same.
+    # Shape (number,): mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
     measured: Array
+    # `by_voltage`, `voltage_error`: shape (number,): power of the voltage that a number goes with, and its error, which
+    # all of a kind have in common; 0 where it goes with none.
     by_voltage: Array
     voltage_error: Array
-    voltage: float
-    by_agility: Array
-    agility_error: Array
-    agility: float
+    voltage: float  # Of the mean; NaN where it does not count.
+    by_agility: Array  # Shape (number,): by how much a number goes with the logarithm of how agile a flight is flown.
+    agility_error: Array  # Shape (number,): its standard error; 0 where it does not count.
+    agility: float  # That logarithm of the mean; NaN where it does not count.
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Reference:
@@ -91,16 +61,10 @@ class Reference:
         A conjugate prior (inverse Wishart, in blocks by kind) holds what is usual from day to day; it counts as six
         flights. The covariance is that of the predictive distribution, a multivariate t. Numbers go with how agile
         flights are flown by a regression with a prior of its own: where the reference flights are all flown alike,
-        flights that are not tell the less the more they differ.
+        flights that are not count the less the more they differ.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Numbers to take, which all of them have.
-
-        References
-        ----------
-        Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
+        `names`: numbers to take, which all of them have.
+        Reference: Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
         """
         values = np.array([[flight.values[name] for name in names] for flight in flights])
         power, error, voltage = _by_voltage(flights, names, values)
@@ -124,12 +88,12 @@ class Reference:
         in the covariance. It is that of their mean: flights of a day have their day in common.
         """
         values = np.array([[flight.values[name] for name in self.names] for flight in flights])
-        # Flights that tell a number worse than those of the reference do.
-        beside = _measured(flights, self.names) / len(flights) - self.measured
+        # Flights with a larger error than those of the reference.
+        excess = _measured(flights, self.names) / len(flights) - self.measured
         more = self.more_agile(flights)
         values -= np.outer(more, self.by_agility)
         unlike = np.abs(more).mean() * self.agility_error
-        covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
+        covariance = self.covariance + np.diag(np.maximum(excess, 0.0))
         covariance += np.outer(unlike, unlike) * 0.5 * (_alike(self.names) + np.eye(len(self.names)))
         voltage = np.array([flight.voltage for flight in flights])
         if np.isfinite(self.voltage) and np.isfinite(voltage).all():
@@ -140,7 +104,7 @@ class Reference:
         return values - self.mean, covariance
 
     def more_agile(self, flights: Sequence[FlightNumbers]) -> Array:
-        """Tell how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if not known."""
+        """Compute how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if unknown."""
         more = _logarithms(flights) - self.agility
         return np.where(np.isfinite(more), more, 0.0)
 
@@ -158,12 +122,7 @@ def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
 def number_limits(freedom: Array, asked: int) -> Array:
     """Compute the deviations that some number of an unchanged vehicle exceeds at the rate of `EACH_TEST` at most.
 
-    Parameters
-    ----------
-    freedom : array, shape (number,)
-        Degrees of freedom of each.
-    asked : int
-        How many means of flights all of them are asked of.
+    `freedom`, shape (number,): degrees of freedom of each; `asked`: how many means of flights all of them are asked of.
     """
     # Slow to load, and who reads a record computes nothing.
     from scipy.special import stdtrit
@@ -174,9 +133,7 @@ def number_limits(freedom: Array, asked: int) -> Array:
 def furthest(deviations: Array, freedom: Array, asked: int) -> float:
     """Compute at most how probable it is that any number of so many means of unchanged flights is as far off.
 
-    Parameters
-    ----------
-    deviations : array, shape (..., number)
+    `deviations`: shape (..., number).
     """
     from scipy.special import stdtr
 
@@ -189,25 +146,22 @@ def either(*p_values: float) -> float:
 
 
 def common_numbers(flights: Sequence[FlightNumbers]) -> tuple[str, ...]:
-    """List the numbers that all flights tell, in the order of the first."""
+    """List the numbers that all flights have, in the order of the first."""
     return tuple(name for name in flights[0].values if all(name in flight.values for flight in flights))
 
 
 def expected_covariance(flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Array:
     """Compute the covariance that is expected of flights before any of them is seen, shape (number, number)."""
-    # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
+    # Scatter of flights holds the error of each; what is usual from day to day is added.
     return usual_covariance(names, vehicle) + np.diag(_measured(flights, names))
 
 
 def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, Array]:
     """Learn the covariance of flights from what is expected and what is seen, and degrees of freedom of each number.
 
-    What is expected of a kind counts as six flights, at a scale that the numbers of the kind tell together.
+    What is expected of a kind counts as six flights, at a scale that the numbers of the kind identify together.
 
-    Parameters
-    ----------
-    apart : array, shape (row, number)
-        Whose squares add up to the covariance, times the degrees of freedom that they have.
+    `apart`, shape (row, number): whose squares add up to the covariance, times the degrees of freedom that they have.
     """
     alike = _alike(names)
     seen, kinds = (apart.T @ apart) * alike, np.array(kinds_of(names))
@@ -219,27 +173,21 @@ def learned_covariance(apart: Array, freedom: float, expected: Array, names: Seq
 
 
 def _scale(expected: Array, seen: Array, freedom: float) -> tuple[float, float]:
-    """Tell by how much numbers of a kind vary beside what is expected of them, a ratio, and the freedom that is left.
+    """Estimate by how much numbers of a kind vary against what is expected, a ratio, and the remaining freedom.
 
     The posterior mean of its logarithm, by the marginal likelihood of what is seen where each covariance is drawn from
-    an inverse Wishart distribution about that scale: numbers of a kind tell it together, and few flights hardly do. How
-    unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
+    an inverse Wishart distribution about that scale: numbers of a kind identify it together, and few flights hardly do.
+    How unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
 
-    Parameters
-    ----------
-    expected : array, shape (number, number)
-    seen : array, shape (number, number)
-        Sum of squares, of so many degrees of freedom.
-
-    References
-    ----------
-    Gelman 2006, Prior distributions for variance parameters in hierarchical models.
+    `expected`: shape (number, number).
+    `seen`, shape (number, number): sum of squares, of so many degrees of freedom.
+    Reference: Gelman 2006, Prior distributions for variance parameters in hierarchical models.
     """
     logarithms = np.linspace(-4.0, 4.0, 81) * 2 * _SCALE_ERROR
     beyond = np.maximum(np.linalg.eigvals(np.linalg.solve(expected, seen)).real, 0.0)
     strength = _DAYS + len(beyond) - 1
-    told = np.log(_DAYS * np.exp(logarithms)[:, None] + beyond).sum(axis=1)
-    likely = 0.5 * (strength * len(beyond) * logarithms - (strength + freedom) * told)
+    determinant = np.log(_DAYS * np.exp(logarithms)[:, None] + beyond).sum(axis=1)
+    likely = 0.5 * (strength * len(beyond) * logarithms - (strength + freedom) * determinant)
     likely -= 0.5 * (logarithms / (2 * _SCALE_ERROR)) ** 2
     share = np.exp(likely - likely.max())
     share /= share.sum()
@@ -255,36 +203,24 @@ def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:
     sensors = np.array([" ".join(name.split()[:-1]) for name in names])
     apart, together = np.array([kind.apart for kind in kinds]), np.array([kind.together for kind in kinds])
     covariance = np.diag(apart**2) + np.outer(together, together) * (sensors[:, None] == sensors)
-    loads = np.array([name.startswith("load ") for name in names])
-    moved = _OFFSET_M * load_directions(vehicle).offset
-    covariance[np.ix_(loads, loads)] += moved[:, _placed(names, loads)].T @ moved[:, _placed(names, loads)]
+    shares = np.array([name.startswith("thrust ") for name in names])
+    moved = _OFFSET_M * thrust_directions(vehicle).offset
+    covariance[np.ix_(shares, shares)] += moved[:, _placed(names, shares)].T @ moved[:, _placed(names, shares)]
     return np.asarray(covariance)
 
 
 @dataclass(frozen=True)
-class LoadDirections:
-    """What a change does to the logarithms of the rotors' loads in hover.
+class ThrustDirections:
+    """What a change does to the logarithms of the rotors' shares of thrust in hover."""
 
-    Attributes
-    ----------
-    rotor : array, shape (rotor, rotor)
-        Of each rotor that lacks a share of its thrust and drag, for a whole share.
-    mass : array, shape (rotor,)
-        For a relative change of the mass.
-    offset : array, shape (2, rotor)
-        Of the centre of mass along x and y, per m.
-    yaw : array, shape (rotor,)
-        Of a torque about z, for as much as all rotors' drag.
-    """
-
-    rotor: Array
-    mass: Array
-    offset: Array
-    yaw: Array
+    rotor: Array  # Shape (rotor, rotor): of each rotor that lacks a share of its thrust and drag, for a whole share.
+    mass: Array  # Shape (rotor,): for a relative change of the mass.
+    offset: Array  # Shape (2, rotor): of the centre of mass along x and y, per m.
+    yaw: Array  # Shape (rotor,): of a torque about z, for as much as all rotors' drag.
 
 
-def load_directions(vehicle: VehicleSettings) -> LoadDirections:
-    """Compute what changes do to the rotors' loads.
+def thrust_directions(vehicle: VehicleSettings) -> ThrustDirections:
+    """Compute what changes do to the rotors' shares of thrust.
 
     An autopilot that hovers asks for squared speeds that balance weight and torques, of least norm where there are more
     than four rotors.
@@ -297,7 +233,7 @@ def load_directions(vehicle: VehicleSettings) -> LoadDirections:
     # A centre of mass further along x leaves the rotors' thrust behind it: they have to raise the nose.
     wanted = weight * np.array([[0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     drag = np.array([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors]) @ hover
-    return LoadDirections(
+    return ThrustDirections(
         rotor=(inverse @ allocation @ np.diag(hover)).T / hover,
         mass=np.ones(len(hover)),
         offset=wanted @ inverse.T / hover,
@@ -305,9 +241,9 @@ def load_directions(vehicle: VehicleSettings) -> LoadDirections:
     )
 
 
-def _placed(names: Sequence[str], loads: BoolArray) -> list[int]:
-    """Give the rotor of each load."""
-    return [int(name.split("M")[-1]) - 1 for name, load in zip(names, loads, strict=True) if load]
+def _placed(names: Sequence[str], shares: BoolArray) -> list[int]:
+    """Give the rotor of each share of thrust."""
+    return [int(name.split("M")[-1]) - 1 for name, own in zip(names, shares, strict=True) if own]
 
 
 def kinds_of(names: Sequence[str]) -> list[str]:
@@ -326,24 +262,19 @@ def _by_agility(
 ) -> tuple[Array, Array, Array, float, float]:
     """Regress numbers on the logarithm of how agile flights are flown.
 
-    Returns
-    -------
-    rows : array, shape (row, number)
-        What is left, and what the prior adds.
-    slope, prior : array, shape (number,)
-        And the variance of the slope before any flight.
-    agility, spread : float
-        Mean of the logarithm, and the sum of squares about it.
+    Result `rows`, shape (row, number): residuals, and what the prior adds.
+    Result `slope`, `prior`, shape (number,): and the variance of the slope before any flight.
+    Result `agility`, `spread`: mean of the logarithm, and the sum of squares about it.
     """
     prior = np.array([KINDS[kind].agile ** 2 for kind in kinds_of(names)])
     more = _logarithms(flights)
     agility = float(more.mean())
     if not np.isfinite(agility):
         return values, np.zeros(len(names)), prior, agility, 0.0
-    beside = more - agility
-    spread = float(beside @ beside)
-    slope = beside @ values / (spread + noise / prior)
-    return np.vstack([values - np.outer(beside, slope), slope * np.sqrt(noise / prior)]), slope, prior, agility, spread
+    centred = more - agility
+    spread = float(centred @ centred)
+    slope = centred @ values / (spread + noise / prior)
+    return np.vstack([values - np.outer(centred, slope), slope * np.sqrt(noise / prior)]), slope, prior, agility, spread
 
 
 def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: Array) -> tuple[Array, Array, float]:
@@ -359,7 +290,7 @@ def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: 
     lower = np.log(voltage / usual)
     for kind, before in _BY_VOLTAGE.items():
         own = kinds == kind
-        if own.any() and (kind != "load" or all(flight.commanded for flight in flights)):
+        if own.any() and (kind != "thrust" or all(flight.commanded for flight in flights)):
             mean = values[:, own].mean(axis=1)
             noise = KINDS[kind].together ** 2 + KINDS[kind].apart ** 2 / own.sum()
             information = (lower**2).sum() / noise + 1 / _VOLTAGE_ERROR**2

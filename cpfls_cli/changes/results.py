@@ -1,7 +1,5 @@
 """What flights say of changes of their vehicle: since reference flights, and over many flights in time."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -9,20 +7,13 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.result import Estimate, about, part, result
 
-CANNOT_TELL = "CANNOT TELL"
-"""The verdict where no change would have shown, or a log is wrong."""
+CANNOT_TELL = "CANNOT TELL"  # The verdict where no change would have shown, or a log is wrong.
+_BY_CHANCE = ("delay", "lag", "unbalance", "swing", "battery")  # Kinds of which a good flight can hold too little.
+_OF_THRUST = ("rotor ", "mass", "centre of mass")
+"""Changes one of which has to have a size where shares of thrust are compared, by the beginnings of their names."""
 
-_BY_CHANCE = ("late", "answer", "unbalance", "swing", "battery")
-"""Kinds of which a good flight can hold too little."""
-
-_OF_LOADS = ("rotor ", "mass", "centre of mass")
-"""Changes one of which has to have a size where loads are compared, by the beginnings of their names."""
-
-_OF_AIR = ("gusts", "lean")
-"""Kinds that go with the weather."""
-
-CABLE = "load on a cable"
-"""The change that has a length."""
+_OF_AIR = ("gusts", "lean")  # Kinds that go with the weather.
+CABLE = "load on a cable"  # The change that has a length.
 
 
 @result
@@ -64,7 +55,7 @@ class Shows:
 class Number:
     """A number that all flights have."""
 
-    name: str = about("kind, and rotor, axis or sensor: load M3")
+    name: str = about("kind, and rotor, axis or sensor: thrust M3")
     unit: str = about("its unit; 1 of the logarithm of a ratio")
     reference: float = about("mean of the reference flights")
 
@@ -88,21 +79,21 @@ class Compared:
     warnings: tuple[str, ...] = about("what to know about the flights", "warning", default=())
 
     @property
-    def loads_show(self) -> bool:
-        """Whether a rotor, a mass or its centre would have shown, where loads are compared."""
-        if not any(each.name.startswith("load ") for each in self.numbers):
+    def thrust_shows(self) -> bool:
+        """Whether a rotor, a mass or its centre would have shown, where shares of thrust are compared."""
+        if not any(each.name.startswith("thrust ") for each in self.numbers):
             return True
-        return any(each.cause.startswith(_OF_LOADS) and np.isfinite(each.smallest) for each in self.shows)
+        return any(each.cause.startswith(_OF_THRUST) and np.isfinite(each.smallest) for each in self.shows)
 
     @property
     def has_size(self) -> bool:
-        """Whether what is looked for would have shown: where loads are compared, a change of these."""
-        return self.loads_show and any(np.isfinite(each.smallest) for each in self.shows)
+        """Whether what is looked for would have shown: where shares of thrust are compared, a change of these."""
+        return self.thrust_shows and any(np.isfinite(each.smallest) for each in self.shows)
 
 
 @result
 class NumberToday(Number):
-    """A number of today's flights against the reference; loads at the voltage of the reference."""
+    """A number of today's flights against the reference; shares of thrust at the voltage of the reference."""
 
     deviation: float = about("what flights of one day differ by from the reference where nothing changed")
     limit: float = about("how far the mean of today is off at most where nothing changed, but for false alarms")
@@ -129,10 +120,10 @@ class Changed(Compared):
 
     today: tuple[str, ...] = about("names of today's flights, in the order given", "today")
     reference_flights: tuple[str, ...] = about("names of the reference flights", "before")
-    commanded: bool = about("whether loads are of commands, and not of speeds that were measured")
+    commanded: bool = about("whether shares of thrust are of commands, and not of speeds that were measured")
     by_flight: Array = about("the probability `p` of each flight of today alone", "today")
     since_flight: int = about("index of the flight of today from which on it looks most as if it had changed", least=0)
-    hover: float = about("what the loads of all rotors have in common, today less the reference, logarithm", gaps=True)
+    hover: float = about("mean share of thrust, today less the reference, logarithm", gaps=True)
     hover_deviation: float = about("what that differs by where nothing changed", gaps=True)
     fewest: int = about("reference flights that say what flights differ by; of fewer, what is usual replaces that")
     missing: tuple[str, ...] = about(
@@ -157,10 +148,10 @@ class Changed(Compared):
         return [each.name for each in self.numbers if each.beyond]
 
     @property
-    def loads_differ(self) -> float:
-        """By which share a load differs within the reference at most; 0 of one flight."""
-        loads = [np.ptp(each.before) for each in self.numbers if each.name.startswith("load ")]
-        return float(np.expm1(max(loads, default=0.0)))
+    def thrusts_differ(self) -> float:
+        """By how much a share of thrust differs within the reference at most; 0 of one flight."""
+        shares = [np.ptp(each.before) for each in self.numbers if each.name.startswith("thrust ")]
+        return float(np.expm1(max(shares, default=0.0)))
 
     @property
     def reference_flights_lacking(self) -> int:
@@ -194,7 +185,7 @@ class Changed(Compared):
 
 @result
 class NumberInTime(Number):
-    """A number over the flights; loads at the voltage of the reference."""
+    """A number over the flights; shares of thrust at the voltage of the reference."""
 
     values: Array = about("of each flight", "flight")
     deviation: Array = about("what each flight differs by from the reference where nothing changed", "flight", least=0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import beyond_chance, judged
-from cpfls_cli.changes.numbers import FlightNumbers, unit_of
+from cpfls_cli.changes.numbers import KINDS, FlightNumbers, unit_of
 from cpfls_cli.changes.reference import (
     EACH_TEST,
     FALSE_ALARM,
@@ -31,18 +31,12 @@ from cpfls_cli.words import joined
 if TYPE_CHECKING:
     from ruptures import KernelCPD
 
-_DRAWS = 1000
-"""Rows of unchanged flights that chance is told by."""
-
-_AT_ONCE = 3
-"""Change points whose gain is shared when a row is held against chance."""
+_DRAWS = 1000  # Rows of unchanged flights that chance is drawn from.
+_AT_ONCE = 3  # Change points whose gain is shared when a row is held against chance.
 
 
 def trend(
-    flights: Sequence[FlightNumbers],
-    vehicle: VehicleSettings,
-    rng: np.random.Generator,
-    reference: int | None = None,
+    flights: Sequence[FlightNumbers], vehicle: VehicleSettings, rng: np.random.Generator, reference: int | None = None
 ) -> Trend:
     """Find the flights from which on a vehicle is another one; numbers and limits of each flight with it.
 
@@ -50,31 +44,20 @@ def trend(
     touches. Change points are those of least squares with a penalty for each (PELT), the one that rows of an unchanged
     vehicle exceed at the rate of false alarms: the same number of flights, drawn, whitened and searched alike.
 
-    Parameters
-    ----------
-    flights : sequence of FlightNumbers
-        In time order.
-    reference : int, optional
-        How many of the first flights are the reference: by default half of them, or those before the first change, and
-        at least three.
-
-    Raises
-    ------
-    InputError
-        If there are fewer flights than the reference and one more, or ruptures is not installed.
-
-    References
-    ----------
-    Killick, Fearnhead and Eckley 2012, Optimal detection of changepoints with a linear computational cost, JASA
-    107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
+    `flights`: in time order.
+    `reference`: how many of the first flights are the reference: by default half of them, or those before the first
+    change, and at least three.
+    Raises InputError if there are fewer flights than the reference and one more, or ruptures is not installed.
+    Reference: Killick, Fearnhead and Eckley 2012, Optimal detection of changepoints with a linear computational cost,
+    JASA 107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
     Processing 167.
     """
-    names, kept = most_told(flights)
+    names, kept = most_complete(flights)
     without = [flight for flight in flights if not any(flight is each for each in kept)]
     turned = [(flight.name, [name for name in flight.reversed if name in names]) for flight in without]
     if len(kept) < (reference or FEWEST) + 1:
         raise InputError(
-            f"flights that tell the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
+            f"flights with the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
             "those of the reference and one more"
         )
     first = reference or max(FEWEST, len(kept) // 2)
@@ -118,20 +101,20 @@ def trend(
     )
 
 
-def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
-    """Choose the numbers and the flights that tell all of them such that they are the most together."""
-    told = list(dict.fromkeys(name for flight in flights for name in flight.values))
+def most_complete(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
+    """Choose the numbers, and the flights that have all of them, such that they are the most together."""
+    every = list(dict.fromkeys(name for flight in flights for name in flight.values))
     if {flight.commanded for flight in flights} == {True, False}:
-        told = [name for name in told if not name.startswith("load ")]
-    count = {name: sum(name in flight.values for flight in flights) for name in told}
+        every = [name for name in every if not name.startswith("thrust ")]
+    count = {name: sum(name in flight.values for flight in flights) for name in every}
     best: tuple[tuple[str, ...], list[FlightNumbers]] = ((), [])
     for least in sorted(set(count.values()), reverse=True):
-        names = tuple(name for name in told if count[name] >= least)
+        names = tuple(name for name in every if count[name] >= least)
         kept = [flight for flight in flights if all(name in flight.values for name in names)]
         if len(names) * len(kept) > len(best[0]) * len(best[1]):
             best = names, kept
     if not best[0]:
-        raise InputError("the flights tell no number in common; import the same signals")
+        raise InputError("the flights have no number in common; import the same signals")
     return best
 
 
@@ -173,27 +156,17 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
 
 @dataclass(frozen=True)
 class Row:
-    """Flights one after another, and what is expected of such a row.
-
-    Attributes
-    ----------
-    values : array, shape (flight, number)
-    expected : array, shape (number, number)
-        Covariance of a flight before any is seen.
-    voltage : array, shape (flight, number)
-        Standard deviation of what numbers of a kind have in common by the voltage, whose effect is not known well.
-    noise : array, shape (flight, number)
-        Standard deviation of what a flight tells worse than others do.
-    agility : array, shape (flight, number)
-        Standard deviation of what is not known for how agile a flight is flown; half of its variance numbers of a kind
-        have in common.
-    """
+    """Flights one after another, and what is expected of such a row."""
 
     names: tuple[str, ...]
-    values: Array
-    expected: Array
+    values: Array  # Shape (flight, number).
+    expected: Array  # Shape (number, number): covariance of a flight before any is seen.
+    # Shape (flight, number): standard deviation of what numbers of a kind have in common by the voltage, whose effect
+    # is not known well.
     voltage: Array
-    noise: Array
+    noise: Array  # Shape (flight, number): standard deviation by which a flight is less certain than others.
+    # Shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of its
+    # variance numbers of a kind have in common.
     agility: Array
 
     @classmethod
@@ -230,7 +203,7 @@ class Row:
         """Draw such rows of unchanged vehicles: of each kind its covariance (inverse Wishart), then the flights."""
         covariance, freedom = self.covariance(self.values)
         root, size = np.linalg.cholesky(covariance), len(covariance)
-        kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
+        kind = np.unique([list(KINDS).index(each) for each in kinds_of(self.names)], return_inverse=True)[1]
         for _ in range(count):
             drawn = np.empty((size, len(self.values)))
             for own in (kind == each for each in range(kind.max() + 1)):

@@ -7,7 +7,7 @@ import difflib
 import functools
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
@@ -119,48 +119,24 @@ def _common_hints() -> dict[str, Any]:
     return get_type_hints(Common, include_extras=True)
 
 
-def with_common(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the common options; it receives them as its keyword argument `common`.
+def is_argument(hint: Any) -> bool:
+    """Tell an argument from an option by its annotation."""
+    return any(isinstance(each, ArgumentInfo) for each in get_args(hint))
 
-    Returns
-    -------
-    callable
-        With a signature that the command-line library reads.
-    """
-    hints = get_type_hints(command, include_extras=True)
-    common_hints = _common_hints()
-    arguments = [name for name, hint in hints.items() if any(isinstance(o, ArgumentInfo) for o in get_args(hint))]
-    command_parameters = [
-        parameter.replace(annotation=hints[name])
-        for name, parameter in inspect.signature(command).parameters.items()
-        if name != "common"
-    ]
-    left_out = _left_out(command.__name__.rstrip("_"), hints)
-    unheard = () if "config" in hints else _OF_A_CONFIG
-    shared = [
+
+def common_options(command: str, hints: Mapping[str, Any]) -> list[inspect.Parameter]:
+    """Give the common options of a command as parameters; `hints` are the annotations of its own."""
+    left_out, unheard = _left_out(command, hints), () if "config" in hints else _OF_A_CONFIG
+    known = ((f, _common_hints()[f.name]) for f in fields(Common) if f.name not in left_out)
+    return [
         inspect.Parameter(
             f.name,
             inspect.Parameter.KEYWORD_ONLY,
             default=f.default,
-            annotation=_hidden(common_hints[f.name]) if f.name in unheard else common_hints[f.name],
+            annotation=_hidden(hint) if f.name in unheard else hint,
         )
-        for f in fields(Common)
-        if f.name not in left_out
+        for f, hint in known
     ]
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
-        common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common) if f.name not in left_out})
-        if "config" not in hints:
-            refuse_overrides(common)
-        _check_order(command.__name__.rstrip("_"), {name: kwargs[name] for name in arguments}, kwargs.get("output"))
-        command(*args, common=common, **kwargs)
-
-    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in command_parameters]
-    parameters += shared
-    wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return wrapped
 
 
 _OF_A_CONFIG = ("overrides", "seed")
@@ -184,23 +160,24 @@ def _left_out(command: str, hints: Mapping[str, Any]) -> tuple[str, ...]:
     """List the options that a command has no use for, being those on numbers, or has as an option of its own."""
     if "config" not in hints or command in _WITHOUT_VEHICLE:
         return (*_OF_NUMBERS, "seed") if "seed" in hints else _OF_NUMBERS
-    own = "model" in hints and not any(isinstance(each, ArgumentInfo) for each in get_args(hints["model"]))
+    own = "model" in hints and not is_argument(hints["model"])
     return ("numbers",) if own else ()
 
 
-def refuse_overrides(common: Common) -> None:
-    """Refuse what overrides a config where none is read."""
+def refuse_overrides(common: Common, *, given: bool = True) -> None:
+    """Refuse what overrides a config where none is read, or where the one that could be is not given."""
     from cpfls_cli.cli.terminal import messages_for_errors
     from cpfls_cli.errors import InputError
 
-    given = {"--set": next(iter(common.overrides or ()), None), "--seed": common.seed}
+    overrides = {"--set": next(iter(common.overrides or ()), None), "--seed": common.seed}
     with messages_for_errors():
-        for option, value in given.items():
+        for option, value in overrides.items():
             if value is not None:
-                raise InputError(f"{option} {value}: this command reads no config; leave {option} out")
+                why = f"this command reads no config; leave {option} out" if given else "needs a CONFIG"
+                raise InputError(f"{option} {value}: {why}")
 
 
-def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:
+def check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:
     """Refuse arguments that do not begin with the config where one is asked for, and a log that is none."""
     from cpfls_cli.cli.misplaced import refuse_misplaced_config, refuse_misplaced_log
     from cpfls_cli.cli.terminal import messages_for_errors

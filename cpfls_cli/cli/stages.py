@@ -19,13 +19,14 @@ from cpfls_cli.arguments import FolderOption
 from cpfls_cli.cli.command_lines import CommandLine, command_line
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import (
-    Commands,
     Common,
     ConfigArgument,
     OutputOption,
+    check_order,
+    common_options,
+    is_argument,
     refuse_overrides,
     repeated,
-    with_common,
 )
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.errors import ComputationError
@@ -38,6 +39,7 @@ STAGES = Path(__file__).parents[1] / "stages"
 ORDER = (
     *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle", "predict"),
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
+    *("spread", "info", "check", "config", "effects"),
 )
 """Of the list of commands; what it does not name stands behind."""
 PARTS = ("twin",)
@@ -73,7 +75,7 @@ class StageCommand(TyperCommand):
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
         assert self.name is not None, "a command has a name"
-        app.command(self.name)(with_common(command_of(self.name, self._line, self._stage)))
+        app.command(self.name)(command_of(self.name, self._line, self._stage))
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -98,24 +100,18 @@ class StageCommand(TyperCommand):
         """Take note of nothing."""
 
 
-class AllCommands(Commands):
-    """The commands of stages and all others, in the order of the way through them."""
-
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
-        every = {**stage_commands(), **self.commands}
-        self.commands = {name: every[name] for name in (*(own for own in ORDER if own in every), *every)}
-
-
 def _named(file: Path) -> str:
     return file.stem.strip("_").replace("_", "-")
 
 
 def stage_commands(folder: Path = STAGES) -> dict[str, TyperCommand]:
-    """List the commands of the stages in a folder; some are a part of another command, which calls them."""
+    """List the commands of the stages in a folder, in the order of the way through them.
+
+    Some stages are a part of another command, which calls them.
+    """
     every = (file for file in sorted(folder.glob("[a-z]*.py")) if file.stem not in PARTS)
     files = {_named(file): file for file in every}
-    return {name: StageCommand(file) for name, file in files.items()}
+    return {name: StageCommand(files[name]) for name in (*(own for own in ORDER if own in files), *files)}
 
 
 def run_of(
@@ -131,7 +127,7 @@ def run_of(
     from cpfls_cli.config.load import validate
     from cpfls_cli.stage import Run
 
-    study = common.study(config, sweep=own.name == "sweep") if config else validate({}, "default")
+    study = common.study(config, sweep=own.name in ("sweep", "config")) if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
     if config:
@@ -140,9 +136,13 @@ def run_of(
         run.data = partial(common.data, config)
         run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
         if common.numbers is not None:
-            run = import_module("cpfls_cli.commands.numbers").with_numbers_of(run, common.numbers)
+            run = import_module("cpfls_cli.stages._numbers").with_numbers_of(run, common.numbers)
         require_numbers(run, own.name)
     return run
+
+
+def _unshown(done: float, total: int, note: str = "") -> None:
+    """Show no progress of what only answers."""
 
 
 @contextmanager
@@ -157,7 +157,7 @@ def noted(job: Job) -> Iterator[None]:
 
 
 def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Callable[..., None]:
-    """Write the command line of a stage: its own parameters, its output, and a config where it takes one.
+    """Write the command line of a stage: its own parameters, its output, a config where it takes one, common options.
 
     Parameters
     ----------
@@ -165,38 +165,45 @@ def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Calla
         Gives the stage, when the command runs.
     """
     declared = any(each.name == "config" for each in line.parameters)
+    hints = {"config": ConfigArgument} if line.study and not declared else {}
+    hints |= {each.name: each.annotation for each in line.parameters}
+    arguments = [own for own, hint in hints.items() if is_argument(hint)]
+    shared = common_options(name, hints)
 
-    def command(*, common: Common, output: Path | None = None, config: Path | None = None, **given: Any) -> None:
+    def command(**given: Any) -> None:
+        common = Common(**{each.name: given.pop(each.name) for each in shared})
+        if "config" not in hints or (declared and given["config"] is None):
+            refuse_overrides(common, given=not declared)
+        check_order(name, {own: given[own] for own in arguments}, given.get("output"))
         with messages_for_errors():
-            from cpfls_cli.artifacts.output import locked
-
-            own = load()
-            narration = Narration(own.name, common.verbose and not common.quiet)
-            given |= {"config": config} if declared else {}
-            if callable(own.study) and not own.study(given):
-                refuse_overrides(common)
-                config = None
-            if own.overrides:
-                common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
-            with progress_bar(own.name, common) as progress:
-                run = run_of(own, common, output, config, narration.reads, progress)
-                with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
-                    outcome = own.run(run, **given)
-            if output and not common.dry_run:
-                narration.wrote(output)
-            tell(outcome, common)
+            _run(load(), common, given, declared=declared)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    added = {"config": ConfigArgument} if line.study and not declared else {}
     option = line.output or (FilledOption if line.folder else FolderOption if line.fills else OutputOption)
     output = inspect.Parameter("output", keyword, annotation=option)
-    whole = [
-        *(inspect.Parameter(name, keyword, annotation=hint) for name, hint in added.items()),
-        *(each.replace(kind=keyword) for each in line.parameters),
-        output.replace(default=None) if line.folder or line.output else output,
-        inspect.Parameter("common", keyword, annotation=Common),
-    ]
+    outputs = [] if line.output is False else [output.replace(default=None) if line.folder or line.output else output]
+    first = [] if declared or not line.study else [inspect.Parameter("config", keyword, annotation=ConfigArgument)]
+    whole = [*first, *(each.replace(kind=keyword) for each in line.parameters), *outputs, *shared]
     command.__signature__ = inspect.Signature(whole)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in whole}
-    command.__name__ = name.replace("-", "_")
     return command
+
+
+def _run(own: Stage, common: Common, given: dict[str, Any], *, declared: bool) -> None:
+    """Run a stage as its command line says, and print what it says."""
+    from cpfls_cli.artifacts.output import locked
+
+    output, config = given.pop("output", None), given["config"] if declared else given.pop("config", None)
+    narration = Narration(own.name, common.verbose and not common.quiet)
+    if callable(own.study) and not own.study(given):
+        refuse_overrides(common)
+        config = None
+    if own.overrides:
+        common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
+    with nullcontext(_unshown) if own.output is False else progress_bar(own.name, common) as progress:
+        run = run_of(own, common, output, config, narration.reads, progress)
+        with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
+            outcome = own.run(run, **given)
+    if output and not common.dry_run:
+        narration.wrote(output)
+    tell(outcome, common)

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from cpfls_cli.report.outcome import Outcome
 
 _BAR_WIDTH = 20
+_TELLING = ("diagnosis", "changed", "trend")
+"""Results in a folder whose `info` shows the answer of its command again."""
 # Unasked notes leave the answer on a small screen.
 _NOTE_LINES, _NOTE_WIDTH = 5, 80
 # A number that is no part of a name.
@@ -69,13 +71,13 @@ def messages_for_errors() -> Iterator[None]:
 
 def tell(outcome: Outcome, common: Common) -> None:
     """Print what a command has to say, and end with its exit code."""
-    from cpfls_cli.report.outcome import as_json
+    from cpfls_cli.result import plain
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # An encoding without a degree sign must not end a command that has done its work.
         sys.stdout.reconfigure(errors="replace")
     if common.as_json:
-        print(json.dumps(as_json(outcome.summary), allow_nan=False), flush=True)
+        print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     # On one terminal what is printed last is what stays on the screen.
     notes_first = not common.as_json and _columns() is not None and _columns(sys.stderr) is not None
     if notes_first:
@@ -113,12 +115,13 @@ def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     if more:
         yield from terminal_lines([Text(f"more with -v: {'; '.join(more)}")], width)
     if more and outcome.written is not None:
-        from cpfls_cli.commands.show import artifact_that_tells
+        from cpfls_cli.store import stage_of
 
         # Nothing has to be computed again to read it.
-        artifact = artifact_that_tells(outcome.written)
-        if artifact is not None:
-            yield f"or with {visible(shlex.join(('cpfls', 'info', str(artifact), '-v')))}"
+        written = outcome.written
+        results = [written / f"{name}.h5" for name in _TELLING] if written.is_dir() else [written]
+        for path in [path for path in results if stage_of(path)][:1]:
+            yield f"or with {visible(shlex.join(('cpfls', 'info', str(path), '-v')))}"
 
 
 def _columns(stream: TextIO | None = None) -> int | None:

@@ -35,7 +35,7 @@ _OFF: Final[dict[Unknown, str]] = {
 }
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.9 of the largest speed."""
 
-_TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
+_TAKEN = frozenset({"import", "config", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
 _GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
 _OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend", "tune"})

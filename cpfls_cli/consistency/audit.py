@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.check import findings_of
 from cpfls_cli.consistency.clocks import actuation_delay
@@ -15,7 +14,6 @@ from cpfls_cli.consistency.findings import AuditFinding, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
-from cpfls_cli.effects.hooks import ReadingError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.result import about, part
@@ -74,30 +72,19 @@ class Audit:
                 test.error(finding.named_values(test.labels)) for test, finding in faults if test.signal == signal
             ]
             if getattr(signals, signal) is not None:
-                truth[signal] = _corrected(getattr(signals, signal), signals.time, errors)
+                reading = shifted(getattr(signals, signal), signals.time, sum(error.delay for error in errors))
+                matrix = reduce(np.matmul, [error.matrix for error in errors])
+                offset = np.sum([error.offset for error in errors], axis=0)
+                truth[signal] = np.asarray((reading - offset) @ np.linalg.inv(matrix).T)
         return replace(signals, **truth) if truth else signals
-
-
-def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> Array:
-    delay = sum(error.delay for error in errors)
-    offset = np.sum([error.offset for error in errors], axis=0)
-    matrix = reduce(np.matmul, [error.matrix for error in errors])
-    return np.asarray((shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
 
 
 def audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals] = ()) -> Audit:
     """Check the sensors of flights with the same hardware against each other.
 
-    Parameters
-    ----------
-    flights : sequence of Signals
-        At least one, with the sampling period of the windows.
-    whole : sequence of Signals
-        Those that rotors and attitude are held against the vehicle in, where `flights` are but a part of them.
-
-    References
-    ----------
-    Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
+    `flights`: at least one, with the sampling period of the windows.
+    `whole`: those that rotors and attitude are held against the vehicle in, where `flights` are but a part of them.
+    Reference: Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
     key = (audit, tuple(flights), windows, tuple(whole))
     return flights[0].once(key, lambda: _audit(flights, windows, whole or flights))

@@ -1,4 +1,4 @@
-"""Two vectors that should be the same: axes swapped, reversed or missing, and the gyroscope beside the attitude."""
+"""Two vectors that should be the same: axes swapped, reversed or missing, and the gyroscope against the attitude."""
 
 from collections.abc import Iterator
 from math import log, pi
@@ -10,30 +10,20 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.rounding import levelled
 
 AXES = ("x", "y", "z")
-SAME = 0.9
-"""Correlation that noise does not reach over a flight."""
-
-_OTHER = 0.5
-"""Correlation that noise does not hide where the motion is worth a look."""
-
-TWICE = 2.0
-"""Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7."""
-
+SAME = 0.9  # Correlation that noise does not reach over a flight.
+_OTHER = 0.5  # Correlation that noise does not hide where the motion is worth a look.
+TWICE = 2.0  # Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7.
 _BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
 """Standard deviation from which on an axis is judged, also as a share of that of the axis which turns most: about one
 that hardly turns, errors of the others decide."""
 
-_POOR = 0.6
-"""Correlation below which gyroscope and attitude do not show one motion."""
-
+_POOR = 0.6  # Correlation below which gyroscope and attitude do not show one motion.
 _SURE_SIGMAS, _OVERLAP = 4.0, 4
 """Standard errors of a correlation from which on it is none by chance, and windows that share a sample."""
 
 _DEGREES_PER_RADIAN = 180 / pi
-_UNIT_TOLERANCE = 1.3
-"""Ratio within which a gain is that of a unit."""
-
+_UNIT_TOLERANCE = 1.3  # Ratio within which a gain is that of a unit.
 _SENSORS = ("attitude", "gyroscope")
 
 
@@ -52,19 +42,10 @@ def _instead(correlation: Array, axis: int) -> int | None:
 def axes_apart(words: str, first: Array, second: Array, floor: float) -> Iterator[tuple[str, float]]:
     """Detect axes that are swapped, reversed or missing.
 
-    Parameters
-    ----------
-    words : str
-        The two channels, "one and other".
-    first, second : array, shape (window, 3)
-        What should be the same.
-    floor : float
-        Standard deviation above which something moves.
-
-    Yields
-    ------
-    tuple of str and float
-        What is wrong, and the correlation along that axis.
+    `words`: the two channels, "one and other".
+    `first`, `second`, shape (window, 3): what should be the same.
+    `floor`: standard deviation above which something moves.
+    Result: what is wrong, and the correlation along that axis.
     """
     spread, other_spread = first.std(axis=0), second.std(axis=0)
     correlation = _correlated(first, second)
@@ -87,19 +68,11 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
     The gain of an axis that agrees is the ratio of the two standard deviations (reduced major axis regression), for
     either may hold the noise.
 
-    Parameters
-    ----------
-    seen, read : array, shape (window, 3), rad/s
-        The rate by the attitude, and by the gyroscope.
-
-    Returns
-    -------
-    unlike : tuple of Finding
-        One for each axis whose correlation is below 0.6.
-    scaled : tuple of Finding
-        One for each axis that agrees whose gain is not within 0.5 .. 2, and for each other one whose gain is that of
-        degrees for radians: noise in one of the two brings the correlation down to the ratio of their sizes, and so
-        explains no gain beyond its inverse.
+    `seen`, `read`, shape (window, 3), rad/s: the rate by the attitude, and by the gyroscope.
+    Result `unlike`: one for each axis whose correlation is below 0.6.
+    Result `scaled`: one for each axis that agrees whose gain is not within 0.5 .. 2, and for each other one whose gain
+    is that of degrees for radians: noise in one of the two brings the correlation down to the ratio of their sizes, and
+    so explains no gain beyond its inverse.
     """
     motion = np.maximum(seen.std(axis=0), read.std(axis=0))
     correlation = _correlated(seen, read)

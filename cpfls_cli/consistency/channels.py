@@ -12,8 +12,7 @@ from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.stretches import clipped
 
-# No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
-_LOWEST_LIMIT_RAD_S = 1.0
+_LOWEST_LIMIT_RAD_S = 1.0  # No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
 # Rounding to this step adds as much noise as a poor gyroscope has.
 _COARSE_STEP_RAD_S = 0.02
 _ANGLES = ("roll", "pitch", "yaw")
@@ -68,19 +67,15 @@ def _channels(signals: Signals) -> Mapping[str, Array]:
 def known_up_to(signals: Signals) -> dict[str, float]:
     """Find the cut-offs of the low-pass filters that the signals of a flight went through before they were logged.
 
-    Returns
-    -------
-    dict from field of `Signals` to float, Hz
-        Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
+    Result: signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
     """
-    return signals.once(known_up_to, lambda: _known_up_to(signals))
 
+    def found() -> dict[str, float]:
+        names = [name for name in _CHANNEL_WORDS if name != "body_rate" or name in signals.available]
+        logged = {name: values for name in names if (values := getattr(signals, name)) is not None}
+        return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
 
-def _known_up_to(signals: Signals) -> dict[str, float]:
-    logged = {name: values for name in _CHANNEL_WORDS if (values := getattr(signals, name)) is not None}
-    if "body_rate" not in signals.available:
-        del logged["body_rate"]
-    return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
+    return signals.once(known_up_to, found)
 
 
 def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:

@@ -1,18 +1,18 @@
-"""Whether a log is right: one check, whose findings every command tells."""
+"""Whether a log is right: one check, whose findings every command reports."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.consistency.motion import beside_lean
+from cpfls_cli.consistency.motion import against_lean
 from cpfls_cli.consistency.rotors import (
     IDLE,
     beyond_propellers,
     lift,
     misplaced,
-    tells_thrust,
-    thrust_beside_weight,
+    thrust_against_weight,
+    thrust_is_known,
     too_fast,
 )
 from cpfls_cli.consistency.sensors import Sensors, sensors_of
@@ -22,31 +22,22 @@ from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
 
-_HANGS = -0.5
-"""Mean upward part of body z below which an attitude is turned over; full rotations come to 0."""
-
-_SHORT_S = 5.0
-"""A shorter part is no log with a take-off and a landing."""
-
+_HANGS = -0.5  # Mean upward part of body z below which an attitude is turned over; full rotations come to 0.
+_SHORT_S = 5.0  # A shorter part is no log with a take-off and a landing.
 _WEIGHED_S, _WEIGHED = 10.0, (0.7, 5.0)
 """Seconds in which nobody falls or climbs enough to feel less than the first share of gravity on average (that takes
 30 m/s), or pulls the second without an end."""
 
-ENOUGH = 50_000
-"""Samples that tell units, axes and which rotor is where."""
+ENOUGH = 50_000  # Samples that identify units, axes and which rotor is where.
 
 
 def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, ...]:
     """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
 
-    What is not flown, where a touchdown is a motion of its own, tells nothing.
+    What is not flown, where a touchdown is a motion of its own, is left out.
 
-    Parameters
-    ----------
-    parts : sequence of Signals
-        Stretches of one flight, or flights with the same hardware; those too short for windows are left out.
-    settings : WindowSettings
-        Of the section `gap`, as in the sensor audit.
+    `parts`: stretches of one flight, or flights with the same hardware; those too short for windows are left out.
+    `settings`: of the section `gap`, as in the sensor audit.
     """
     parts = [_flown(part) for part in parts]
     looked_at = _middle(parts)
@@ -57,7 +48,7 @@ def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, 
 
 
 def _flown(part: Signals) -> Signals:
-    """Cut off what is not flown; a part in which that cannot be told is taken as it is."""
+    """Cut off what is not flown; a part in which that is not known is taken as it is."""
     if part.rotor_speed is None or len(part) * part.period < _SHORT_S:
         return part
     span = flown(part).span_s
@@ -89,21 +80,21 @@ def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Find
 
 def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Finding | None]:
     yield too_fast(parts)
-    weighs = thrust_beside_weight(parts)
+    weighs = thrust_against_weight(parts)
     yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
     if parts[0].attitude is None:
         yield _unlike_gravity(max(_middle(parts), key=len))
     if hangs is None:
-        yield from beside_lean(max(_middle(parts), key=len))
+        yield from against_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
         return
     if not sensors.gyroscope.apart:
-        # A gyroscope that the attitude contradicts tells of no rotor.
+        # A gyroscope that the attitude contradicts identifies no rotor.
         yield misplaced(_middle(parts))
     yield from sensors.findings
-    if tells_thrust(parts) and sensors.motion.against_thrust is None:
+    if thrust_is_known(parts) and sensors.motion.against_thrust is None:
         yield lift(sensors.motion.checks, parts[0].vehicle)
 
 
@@ -137,7 +128,7 @@ def _unlike_gravity(part: Signals) -> Finding | None:
 
 
 def _middle(parts: Sequence[Signals]) -> list[Signals]:
-    """Take no more of a long log than tells units and axes, from the middle of where its rotors turn."""
+    """Take no more of a long log than identifies units and axes, from the middle of where its rotors turn."""
     if sum(len(part) for part in parts) <= ENOUGH:
         return list(parts)
     longest = max(parts, key=len)

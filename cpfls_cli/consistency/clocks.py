@@ -17,26 +17,18 @@ from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import capitalised
 
-# The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
-_STEPS = 41
+_STEPS = 41  # The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
 # Above the motion of a multirotor and below most of the noise of its derivative.
 _LOWPASS_HZ, _SHARE_OF_RATE = 8.0, 0.2
-# Rotors of the largest multirotors follow within a fifth of a second.
-_DELAY_MAX_S = 0.2
-# A rigid body that explains less of the torque leaves the delay to chance.
-_SMALLEST_R2 = 0.3
-# Missing effects shift the motion against the torque by about this much; a damping is allowed for.
-_SURE_S = 0.002
-# Windows that a fit of five numbers wants, and estimates whose scatter can be told.
-_FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2
-# Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
-_ROTORS_OFF_S = 0.008
+_DELAY_MAX_S = 0.2  # Rotors of the largest multirotors follow within a fifth of a second.
+_SMALLEST_R2 = 0.3  # A rigid body that explains less of the torque leaves the delay to chance.
+_SURE_S = 0.002  # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
+_FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2  # Windows that a fit of five numbers wants, and estimates that have a scatter.
+_ROTORS_OFF_S = 0.008  # Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
 # Telemetry comes up to a quarter of a second late; steps of 20 ms, then of 5.
 _TELEMETRY_S, _TELEMETRY_STEPS, _FINER = 0.24, 25, 9
-# Estimates of one clock scatter by less than this, or by less than this share of it.
-_SCATTER_S, _SCATTER = 0.004, 0.2
-# Two halves of one flight about roll and pitch.
-_FEWEST_SHIFTS = 4
+_SCATTER_S, _SCATTER = 0.004, 0.2  # Estimates of one clock scatter by less than this, or by less than this share of it.
+_FEWEST_SHIFTS = 4  # Two halves of one flight about roll and pitch.
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
 _DONE = "corrected before the balance"
@@ -44,16 +36,16 @@ _UNDECIDED = "these flights do not show whether the gyroscope or the attitude is
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
-    """Say how late the motion follows commands or a logged torque, median over the flights; nothing where none tells.
+    """Say by which delay the motion follows commands or a logged torque, median over the flights; nothing if unknown.
 
     Behind measured speeds nothing has to come late: what looks so may be an autopilot that answers gusts.
     """
-    told = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
-    estimates = [estimate for signals in told if (estimate := _estimate(signals)) is not None]
+    driven = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
+    estimates = [estimate for signals in driven if (estimate := _estimate(signals)) is not None]
     if not estimates:
         return ()
     delay = float(np.median([estimate.delay_s for estimate in estimates]))
-    whom = "commands" if told[0].commanded else "logged torque"
+    whom = "commands" if driven[0].commanded else "logged torque"
     bound = "at least" if any(estimate.at_bound for estimate in estimates) else "about"
     return (f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms.",)
 
@@ -79,17 +71,9 @@ def attitude_on_clock(
     Which of the two is late the rotors say. Where they do not, as commands or a loop that answers gusts, it is the one
     that comes after the other: a sensor, a filter or a wire makes a log late, and nothing makes it early.
 
-    Parameters
-    ----------
-    gyro_delay : float
-        Of the gyroscope behind the attitude, s.
-
-    Returns
-    -------
-    repairs : tuple of ChannelRepair
-        Empty where the gyroscope is late.
-    notes : tuple of str
-        That only this makes the gyroscope late.
+    `gyro_delay`: of the gyroscope behind the attitude, s.
+    Result `repairs`: empty where the gyroscope is late.
+    Result `notes`: that only this makes the gyroscope late.
     """
     behind = np.array([delay for half in _halves(flights, windows) if (delay := _behind(half)) is not None])
     agrees, lags = False, False
@@ -102,7 +86,7 @@ def attitude_on_clock(
     judged = "the gyroscope and the rotors, whose clocks agree" if agrees else f"the gyroscope: {_UNDECIDED}"
     what = f"the attitude is {off_clock(-gyro_delay)}, judged by {judged}"
     finding = _late(what, "correct its clock in the log", ("attitude", *channels), -gyro_delay)
-    return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, f"It is {_DONE}"),), ()
+    return (ChannelRepair("attitude", delay_s=-gyro_delay).with_finding(finding, f"It is {_DONE}"),), ()
 
 
 def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
@@ -112,20 +96,17 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     and a shift has to halve what is left at least: on real flights whose clocks agree, drag and damping explain the
     torque as well with any shift. Yaw says nothing, because rotors that speed up turn the vehicle ahead of their drag.
 
-    Returns
-    -------
-    ChannelRepair or None
-        None where nothing is wrong, or nobody knows.
+    None where nothing is wrong, or nobody knows.
     """
-    told = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
-    if len(told) < _FEWEST_SHIFTS:
+    found = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
+    if len(found) < _FEWEST_SHIFTS:
         return None
-    delay = float(np.median(told))
-    if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
+    delay = float(np.median(found))
+    if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(found) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
     what = f"the rotor speeds are {off_clock(delay)}, judged by the gyroscope"
     finding = _late(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
-    return ChannelRepair("rotor_speed", delay_s=delay).told(finding, f"They are {_DONE}")
+    return ChannelRepair("rotor_speed", delay_s=delay).with_finding(finding, f"They are {_DONE}")
 
 
 def _late(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
@@ -159,7 +140,7 @@ class _Half:
 
 
 def _halves(flights: Sequence[Signals], windows: Windows) -> Iterator[_Half]:
-    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, tell nothing."""
+    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, are left out."""
     for signals in flights:
         if signals.rotor_speed is None or signals.commanded:
             continue

@@ -1,4 +1,4 @@
-"""What a check finds: what is wrong with a log, how much, what mends it, and whether a verdict can stand beside it."""
+"""What a check finds: what is wrong with a log, how much, what mends it, and whether it rules out a verdict."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,34 +14,18 @@ _CONSTANTS = {"vehicle", "vehicle.rotor_speed_max_rad_s"}
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong with a log, or with what the config says of its vehicle.
+    """Something that is wrong with a log, or with what the config says of its vehicle."""
 
-    Attributes
-    ----------
-    what : str
-        Who says so and what is wrong, with its numbers; begins small, to stand behind the name of a flight.
-    remedy : str
-        What would mend it: keys of the config, or a part of the log.
-    channels : tuple of str
-        What was held against each other.
-    size : float
-        Of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
-    unit : str
-        Of the size; empty for a ratio.
-    contradiction : bool
-        Whether no verdict can stand beside it: a unit, an axis or a sign is wrong. What is late, noisy or a little off
-        is fitted, repaired or told, and spoils no verdict.
-    repairable : bool
-        Whether `cpfls gap` sets it right before it looks at the model.
-    """
-
-    what: str
-    remedy: str
-    channels: tuple[str, ...]
+    what: str  # Who says so and what is wrong, with its numbers; begins small, to follow the name of a flight.
+    remedy: str  # What would mend it: keys of the config, or a part of the log.
+    channels: tuple[str, ...]  # What was held against each other.
+    # Of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
     size: float = float("nan")
-    unit: str = ""
+    unit: str = ""  # Of the size; empty for a ratio.
+    # Whether it rules out a verdict: a unit, an axis or a sign is wrong. What is delayed, noisy or a little off is
+    # fitted, repaired or reported, and spoils no verdict.
     contradiction: bool = True
-    repairable: bool = False
+    repairable: bool = False  # Whether `cpfls gap` sets it right before it looks at the model.
 
     @property
     def of_constants(self) -> bool:
@@ -50,7 +34,7 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """What is wrong and what would mend it, to stand behind the name of a flight."""
+        """What is wrong and what would mend it, to follow the name of a flight."""
         return f"{self.what}: {self.remedy}"
 
     def of(self, flight: str) -> Self:
@@ -95,7 +79,7 @@ class AuditFinding:
 
 
 def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Give the sentences of the findings that no verdict can stand beside."""
+    """Give the sentences of the findings that rule out a verdict."""
     return tuple(finding.sentence for finding in findings if finding.contradiction)
 
 

@@ -21,13 +21,12 @@ from cpfls_cli.weak_form.windows import Windows
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-FEWEST_BLOCKS = 7
-"""Blocks below which a jackknife says too little about significance of one in a thousand."""
+FEWEST_BLOCKS = 7  # Blocks below which a jackknife says too little about significance of one in a thousand.
 # Short flights are cut into so many blocks, but into none that knows its neighbour.
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
 # A coarse delay that Gauss-Newton steps refine, and how many: the last one changes nothing.
 _SCAN_STEP_S, _ROUNDS = 0.005, 4
-# A rate about an axis counts as excited from this multiple of the variance of what is left; below it, noise of the
+# A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
@@ -40,22 +39,15 @@ class Kinematics:
     """Windows of one flight, ``d/dt r = 1/2 (r0 omega + r x omega)`` with r relative to the middle of the window.
 
     The equation keeps its form under any fixed rotation of r, so noise of the middle sample does not enter.
-
-    Attributes
-    ----------
-    rate : array, shape (window, 3), rad/s
-        Averages of the rate that the attitude shows, body axes at the middle of the window; nothing is differentiated.
-    turning : array, shape (window, sample, 3, 3)
-        ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
-    time : array, shape (window, sample), s
-    gyro : CubicSpline
-        Body rate over time; through smooth windows its interpolation error is nothing.
     """
 
+    # Shape (window, 3), rad/s: averages of the rate that the attitude shows, body axes at the middle of the window;
+    # nothing is differentiated.
     rate: Array
+    # Shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
     turning: Array
-    time: Array
-    gyro: "CubicSpline"
+    time: Array  # Shape (window, sample), s.
+    gyro: "CubicSpline"  # Body rate over time; through smooth windows its interpolation error is nothing.
 
     @property
     def centres(self) -> Array:
@@ -75,16 +67,7 @@ class Kinematics:
     def products(self, delay: float, order: int = 0) -> Array:
         """Average each reading, put on each axis; the columns of a matrix on the gyroscope.
 
-        Parameters
-        ----------
-        delay : float
-            s.
-        order : int
-            1 for the derivative of the reading.
-
-        Returns
-        -------
-        array, shape (window, 3, to, from), rad/s or rad/s^2
+        `delay`: s; `order`: 1 for the derivative of the reading; Result: shape (window, 3, to, from), rad/s or rad/s^2.
         """
         turning = np.moveaxis(self.turning, 1, 3)
         averages = turning.reshape(len(turning), 9, -1) @ self.gyro(self.time + delay, order)
@@ -129,25 +112,13 @@ def _relative(turned: Array) -> Array:
 
 @dataclass(frozen=True)
 class DelayScan:
-    """The delay at which the readings as they are fit best.
+    """The delay at which the readings as they are fit best."""
 
-    Attributes
-    ----------
-    delay : float
-        Positive where the gyroscope is late, s, on a coarse grid.
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    excited : array of bool, shape (3,)
-        Axes that turn enough to tell a scale.
-    seen, read : array, shape (window, 3), rad/s
-        Averages of the rate by the attitude, and by the gyroscope at that delay.
-    """
-
-    delay: float
-    variance: Array
-    excited: BoolArray
-    seen: Array
-    read: Array
+    delay: float  # Positive where the gyroscope is late, s, on a coarse grid.
+    variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
+    excited: BoolArray  # Shape (3,): axes that turn enough to identify a scale.
+    seen: Array  # Shape (window, 3), rad/s: averages of the rate by the attitude.
+    read: Array  # Shape (window, 3), rad/s: the same by the gyroscope at that delay.
 
 
 def scan(flights: Sequence[Kinematics]) -> DelayScan:
@@ -183,34 +154,18 @@ def _precision(read: Array) -> Array:
 
 @dataclass(frozen=True)
 class GyroFit:
-    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
+    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated."""
 
-    Attributes
-    ----------
-    value : array, shape (13,)
-        Bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
-        misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
-    error : array, shape (13,)
-        Standard errors by the jackknife over blocks.
-    pull : array, shape (13,)
-        How far noise of the gyroscope can have pulled the value at most.
-    known : array of bool, shape (13,)
-        What the motion could tell.
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    flight_bias : array, shape (flight, 3), rad/s
-        Bias of each flight less that of all.
-    flight_bias_error : array, shape (flight, 3), rad/s
-    """
-
+    # Shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
+    # misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
     value: Array
-    error: Array
-    pull: Array
-    known: BoolArray
+    error: Array  # Shape (13,): standard errors by the jackknife over blocks.
+    pull: Array  # Shape (13,): how far noise of the gyroscope can have pulled the value at most.
+    known: BoolArray  # Shape (13,): what the motion identifies.
     blocks: int
-    variance: Array
-    flight_bias: Array
-    flight_bias_error: Array
+    variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
+    flight_bias: Array  # Shape (flight, 3), rad/s: bias of each flight less that of all.
+    flight_bias_error: Array  # Shape (flight, 3), rad/s.
 
     def of(self, name: str) -> FaultFit:
         """Select the numbers of one kind of fault: bias, scale, misalignment or delay."""
@@ -225,14 +180,8 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
 
-    Returns
-    -------
-    GyroFit or None
-        None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
-
-    References
-    ----------
-    Frisch 1934 (bounds of regression with noise on both sides).
+    None where there are too few blocks. Nothing is known where only some of them rotate.
+    Reference: Frisch 1934 (bounds of regression with noise on both sides).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     whole = sum(float(np.ptp(flight.centres)) for flight in flights)

@@ -1,6 +1,6 @@
 """Which channel of the motion is wrong where two contradict each other, by majority; it is set right or left out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
@@ -30,47 +30,34 @@ from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 from cpfls_cli.words import joined
 
-# Channels that are mended one after the other: there are no more.
-_ROUNDS = 3
+_ROUNDS = 3  # Channels that are mended one after the other: there are no more.
 # Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
 _PARTS, _PARTS_SIGMAS = 16, 4.0
-# Below this a vehicle hovers, and noise points anywhere.
-_MOVES_M_S2 = 0.1
+_MOVES_M_S2 = 0.1  # Below this a vehicle hovers, and noise points anywhere.
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _ONE_PLANE, _NOT_ONE_PLANE, _REVERSED = 0.8, 0.5, 0.6
-# Logarithms: of a size that is no unit, and of what a unit may be off by beside a sensor and beside the thrust.
+# Logarithms: of a size that is no unit, and of what a unit may be off by against a sensor and against the thrust.
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
-# Share of a channel that other axes have to explain.
-_EXPLAINED = 0.8
-# Growth of what is left between two channels from which on a repair sets them apart; noise and a shift make less.
+_EXPLAINED = 0.8  # Share of a channel that other axes have to explain.
+# Growth of the residual between two channels from which on a repair sets them apart; noise and a shift make less.
 _APART = 1.2
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 _DONE = "It is corrected before the balance"
 
-_Read = tuple[ChannelRepair, tuple[str, ...]]
-"""A way to read a channel, and the mistakes that it takes."""
+_Read = tuple[ChannelRepair, tuple[str, ...]]  # A way to read a channel, and the mistakes that it takes.
 
 
 @dataclass(frozen=True)
 class Settled:
-    """What a majority of the channels decides.
-
-    Attributes
-    ----------
-    checks : tuple of PairCheck
-        Of the repaired flights.
-    against_thrust : Finding or None
-        That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
-    dropped : tuple of Finding
-        Of repairs that another channel contradicts, so that nothing is done.
-    """
+    """What a majority of the channels decides."""
 
     repairs: tuple[ChannelRepair, ...]
-    checks: tuple[PairCheck, ...]
+    checks: tuple[PairCheck, ...]  # Of the repaired flights.
+    # That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
     against_thrust: Finding | None = None
-    dropped: tuple[Finding, ...] = ()
+    dropped: tuple[Finding, ...] = ()  # Of repairs that another channel contradicts, so that nothing is done.
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -113,10 +100,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     one that agrees with fewest, is read in the ways that logs are usually wrong (unit, gravity, axes, clock). It is
     mended if it then contradicts nothing, and left out if nothing mends it and two others are against it.
 
-    Parameters
-    ----------
-    flights : sequence of Signals
-        With the sampling period of the windows, and a late attitude set right.
+    `flights`: with the sampling period of the windows, and a late attitude set right.
     """
     repairs: tuple[ChannelRepair, ...] = ()
     dropped: tuple[Finding, ...] = ()
@@ -137,13 +121,16 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
-    """Tell of a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
+    """Name a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
     against = by_thrust(checks)
     if not against or any(len(check.first) < FEWEST_WINDOWS for check in against):
         return None
     moved = [CHANNELS[check.pair.second].words for check in against]
     who, held = " and ".join(moved), ("thrust of the rotors", "attitude", *moved)
-    if all(_reversed_along_z(check) for check in against):
+    up = [(check.first[:, 2], check.second[:, 2]) for check in against]
+    if all(
+        min(one.std(), other.std()) > _MOVES_M_S2 and np.corrcoef(one, other)[0, 1] < -_REVERSED for one, other in up
+    ):
         what = f"along z, the thrust of the rotors is opposite to {who}"
         return Finding(what, "check import.world_frame and import.body_frame", held)
     turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
@@ -165,12 +152,6 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
             held,
         )
     return None
-
-
-def _reversed_along_z(check: PairCheck) -> bool:
-    first, second = check.first[:, 2], check.second[:, 2]
-    moves = min(first.std(), second.std()) > _MOVES_M_S2
-    return bool(moves and np.corrcoef(first, second)[0, 1] < -_REVERSED)
 
 
 def _about_the_vertical(check: PairCheck) -> tuple[complex, complex]:
@@ -196,7 +177,7 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
             dropped.append(_contradicted(now, *read, witnesses, opposed))
         elif read is not None and (sure or read[0].is_mistake):
             return _told(now, *read, witnesses), ()
-        elif read is not None and _nearer_the_thrust(now, read[0]):
+        elif read is not None and _changed_to_thrust(now, read[0], lambda before, after: _surely_less(after, before)):
             return _told(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
         # Noise on both sides can look like one contradiction, not like two.
         elif sure and read is None and len(set(witnesses)) > 1:
@@ -241,16 +222,16 @@ def _read_rightly(now: _Compared, channel: str) -> _Read | None:
 
 
 def _surely_less(after: Array, before: Array) -> bool:
-    """Tell whether squares are less by more than their scatter along the flights."""
+    """Check whether squares are less by more than their scatter along the flights."""
     parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
     return bool(parts.mean() > _PARTS_SIGMAS * mean_error(parts))
 
 
-def _nearer_the_thrust(now: _Compared, repair: ChannelRepair) -> bool:
-    """Tell whether a repair surely brings a channel nearer to what the thrust does: the third clock and frame."""
+def _changed_to_thrust(now: _Compared, repair: ChannelRepair, judge: Callable[[Array, Array], bool]) -> bool:
+    """Judge squares of a channel against the thrust, the third clock and frame, before and after a repair."""
     repaired = now.repaired(*now.with_position(repair))
     before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, repaired))
-    return before is not None and after is not None and _surely_less(after, before)
+    return before is not None and after is not None and judge(before, after)
 
 
 def _opposed(now: _Compared, repair: ChannelRepair) -> tuple[str, ...]:
@@ -261,9 +242,7 @@ def _opposed(now: _Compared, repair: ChannelRepair) -> tuple[str, ...]:
         return (CHANNELS["position"].words,)
     if any(signals.commanded for signals in now.flights):
         return ()
-    before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, now.repaired(*along)))
-    farther = before is not None and after is not None and _surely_farther(before, after)
-    return (CHANNELS["thrust"].words,) if farther else ()
+    return (CHANNELS["thrust"].words,) if _changed_to_thrust(now, repair, _surely_farther) else ()
 
 
 def _surely_farther(before: Array, after: Array) -> bool:
@@ -326,7 +305,7 @@ def _tuned(now: _Compared, repair: ChannelRepair, what: tuple[str, ...]) -> _Rea
         if abs(repair.delay_s) > LATEST_S:
             # What does not move together has no delay, and a fit of one runs away.
             return None
-        # Noise shrinks what is left of a delay, so a second look is worth it.
+        # Noise shrinks an estimate of a delay, so it is repeated.
         repair, _ = _with_delay(repair, _clearest(now.checked(repair)))
     against = now.checked(repair)
     # An accelerometer hardly moves in a gentle flight; what it shows of gravity is agreement enough.
@@ -367,7 +346,7 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Read:
         return repair, ()
     size = float(np.sqrt(squares[0] / squares[1]))
     correlation = abs(float((should * reading).sum())) / np.sqrt(squares[0] * squares[1] + TINY)
-    # Noise on one side makes its size too large, by no more than the correlation tells.
+    # Noise on one side makes its size too large, by no more than the correlation allows.
     error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(float(np.clip(correlation, 0.1, 1.0)))
     if abs(np.log(size)) < max(error, _SAME_UNIT):
         return repair, ()
@@ -402,27 +381,18 @@ def _told(
     who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        _remedy(repair),
+        "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
+        if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body
+        else f"correct the log, or {channel.keys}",
         (channel.words, *witnesses),
         contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
     )
-    return (first.told(finding, _DONE), *others)
-
-
-def _remedy(repair: ChannelRepair) -> str:
-    """Say what mends a channel; no key takes gravity from an acceleration of the world."""
-    if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body:
-        return "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
-    return f"correct the log, or {CHANNELS[repair.channel].keys}"
+    return (first.with_finding(finding, _DONE), *others)
 
 
 def _contradicted(
-    now: _Compared,
-    repair: ChannelRepair,
-    what: Sequence[str],
-    witnesses: Sequence[str],
-    opposed: Sequence[str],
+    now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], opposed: Sequence[str]
 ) -> Finding:
     channel = CHANNELS[repair.channel]
     clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []
@@ -437,7 +407,7 @@ def _contradicted(
 
 
 def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
-    """Tell whether more than a delay or a small scale is wrong with a channel: in a hover a few ms look like axes."""
+    """Check whether more than a delay or a small scale is wrong with a channel: in a hover a few ms look like axes."""
     return any(problem.contradiction for check in checks if channel in check.pair for problem in check.problems)
 
 
@@ -451,4 +421,4 @@ def _left_out(now: _Compared, name: str, witnesses: Sequence[str]) -> ChannelRep
         contradiction=_grave(name, now.checks),
         repairable=True,
     )
-    return ChannelRepair(name, dropped=True).told(finding, f"It is left out: {channel.without}")
+    return ChannelRepair(name, dropped=True).with_finding(finding, f"It is left out: {channel.without}")

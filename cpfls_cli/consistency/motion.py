@@ -30,41 +30,25 @@ ANOTHER_NORTH = np.radians(20.0)
 
 # Share of what moves in both that agreement asks for, and the ratio within which scales of axes are one.
 _SHARED, _ONE_SCALE = 0.5, 1.05
+# Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that identifies it.
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
-"""Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
-
-LATEST_S = 0.3
-"""Longest delay of an estimator or of telemetry."""
-
+LATEST_S = 0.3  # Longest delay of an estimator or of telemetry.
 _COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
 """Share of a turn that a delay could be, share of what a delay leaves that a turn has to leave at most, and delays that
 are tried from one window to the next."""
 
 _QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _UP = np.array([0.0, 0.0, 1.0])
-TINY = 1e-100
-"""Square of what does not move."""
+TINY = 1e-100  # Square of what does not move.
 
 
 class MotionChannel(NamedTuple):
-    """A channel of the motion.
+    """A channel of the motion."""
 
-    Attributes
-    ----------
-    words : str
-        What it is called.
-    keys : str
-        What of the config says how it is read.
-    units : mapping of str to float
-        Units that logs hold it in by mistake, in SI.
-    without : str
-        What follows where it is left out; empty for one that is never mended or left out.
-    """
-
-    words: str
-    keys: str
-    units: Mapping[str, float] = {}
-    without: str = ""
+    words: str  # What it is called.
+    keys: str  # What of the config says how it is read.
+    units: Mapping[str, float] = {}  # Units that logs hold it in by mistake, in SI.
+    without: str = ""  # What follows where it is left out; empty for one that is never mended or left out.
 
 
 _ACCELERATIONS = {
@@ -77,9 +61,7 @@ _ACCELERATIONS = {
 _NO_FORCE = "the force is taken from other channels, if there are any"
 CHANNELS = {
     "position": MotionChannel(
-        "position",
-        "import.signals.position",
-        {"mm": 0.001, "cm": 0.01, "ft": 0.3048, "m where mm is stated": 1000.0},
+        "position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048, "m where mm is stated": 1000.0}
     ),
     "velocity": MotionChannel(
         "velocity",
@@ -108,7 +90,7 @@ class Sure(NamedTuple):
     error: float
 
     def beyond(self, size: float) -> bool:
-        """Tell whether it is surely not zero, and larger than a size."""
+        """Check whether it is surely not zero, and larger than a size."""
         return abs(self.value) > max(size, _JACKKNIFE_SIGMAS * self.error)
 
 
@@ -142,36 +124,18 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True)
 class PairCheck:
-    """Two channels held against each other.
-
-    Attributes
-    ----------
-    first, second : array, shape (window, 3)
-        What should be the same.
-    scale, r2 : array, shape (3,)
-        Of the second against the first along each axis, and the share of what moves in both.
-    delay : Sure
-        Of the second against the first, s.
-    turn : Sure
-        Of the second against the first about the vertical, rad.
-    hop_s : float
-        From one window to the next, s.
-    problems : tuple of Finding
-        What is wrong between the two; empty where nothing is.
-    agrees : bool
-        Whether what moves moves together.
-    """
+    """Two channels held against each other."""
 
     pair: Pair
-    first: Array
-    second: Array
-    scale: Array
-    r2: Array
-    delay: Sure
-    turn: Sure
-    hop_s: float
-    problems: tuple[Finding, ...] = field(default=())
-    agrees: bool = False
+    first: Array  # Shape (window, 3): what should be the same.
+    second: Array  # Alike.
+    scale: Array  # Shape (3,): of the second against the first along each axis.
+    r2: Array  # Shape (3,): share of what moves in both.
+    delay: Sure  # Of the second against the first, s.
+    turn: Sure  # Of the second against the first about the vertical, rad.
+    hop_s: float  # From one window to the next, s.
+    problems: tuple[Finding, ...] = field(default=())  # What is wrong between the two; empty where nothing is.
+    agrees: bool = False  # Whether what moves moves together.
 
     @property
     def moving(self) -> BoolArray:
@@ -198,16 +162,13 @@ _PAIRS = (
 def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = None) -> tuple[PairCheck, ...]:
     """Compare channels with the derivatives of others.
 
-    Parameters
-    ----------
-    channel : str or None
-        The one that is compared with the others; None for all pairs.
+    `channel`: the one that is compared with the others; None for all pairs.
     """
     pairs = [pair for pair in _PAIRS if channel is None or channel in pair]
     return tuple(check for pair in pairs if (check := _checked(pair, flights, windows)) is not None)
 
 
-def beside_lean(part: Signals) -> Iterator[Finding]:
+def against_lean(part: Signals) -> Iterator[Finding]:
     """Say which of position and velocity no lean makes of gravity in their unit, where the lean explains them."""
     from scipy.spatial.transform import Rotation
 
@@ -312,7 +273,7 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
 
 
 def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
-    """Fit the turn of one about the vertical against the other, beside what is late of it; a jackknife over blocks.
+    """Fit the turn of one about the vertical against the other, jointly with its delay; a jackknife over blocks.
 
     In a steady circle what is late is turned: where most of a turn could be a delay, nothing is known of it.
     """
@@ -389,7 +350,7 @@ def _correlation(first: Array, second: Array) -> float:
 
 
 def _is_turned(check: PairCheck) -> bool:
-    """Tell whether a turn about the vertical leaves less between two than any delay does."""
+    """Check whether a turn about the vertical leaves less between two than any delay does."""
     plane = np.array([0, 1])
     if not check.visible[plane].all() or not check.turn.beyond(TURNED_RAD):
         return False

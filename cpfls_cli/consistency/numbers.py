@@ -13,11 +13,8 @@ _TOO_WIDE = 5.0
 """A frame may be wider than its rotors, and a paper may round; a slipped digit or g cm^2 is more than that."""
 
 _INERTIAS = ("inertia_x", "inertia_y", "inertia_z")
-_REVERSED = 0.005
-"""Ratio below which a torque has the wrong sign, or belongs to another axis."""
-
-_ALIKE = 0.3
-"""Largest logarithm of a ratio of two numbers that one mistake makes wrong."""
+_REVERSED = 0.005  # Ratio below which a torque has the wrong sign, or belongs to another axis.
+_ALIKE = 0.3  # Largest logarithm of a ratio of two numbers that one mistake makes wrong.
 
 
 def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
@@ -34,11 +31,11 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
             "check it, vehicle.mass_kg and position_m of vehicle.rotors",
             ("vehicle",),
             stated[name] * _TOO_WIDE / limit,
-            # The motion tells it: a fit finds another.
+            # The motion identifies it: a fit finds another.
             contradiction=False,
         )
         for name, limit in limits.items()
-        # Rotors that stand for others, all in one place, tell no size.
+        # Rotors that replace others, all in one place, have no size.
         if limit > 0
     )
 
@@ -46,10 +43,7 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
 def impossible(off: Mapping[str, float]) -> tuple[Finding, ...]:
     """Say of numbers of the vehicle that a fit asks for and no vehicle has what makes them so: the log is wrong.
 
-    Parameters
-    ----------
-    off : mapping of str to float
-        Their ratios to the config.
+    `off`: their ratios to the config.
     """
     return tuple(
         Finding(

@@ -22,13 +22,7 @@ _SCALED = 0.1
 
 @dataclass(frozen=True)
 class ChannelRepair:
-    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
-
-    Attributes
-    ----------
-    finding : Finding or None
-        The same as the sentence, where nothing is done about it.
-    """
+    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing."""
 
     channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")
     dropped: bool = about("1 where it is left out, and nothing else counts", default=False)
@@ -42,9 +36,9 @@ class ChannelRepair:
     sentence: str = about(
         "what is wrong, what shows it, and what to correct; empty for a channel that goes with another", default=""
     )
-    finding: Finding | None = None
+    finding: Finding | None = None  # The same as the sentence, where nothing is done about it.
 
-    def told(self, finding: Finding, done: str) -> Self:
+    def with_finding(self, finding: Finding, done: str) -> Self:
         """Say what is wrong, and what is done about it."""
         return replace(self, finding=finding, sentence=f"{capitalised(finding.what)}. {done}; {finding.remedy}.")
 
@@ -91,7 +85,7 @@ def accelerated(signals: Signals) -> Array | None:
 
 
 def is_derived(signals: Signals) -> bool:
-    """Tell whether the acceleration was made of what the accelerometer senses, and is no channel of its own."""
+    """Check whether the acceleration was made of what the accelerometer senses, and is no channel of its own."""
     made = accelerated(signals)
     if made is None or signals.acceleration is None:
         return False

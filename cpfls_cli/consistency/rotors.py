@@ -18,29 +18,16 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room_between, thrust_number
 _THRUST_TO_WEIGHT = 5.0
 """Thrust over weight, or the reverse, that no flight keeps up; a wrong unit or a slipped digit is farther off."""
 
-_CARRIES = 2.0
-"""Thrust over weight, or the reverse, that a flight has on average where unit and factors are right."""
-
-_FEWEST_ROTORS = 3
-"""Of fewer, propellers may be small."""
-
+_CARRIES = 2.0  # Thrust over weight, or the reverse, that a flight has on average where unit and factors are right.
+_FEWEST_ROTORS = 3  # Of fewer, propellers may be small.
 _SPEEDS = {"rad/s": 1.0, "rpm": pi / 30, "Hz": 2 * pi}
-
 _ABOVE_THE_LIMIT = 1.5
 """Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least."""
 
-_LIFTS = 1.25
-"""Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to."""
-
-IDLE = 0.5
-"""Share of the largest thrust below which rotors idle."""
-
-_TYPICAL = 0.03
-"""Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05."""
-
-_LEANS = 0.03
-"""Spread of roll and pitch in rad that no vehicle has that stands."""
-
+_LIFTS = 1.25  # Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to.
+IDLE = 0.5  # Share of the largest thrust below which rotors idle.
+_TYPICAL = 0.03  # Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05.
+_LEANS = 0.03  # Spread of roll and pitch in rad that no vehicle at rest has.
 _REMEDY = (
     "check the unit of import.signals.rotor_speed (or of rotor_command, and vehicle.rotor_speed_max_rad_s), "
     "vehicle.mass_kg, vehicle.gravity_m_s2 and thrust_factor_n_s2 of vehicle.rotors"
@@ -64,7 +51,7 @@ def too_fast(parts: Sequence[Signals]) -> Finding | None:
 def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
     """Say where no propellers that fit between the hubs carry the mass at the measured speeds.
 
-    Only where the thrust factor is a guess: one that carries the weight bears witness for the speeds. Rotors that idle
+    Only where the thrust factor is a guess: one that carries the weight confirms the speeds. Rotors that idle
     on the ground lift nothing, so slow ones contradict only flights that lean; of fewer than three any may be small.
     """
     vehicle = parts[0].vehicle
@@ -115,19 +102,11 @@ class MeantUnit(NamedTuple):
 
 
 def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, declared: str) -> MeantUnit | None:
-    """Tell in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
+    """Find in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
 
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-        As read in the unit that is declared.
-    attitude : array, shape (time, 3), rad, or None
-        Slow rotors may idle on the ground where it does not lean.
-
-    Returns
-    -------
-    MeantUnit or None
-        None where they may be right, or no other unit makes them so.
+    `speed`, shape (time, rotor), rad/s: as read in the unit that is declared.
+    `attitude`, shape (time, 3), rad: slow rotors may idle on the ground where it does not lean.
+    None where they may be right, or no other unit makes them so.
     """
     turning, guessed = _turning(speed), "thrust_factor" in vehicle.unknown
     if len(vehicle.rotors) < _FEWEST_ROTORS or speed.shape[1] != len(vehicle.rotors) or not turning.any():
@@ -151,7 +130,7 @@ def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, d
     return None if unit is None else MeantUnit(unit, read[unit], lifts)
 
 
-def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
+def thrust_against_weight(parts: Sequence[Signals]) -> Finding | None:
     """Say how the thrust lies to the weight where no flight has it so; nothing where a guess states it."""
     vehicle = parts[0].vehicle
     if "thrust_factor" in vehicle.unknown:
@@ -169,13 +148,13 @@ def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
     return Finding(f"the thrust of the rotors is {size:.3g} {words}", _REMEDY, ("rotors", "vehicle"), size)
 
 
-def tells_thrust(parts: Sequence[Signals]) -> bool:
-    """Tell whether the size of the thrust says anything."""
-    return "thrust_factor" not in parts[0].vehicle.unknown and thrust_beside_weight(parts) is None
+def thrust_is_known(parts: Sequence[Signals]) -> bool:
+    """Check whether the size of the thrust says anything."""
+    return "thrust_factor" not in parts[0].vehicle.unknown and thrust_against_weight(parts) is None
 
 
 def weighed(part: Signals) -> Signals:
-    """Scale thrust to the weight where its size says nothing, so that its direction still bears witness."""
+    """Scale thrust to the weight where its size says nothing, so that its direction still counts."""
     if part.rotor_speed is None or part.thrust is None or not part.thrust.any():
         return part
     scale = part.vehicle.mass_kg * part.vehicle.gravity_m_s2 / float(part.thrust.mean())
@@ -194,7 +173,7 @@ def lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Finding | Non
     given, taken = (part[:, 2] + vehicle.gravity_m_s2 for part in (against[0].first, against[0].second))
     most = given.max()
     if most < vehicle.gravity_m_s2 / _THRUST_TO_WEIGHT:
-        # On the ground, or told already.
+        # On the ground, or reported already.
         return None
     flown = given > IDLE * most
     share = float(given[flown].mean() / taken[flown].mean())
@@ -210,7 +189,7 @@ def misplaced(parts: Sequence[Signals]) -> Finding | None:
     Of several flights or stretches one that says so clearly is enough; else the longest is asked.
     """
     found = [(part, _misplaced(part)) for part in sorted(parts, key=len, reverse=True)]
-    clear = (told for _, told in found if told is not None and told.contradiction)
+    clear = (own for _, own in found if own is not None and own.contradiction)
     return next(clear, found[0][1])
 
 
@@ -220,12 +199,12 @@ def _misplaced(part: Signals) -> Finding | None:
     moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
     if moved is None or not moved.by_axes:
         return None
-    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
+    moving = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
     stated = [(place_of(each.position_m[:2]), each.spin) for each in part.vehicle.rotors]
-    # Of rotors that are stated as no X or plus such as it tells of, the motion says nothing.
-    if told == stated or {name for name, _ in told} != {name for name, _ in stated}:
+    # Of rotors that are stated as another X or plus the motion says nothing.
+    if moving == stated or {name for name, _ in moving} != {name for name, _ in stated}:
         return None
-    places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
+    places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in moving)
     shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
     return Finding(
         f"judged by the motion, the rotors are, in the order of their columns: {places} (which explains {shares} of "

@@ -16,7 +16,7 @@ from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
 from cpfls_cli.consistency.repairs import ChannelRepair
-from cpfls_cli.consistency.rotors import tells_thrust, weighed
+from cpfls_cli.consistency.rotors import thrust_is_known, weighed
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
@@ -28,7 +28,7 @@ from cpfls_cli.words import joined
 # Largest probability of chance, after Holm over all that is tested: an audit that cries wolf is not read.
 _SIGNIFICANCE = 1e-3
 # Share of the size that matters which must be exceeded significantly: a jackknife over two dozen blocks has heavier
-# tails than Student's t where few of them tell, and what it then calls significant is small.
+# tails than Student's t where few of them are informative, and what it then calls significant is small.
 _SHARE_EXCEEDED = 0.5
 
 
@@ -54,16 +54,9 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
     """Test faults of sensors.
 
     A number is named when its size matters, and Student's t of what exceeds the possible pull of noise and half of
-    that size stays significant after Holm's correction over all numbers that the motion can tell.
+    that size stays significant after Holm's correction over all numbers that the motion identifies.
 
-    Parameters
-    ----------
-    period : float
-        Sampling period, s.
-
-    References
-    ----------
-    Holm 1979.
+    `period`: sampling period, s. Reference: Holm 1979.
     """
     known_faults = [fault for fault in faults if fault.fit.known.any()]
     if not known_faults:
@@ -120,32 +113,22 @@ _SLOWER, _FILTERED_FROM, _NEARER = (8, 4), 0.05, 0.7
 """Times the usual length of windows in which the motion is slow; the logarithm of a ratio of sizes that is looked at,
 and the share of it that a filter leaves there at most: an error of scale leaves all."""
 
-_FILTERED = "its size beside the attitude nears 1 in slow motion, so one of the two is behind a filter"
+_FILTERED = "its size against the attitude nears 1 in slow motion, so one of the two is behind a filter"
 _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
 @dataclass(frozen=True)
 class Gyroscope:
-    """The gyroscope held against the attitude.
+    """The gyroscope held against the attitude."""
 
-    Attributes
-    ----------
-    faults : tuple of CheckedFault
-        What can be told.
-    untested : mapping of str to str
-        Faults that cannot, with the reason.
-    apart : tuple of Finding
-        That the two do not show one motion in one unit.
-    """
-
-    faults: tuple[CheckedFault, ...] = ()
-    untested: Mapping[str, str] = field(default_factory=dict)
+    faults: tuple[CheckedFault, ...] = ()  # What is identified.
+    untested: Mapping[str, str] = field(default_factory=dict)  # Faults that cannot, with the reason.
     fit: GyroFit | None = None
-    apart: tuple[Finding, ...] = ()
+    apart: tuple[Finding, ...] = ()  # That the two do not show one motion in one unit.
 
     @classmethod
     def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Self:
-        """Say why none of its faults can be told."""
+        """Say why none of its faults is identified."""
         return cls(untested=dict.fromkeys(_of_gyroscope(), reason), apart=apart)
 
     def late(self, windows: Windows) -> AuditFinding | None:
@@ -155,39 +138,23 @@ class Gyroscope:
 
     def findings(self, windows: Windows) -> tuple[Finding, ...]:
         """Say what is wrong with the gyroscope, far beyond what sensors of multirotors show."""
-        told = findings(self.faults, windows.period)
+        found = findings(self.faults, windows.period)
         if self.apart:
-            scaled = any(each.named and _estimate(each.name) == "scale" for each in told)
+            scaled = any(each.named and _estimate(each.name) == "scale" for each in found)
             return tuple(replace(each, repairable=scaled) for each in self.apart)
-        return tuple(gross for each in told if (gross := _gross(each)) is not None)
+        return tuple(gross for each in found if (gross := _gross(each)) is not None)
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the sensors of flights say of each other.
+    """What the sensors of flights say of each other."""
 
-    Attributes
-    ----------
-    gyroscope : Gyroscope
-        Once a late attitude is set right.
-    clocks : tuple of ChannelRepair
-        What sets a late attitude and late rotors right.
-    notes : tuple of str
-        What nobody knows of a clock.
-    flights : tuple of Signals
-        On one clock.
-    motion : Settled
-        What a majority says of the channels of the motion.
-    findings : tuple of Finding
-        What is wrong.
-    """
-
-    gyroscope: Gyroscope
-    clocks: tuple[ChannelRepair, ...]
-    notes: tuple[str, ...]
-    flights: tuple[Signals, ...]
-    motion: Settled
-    findings: tuple[Finding, ...]
+    gyroscope: Gyroscope  # Once a late attitude is set right.
+    clocks: tuple[ChannelRepair, ...]  # What sets a late attitude and late rotors right.
+    notes: tuple[str, ...]  # What nobody knows of a clock.
+    flights: tuple[Signals, ...]  # On one clock.
+    motion: Settled  # What a majority says of the channels of the motion.
+    findings: tuple[Finding, ...]  # What is wrong.
 
 
 def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
@@ -203,8 +170,7 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     if rotors is not None:
         own, flights, doubted = _uncontradicted((rotors,), flights, windows)
         clocks, dropped = (*clocks, *own), (*dropped, *doubted)
-    told = tells_thrust(flights)
-    motion = settled(flights if told else [weighed(signals) for signals in flights], windows)
+    motion = settled(flights if thrust_is_known(flights) else [weighed(signals) for signals in flights], windows)
     mended = [repair.finding for repair in clocks if repair.finding is not None]
     wrong = (*gyroscope.findings(windows), *mended, *dropped, *motion.findings)
     return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
@@ -221,10 +187,10 @@ def _uncontradicted(
     if not apart:
         return clocks, repaired, ()
     why = f", which {joined(apart)} contradict, so nothing is corrected"
-    told = (repair.finding for repair in clocks if repair.finding is not None)
+    wrong = (repair.finding for repair in clocks if repair.finding is not None)
     dropped = (
         replace(each, what=f"{each.what}{why}", remedy=f"check the clocks of {joined(each.channels)}", repairable=False)
-        for each in told
+        for each in wrong
     )
     return (), flights, tuple(dropped)
 
@@ -288,7 +254,7 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
 
 
 def _is_filtered(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> bool:
-    """Tell whether gyroscope and attitude differ in size as a filter of one makes them: in fast motion alone."""
+    """Check whether gyroscope and attitude differ in size as a filter of one makes them: in fast motion alone."""
     gain = _gains(scanned)
     off = (np.abs(gain) > _FILTERED_FROM) & (scanned.seen.std(axis=0) > TURNING_RAD_S)
     if not off.any():

@@ -1,7 +1,5 @@
 """Actuation that comes late: filtered or shifted, with the change of wrench that follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -11,8 +9,7 @@ from cpfls_cli.filters import SecondOrder
 from cpfls_cli.lag import delayed
 from cpfls_cli.vehicle.stepping import Memory, RotorMotion
 
-_HIGHEST = 0.45
-"""Frequency of a filter over that of the sampling, above which it is taken to be there."""
+_HIGHEST = 0.45  # Frequency of a filter over that of the sampling, above which it is taken to be there.
 
 
 def second_order(frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:
@@ -23,10 +20,7 @@ def second_order(frequency: float, damping: float, period: float, upper: tuple[f
 def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
     """Change the rotor speeds, or the stated torque and thrust of a flight without rotor speeds.
 
-    Parameters
-    ----------
-    change : callable
-        From a signal to the changed one, time first.
+    `change`: from a signal to the changed one, time first.
     """
     if signals.rotor_speed is not None:
         return signals.with_rotor_speed(change(signals.rotor_speed))
@@ -42,18 +36,10 @@ def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
 
 @dataclass(frozen=True)
 class CommandFilter:
-    """A second-order filter between command and rotors, with the functions that an effect is made of.
+    """A second-order filter between command and rotors, with the functions that an effect is made of."""
 
-    Attributes
-    ----------
-    damping : str
-        Name of the shape that is zeta; the other one is ``frequency_hz``.
-    upper : tuple of float
-        (a, b, c) of `SecondOrder`.
-    """
-
-    damping: str
-    upper: tuple[float, float, float]
+    damping: str  # Name of the shape that is zeta; the other one is ``frequency_hz``.
+    upper: tuple[float, float, float]  # (a, b, c) of `SecondOrder`.
 
     def _passing(self, shape: Mapping[str, float], period: float) -> SecondOrder:
         return second_order(shape["frequency_hz"], shape[self.damping], period, self.upper)

@@ -21,25 +21,15 @@ Kind = Literal["wrench", "actuator", "sensor", "parameter"]
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One number that an effect needs.
-
-    Attributes
-    ----------
-    low, high : float
-        What is physically possible, not what is usual, in multiples of `scale`.
-    scale : callable or None
-        Natural size on a vehicle, in `unit`; None for 1.
-    of_log : bool
-        Whether it tells how the motion is logged, and leaves the motion itself as it is.
-    """
+    """One number that an effect needs."""
 
     name: str
     unit: str
-    low: float
-    high: float
+    low: float  # What is physically possible, not what is usual, in multiples of `scale`.
+    high: float  # The same.
     meaning: str
-    scale: Callable[[VehicleSettings], float] | None = None
-    of_log: bool = False
+    scale: Callable[[VehicleSettings], float] | None = None  # Natural size on a vehicle, in `unit`; None for 1.
+    of_log: bool = False  # Whether it is of the log, and not of the motion.
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle, in `unit`."""
@@ -65,24 +55,14 @@ def of_axes(
 
 @dataclass(frozen=True)
 class Shape:
-    """A parameter that an effect depends on nonlinearly.
-
-    Attributes
-    ----------
-    grid : tuple of float
-        Ascending; values that a search starts from. The first and the last bound it.
-    first : float or None
-        Where a search stays until the effect is chosen; None: it tries the whole grid.
-    valley : float or None
-        Where the residual has many valleys over it: their width, as a share of the value.
-    """
+    """A parameter that an effect depends on nonlinearly."""
 
     name: str
     unit: str
-    grid: tuple[float, ...]
+    grid: tuple[float, ...]  # Ascending; values that a search starts from. The first and the last bound it.
     meaning: str
-    first: float | None = None
-    valley: float | None = None
+    first: float | None = None  # Where a search stays until the effect is chosen; None: it tries the whole grid.
+    valley: float | None = None  # Where the residual has many valleys over it: their width, as a share of the value.
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the shape, on any vehicle, in `unit`."""
@@ -96,31 +76,18 @@ class Shape:
 
 @dataclass(frozen=True)
 class Columns:
-    """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``.
+    """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``."""
 
-    Attributes
-    ----------
-    direct : array, shape (time, 6, coefficient)
-        Torque (3) and force (3) about the body axes for one unit of each coefficient.
-    momentum : array, shape (time, 6, coefficient), or None
-        What has to be differentiated in time; None for nothing. Nobody differentiates it: windows are integrated by
-        parts.
-    """
-
+    # Shape (time, 6, coefficient): torque (3) and force (3) about the body axes for one unit of each coefficient.
     direct: Array
+    # Shape (time, 6, coefficient): what has to be differentiated in time; None for nothing. Nobody differentiates it:
+    # windows are integrated by parts.
     momentum: Array | None = None
 
     def at_samples(self, coefficients: Array, time: Array) -> Array:
         """Evaluate ``direct @ c + d/dt (momentum @ c)`` sample by sample; noise of what is differentiated shows in it.
 
-        Parameters
-        ----------
-        coefficients : array, shape (coefficient,)
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (time, 6)
+        `coefficients`: shape (coefficient,); `time`: shape (time,), s; Result: shape (time, 6).
         """
         momentum = None if self.momentum is None else self.momentum @ coefficients
         return Columns(np.asarray(self.direct @ coefficients), momentum).along(time)
@@ -137,105 +104,59 @@ class Columns:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """A physical effect that a model may miss.
+    """A physical effect that a model may miss."""
 
-    Attributes
-    ----------
-    name : str
-        Identifier.
-    title : str
-        What people call it.
-    kind : {"wrench", "actuator", "sensor", "parameter"}
-        Adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the vehicle.
-    formula : str
-        One line.
-    sentence : str
-        What a pilot understands.
-    coefficients : tuple of Coefficient
-        Physical, as reported; those of `shapes` not among them.
-    needs : frozenset of str
-        Of `Signals.available`.
-    excitation : str
-        The flight that shows it.
-    rivals : mapping of str to str
-        Effects that look alike, each with the flight that tells them apart.
-    columns : callable or None
-        ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
-        Left out, it follows from `acts`; None for what only the audit of the sensors can see.
-    physical : PhysicalNumbers or None
-        None: the linear coefficients are the physical ones, whose bounds bound them.
-    apply : callable or None
-        For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
-        effect's error, or with its air, so that all other columns can be computed from them.
-    describe : callable or None
-        ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
-    rate_derivative : bool
-        Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
-    holds : frozenset of str
-        Effects that are special cases of this one, which is then not their rival.
-    scatter : callable or None
-        For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
-        force for a unit of relative scatter.
-    order : int
-        Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
-    of_all_forces : bool
-        Whether the columns have a lever for the forces of all other effects.
-    actuation : Actuation or None
-        For effects between command and rotors: how they are simulated.
-    acts : callable or None
-        ``acts(see, p) -> Wrench`` at an instant, of its numbers by name: what is simulated. None for what changes only
-        the log or the actuators, or has a state of its own.
-    air : callable or None
-        ``air(values)``: velocity of the air that all effects meet, m/s, world frame.
-    carried : Body or None
-        For effects with a state of their own, in place of `acts`.
-    log : SensorLog or None
-        For effects on the log: how they are simulated.
-    test : SensorTest or None
-        For effects that the sensor audit finds.
-    accounts : callable or None
-        ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
-        so that the number is not called wrong.
-    in_vehicle : callable or None
-        ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model
-        of a whole vehicle.
-    exact : Effect or None
-        What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
-        would do as well, or with those that others depend on as shapes, under the same names.
-    lever : callable or None
-        ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
-        possible, a torque being no larger than its force on a lever as long as the body.
-    """
-
-    name: str
-    title: str
+    name: str  # Identifier.
+    title: str  # What people call it.
+    # Adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the vehicle.
     kind: Kind
-    formula: str
-    sentence: str
-    needs: frozenset[str]
-    excitation: str
-    rivals: Mapping[str, str]
+    formula: str  # One line.
+    sentence: str  # What a pilot understands.
+    needs: frozenset[str]  # Of `Signals.available`.
+    excitation: str  # The flight that shows it.
+    rivals: Mapping[str, str]  # Effects that look alike, each with the flight that separates them.
     source: str
-    coefficients: tuple[Coefficient, ...] = ()
+    coefficients: tuple[Coefficient, ...] = ()  # Physical, as reported; those of `shapes` not among them.
     shapes: tuple[Shape, ...] = ()
+    # ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
+    # Left out, it follows from `acts`; None for what only the audit of the sensors can see.
     columns: Callable[[Signals, Mapping[str, float]], Columns] | None = None
+    # None: the linear coefficients are the physical ones, whose bounds bound them.
     physical: PhysicalNumbers | None = None
+    # For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
+    # effect's error, or with its air, so that all other columns can be computed from them.
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
+    # For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
+    # force for a unit of relative scatter.
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
+    # ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
-    holds: frozenset[str] = frozenset()
+    holds: frozenset[str] = frozenset()  # Effects that are special cases of this one, which is then not their rival.
+    # Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     rate_derivative: bool = False
+    # Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
     order: int = 1000
-    of_all_forces: bool = False
-    actuation: Actuation | None = None
+    of_all_forces: bool = False  # Whether it has a lever for the forces of all other effects.
+    actuation: Actuation | None = None  # For effects between command and rotors: how they are simulated.
+    # ``acts(see, p) -> Wrench`` at an instant, of its numbers by name. None for what changes only the log or the
+    # actuators, or has a state of its own.
     acts: Callable[[Instant, Numbers], Wrench] | None = None
+    # ``air(values)``: velocity of the air that all effects meet, m/s, world frame.
     air: Callable[[Mapping[str, float]], tuple[float, float, float]] | None = None
-    carried: Body | None = None
-    log: SensorLog | None = None
-    test: SensorTest | None = None
+    carried: Body | None = None  # For effects with a state of their own, in place of `acts`.
+    log: SensorLog | None = None  # For effects on the log: how they are simulated.
+    test: SensorTest | None = None  # For effects that the sensor audit finds.
+    # ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves, so
+    # that the number is not called wrong.
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
+    # ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model of a
+    # whole vehicle.
     in_vehicle: Callable[[VehicleParts, Mapping[str, float], Array], VehicleParts] | None = None
+    # What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
+    # would do as well, or with those that others depend on as shapes, under the same names.
     exact: Effect | None = None
+    # ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
+    # possible, a torque being no larger than its force on a lever as long as the body.
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
 
     def __post_init__(self) -> None:
@@ -252,14 +173,14 @@ class Effect:
         return not self.coefficients
 
     @property
-    def late(self) -> bool:
+    def is_lag(self) -> bool:
         """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
         if self.actuation is None:
             return self.kind == "actuator" and self.log is not None
         return self.actuation.supply is None
 
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
-        """Tell by the numbers that were fitted whether it is this effect or what took its place."""
+        """Check by the fitted parameters whether it is this effect or what took its place."""
         other = self.exact or self
         names = {shape.name for shape in other.shapes}
         return other if (len(other.coefficients), names) == (coefficients, {*shapes}) else self
@@ -301,30 +222,17 @@ def _filled(components: Vector, samples: int, names: Sequence[str]) -> Array:
 
 
 def stack(*wrenches: Array) -> Array:
-    """Arrange wrenches, one for each coefficient, as columns.
+    """Arrange wrenches, one for each coefficient, as columns, shape (time, 6, coefficient).
 
-    Parameters
-    ----------
-    *wrenches : array, shape (time, 6)
-
-    Returns
-    -------
-    array, shape (time, 6, coefficient)
+    `wrenches`: shape (time, 6).
     """
     return np.stack(wrenches, axis=2)
 
 
 def wrench(torque: Array | None = None, force: Array | None = None) -> Array:
-    """Join a body torque and a body force.
+    """Join a body torque and a body force, shape (time, 6), N m and N.
 
-    Parameters
-    ----------
-    torque, force : array, shape (time, 3), or None
-        None for zero; one of them is given.
-
-    Returns
-    -------
-    array, shape (time, 6), N m and N
+    `torque`, `force`, shape (time, 3): None for zero; one of them is given.
     """
     given = torque if torque is not None else force
     assert given is not None, "torque or force"
@@ -335,29 +243,15 @@ def wrench(torque: Array | None = None, force: Array | None = None) -> Array:
 def hub_wrench(hubs: Array, force: Array) -> Array:
     """Sum forces at the hubs to a wrench about the centre of mass, ``(sum r_i x F_i, sum F_i)``.
 
-    Parameters
-    ----------
-    hubs : array, shape (rotor, 3), m
-    force : array, shape (time, rotor, 3), N
-
-    Returns
-    -------
-    array, shape (time, 6)
+    `hubs`: shape (rotor, 3), m; `force`: shape (time, rotor, 3), N; Result: shape (time, 6).
     """
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
 
 
 def thrust_wrench(hubs: Array, thrust: Array) -> Array:
-    """Sum changes of thrust along body z to a wrench.
+    """Sum changes of thrust along body z to a wrench, shape (time, 6).
 
-    Parameters
-    ----------
-    hubs : array, shape (rotor, 3), m
-    thrust : array, shape (time, rotor), N
-
-    Returns
-    -------
-    array, shape (time, 6)
+    `hubs`: shape (rotor, 3), m; `thrust`: shape (time, rotor), N.
     """
     force = np.zeros((*thrust.shape, 3))
     force[..., 2] = thrust

@@ -1,6 +1,4 @@
-"""Hooks of an effect beside its columns: its place in the closed loop, and its test by the sensor audit."""
-
-from __future__ import annotations
+"""Hooks of an effect other than its columns: its place in the closed loop, and its test by the sensor audit."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,90 +19,49 @@ Link = Callable[[RotorMotion, Mapping[str, float], Memory], RotorMotion]
 
 @dataclass(frozen=True, kw_only=True)
 class Actuation:
-    """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds.
+    """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds."""
 
-    Attributes
-    ----------
-    lag : callable or None
-        ``lag(values) -> float``: time constant in s that replaces that of the rotors.
-    link : callable or None
-        ``link(rotors, values, memory) -> RotorMotion`` after the lag, at each step.
-    delay : callable or None
-        ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
-    supply : callable or None
-        ``supply(values, voltage)``: factor on the rotor speed at a share of the full voltage, which is logged.
-    """
-
+    # ``lag(values) -> float``: time constant in s that replaces that of the rotors.
     lag: Callable[[Mapping[str, float]], float] | None = None
-    link: Link | None = None
+    link: Link | None = None  # ``link(rotors, values, memory) -> RotorMotion`` after the lag, at each step.
+    # ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
     delay: Callable[[Mapping[str, float]], float] | None = None
+    # ``supply(values, voltage)``: factor on the rotor speed at a share of the full voltage, which is logged.
     supply: Callable[[Mapping[str, float], Value], Value] | None = None
 
 
 class PhysicalNumbers(NamedTuple):
-    """How linear coefficients are written as physical ones, which are not linear in the columns.
+    """How linear coefficients are written as physical ones, which are not linear in the columns."""
 
-    Attributes
-    ----------
-    of : callable
-        ``of(linear) -> physical``, NaN where the data left one open.
-    linear : callable
-        The reverse.
-    """
-
-    of: Callable[[Array], Array]
-    linear: Callable[[Array], Array]
+    of: Callable[[Array], Array]  # ``of(linear) -> physical``, NaN where the data left one open.
+    linear: Callable[[Array], Array]  # The reverse.
 
 
 class VehicleParts(NamedTuple):
-    """What effects become in the model of a whole vehicle.
-
-    Attributes
-    ----------
-    inertia : array, shape (3, 3), kg m^2
-        Added to that of the vehicle.
-    wind : tuple of float, m/s, world frame
-    effects : tuple of (str, mapping of str to float, array)
-        Those without a place of their own: name, shape, linear coefficients.
-    """
+    """What effects become in the model of a whole vehicle."""
 
     vehicle: VehicleSettings
-    inertia: Array
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: Array  # Shape (3, 3), kg m^2: added to that of the vehicle.
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)  # M/s, world frame.
+    # Those without a place of their own: name, shape, linear coefficients.
     effects: tuple[tuple[str, Mapping[str, float], Array], ...] = ()
 
 
 class Body(NamedTuple):
-    """A body with a state of its own on the vehicle.
+    """A body with a state of its own on the vehicle."""
 
-    Attributes
-    ----------
-    pull : callable
-        ``pull(see, p, state, carrier) -> Pull``, see `Carried`.
-    start : tuple of float
-        Its state at the start.
-    """
-
+    # ``pull(see, p, state, carrier) -> Pull``, see `Carried`.
     pull: Callable[[Instant, Numbers, Vector, Carrier], Pull]
-    start: tuple[float, ...]
+    start: tuple[float, ...]  # Its state at the start.
 
 
 class TrueMotion(NamedTuple):
-    """True motion at the samples of a simulated flight.
+    """True motion at the samples of a simulated flight."""
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    rotation : array, shape (time, 3, 3)
-        Body to world.
-    body_rate : array, shape (time, 3), rad/s, body frame
-    body_acceleration : array, shape (time, 3), rad/s^2, body frame
-    """
-
-    time: Array
-    rotation: Array
-    body_rate: Array
-    body_acceleration: Array
+    time: Array  # Shape (time,), s.
+    rotation: Array  # Shape (time, 3, 3): body to world.
+    body_rate: Array  # Shape (time, 3), rad/s, body frame.
+    body_acceleration: Array  # Shape (time, 3), rad/s^2, body frame.
 
     @property
     def period(self) -> float:
@@ -114,18 +71,11 @@ class TrueMotion(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorLog:
-    """How the log of a sensor differs from the truth.
+    """How the log of a sensor differs from the truth."""
 
-    Attributes
-    ----------
-    change : callable
-        ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without noise.
-    does : str
-        The same in words, for refusals.
-    """
-
+    # ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without noise.
     change: Callable[[Mapping[str, Array], TrueMotion, Mapping[str, float]], dict[str, Array]]
-    does: str = "needs measured rotor speeds"
+    does: str = "needs measured rotor speeds"  # The same in words, for refusals.
 
 
 def gyroscope_log(reading: Callable[[Array, Array], Array]) -> SensorLog:
@@ -146,63 +96,31 @@ class ReadingError(NamedTuple):
 
 
 class FaultFit(NamedTuple):
-    """Estimated numbers of a fault.
+    """Estimated numbers of a fault."""
 
-    Attributes
-    ----------
-    value, error : array, shape (number,)
-        With standard errors.
-    pull : array, shape (number,)
-        How far noise of the sensor can have pulled the value at most.
-    known : array of bool, shape (number,)
-        What the motion could tell.
-    blocks : int
-        Of time that scattered the values.
-    """
-
-    value: Array
-    error: Array
-    pull: Array
-    known: BoolArray
-    blocks: int
+    value: Array  # Shape (number,).
+    error: Array  # Standard errors, shape (number,).
+    pull: Array  # Shape (number,): how far noise of the sensor can have pulled the value at most.
+    known: BoolArray  # Shape (number,): what the motion identifies.
+    blocks: int  # Of time that scattered the values.
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorTest:
-    """How the sensor audit tests a fault, says what it found, and repairs it.
+    """How the sensor audit tests a fault, says what it found, and repairs it."""
 
-    Attributes
-    ----------
-    estimate : str or callable
-        Numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or ``delay``;
-        else ``estimate(flights) -> FaultFit``, None where the flights do not tell.
-    labels : tuple of str
-        Names of the numbers in findings, in the order of the effect's coefficients, then shapes.
-    smallest : float
-        Size below which a fault moves no torque by more than the noise of a window, so that nothing is to repair.
-    smallest_samples : float
-        The same in sampling periods, for a time.
-    number : callable
-        ``number(label, value) -> str``: a number in words.
-    found : str
-        Sentence with ``{}`` for the numbers.
-    nothing : str
-        Sentence where no number is named.
-    error : callable
-        ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
-    signal : str
-        Field of `Signals`, shape (time, 3).
-    integrated : bool
-        Whether an attitude that is integrated from the gyroscope would not show the fault.
-    """
-
+    # Numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or ``delay``;
+    # else ``estimate(flights) -> FaultFit``, None where the flights do not identify it.
     estimate: str | Callable[[Sequence[Signals]], FaultFit | None]
+    # Size below which a fault moves no torque by more than the noise of a window, so that nothing is to repair.
     smallest: float
-    number: Callable[[str, float], str]
-    found: str
-    nothing: str
+    number: Callable[[str, float], str]  # ``number(label, value) -> str``: a number in words.
+    found: str  # Sentence with ``{}`` for the numbers.
+    nothing: str  # Sentence where no number is named.
+    # ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
     error: Callable[[Array], ReadingError]
+    # Names of the numbers in findings, in the order of the effect's coefficients, then shapes.
     labels: tuple[str, ...] = ("x", "y", "z")
-    smallest_samples: float = 0.0
-    signal: str = "body_rate"
-    integrated: bool = False
+    smallest_samples: float = 0.0  # The same in sampling periods, for a time.
+    signal: str = "body_rate"  # Field of `Signals`, shape (time, 3).
+    integrated: bool = False  # Whether an attitude that is integrated from the gyroscope would not show the fault.

@@ -30,25 +30,17 @@ STATE_TERMS = (
 )
 """Terms of the motion: constant, linear, products, and speed times velocity, rate times rate with its sign."""
 
-# More than the products of 34 terms of the motion with 17 of eight rotors, which are fitted to them.
-_PROBES = 900
-# Shares of the largest value: what is left of an effect that is a polynomial, and a weight that is 0, but for rounding.
+_PROBES = 900  # More than the products of 34 terms of the motion with 17 of eight rotors, which are fitted to them.
+# Shares of the largest value: the residual of an effect that is a polynomial, and a weight that is 0, but for rounding.
 _EXACT, _NEGLIGIBLE = 1e-9, 1e-10
 
 
 def state_terms(velocity: Array, rate: Array) -> Array:
     """Evaluate the terms of the motion.
 
-    Parameters
-    ----------
-    velocity : array, shape (time, 3), m/s, body frame
-        Through the air.
-    rate : array, shape (time, 3), rad/s, body frame
-
-    Returns
-    -------
-    array, shape (time, 34)
-        In the order of `STATE_TERMS`, SI.
+    `velocity`, shape (time, 3), m/s, body frame: through the air.
+    `rate`: shape (time, 3), rad/s, body frame.
+    Result: shape (time, 34); in the order of `STATE_TERMS`, SI.
     """
     motion = np.hstack([velocity, rate])
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -59,29 +51,20 @@ def state_terms(velocity: Array, rate: Array) -> Array:
 def rotor_terms(speed: Array, acceleration: Array) -> Array:
     """Evaluate the terms of the rotors: 1, then speeds, squared speeds and accelerations of all of them.
 
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-    acceleration : array, shape (time, rotor), rad/s^2
-
-    Returns
-    -------
-    array, shape (time, 1 + 3 rotors)
+    `speed`: shape (time, rotor), rad/s.
+    `acceleration`: shape (time, rotor), rad/s^2.
+    Result: shape (time, 1 + 3 rotors).
     """
     return np.hstack([np.ones((len(speed), 1)), speed, speed**2, acceleration])
 
 
 @dataclass(frozen=True)
 class Probe:
-    """Motions and rotor speeds at random, and their terms, for one vehicle.
-
-    Attributes
-    ----------
-    share : array, shape (time, rotor)
-        Rotor speeds as shares of the one at which the vehicle hovers; the same for all vehicles of as many rotors.
-    """
+    """Motions and rotor speeds at random, and their terms, for one vehicle."""
 
     signals: Signals
+    # Shape (time, rotor): rotor speeds as shares of the one at which the vehicle hovers; the same for all vehicles of
+    # as many rotors.
     share: Array
     rotor: Array
     state: Array
@@ -133,15 +116,9 @@ def _joint(state: bytes, share: bytes, probes: int) -> tuple[Array, Array, Array
 def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array | None:
     """Find the polynomial that an effect is, from its columns at random motions.
 
-    Parameters
-    ----------
-    shape : mapping of str to float
-        Its nonlinear parameters.
-
-    Returns
-    -------
-    array, shape (coefficient, 6, state terms, rotor terms), or None
-        Torque and force for a unit of each coefficient, SI, body frame; None if the effect is not such a polynomial.
+    `shape`: its nonlinear parameters.
+    Result: shape (coefficient, 6, state terms, rotor terms); torque and force for a unit of each coefficient, SI, body
+    frame; None if the effect is not such a polynomial.
     """
     if known.columns is None or known.kind != "wrench" or known.missing(probe.signals):
         return None
@@ -161,14 +138,8 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
 def fitted_terms(columns: Array, probe: Probe) -> Array | None:
     """Find the weights that columns of torque and force along a probe are.
 
-    Parameters
-    ----------
-    columns : array, shape (time, 6, coefficient)
-
-    Returns
-    -------
-    array, shape (coefficient, 6, state terms, rotor terms), or None
-        None where they leave anything.
+    `columns`: shape (time, 6, coefficient).
+    Result: shape (coefficient, 6, state terms, rotor terms); None where they leave anything.
     """
     joint, inverse, scale = probe.joint
     values = columns.reshape(len(columns), -1)

@@ -1,7 +1,5 @@
 """The catalogue: every effect that has a module in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from pkgutil import iter_modules
@@ -19,9 +17,7 @@ def _discover() -> Mapping[str, Effect]:
     return MappingProxyType({known.name: known for known in effects})
 
 
-CATALOGUE: Mapping[str, Effect] = _discover()
-"""Effects by identifier."""
-
+CATALOGUE: Mapping[str, Effect] = _discover()  # Effects by identifier.
 VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
 """The vehicle's own numbers, which stay free in every fit."""
 
@@ -32,10 +28,7 @@ CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_
 def effect(name: str) -> Effect:
     """Find an effect by its identifier.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name; the message gives the nearest ones.
+    Raises InputError if there is none of that name; the message gives the nearest ones.
     """
     if name in CATALOGUE:
         return CATALOGUE[name]

@@ -1,7 +1,5 @@
 """Natural sizes of coefficients on a vehicle, so that bounds are stated once for all vehicles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import sqrt
 

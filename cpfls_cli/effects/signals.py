@@ -17,10 +17,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import ARRAYS, Value
 
 _T = TypeVar("_T")
-
-_SHORTEST = 8
-"""Samples up to which a signal is taken as it is."""
-
+_SHORTEST = 8  # Samples up to which a signal is taken as it is.
 _OF_MOTION = (
     *("rotation", "ground_velocity", "air_velocity"),
     *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
@@ -30,62 +27,33 @@ _OF_MOTION = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Signals:
-    """A flight on a uniform clock, in SI, body frame FLU, world z up.
+    """A flight on a uniform clock, in SI, body frame FLU, world z up."""
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    body_rate : array, shape (time, 3), rad/s, body frame
-    attitude : array, shape (time, 3), rad, or None
-        Roll, pitch, yaw.
-    velocity : array, shape (time, 3), m/s, world frame, or None
-        Relative to the ground.
-    position : array, shape (time, 3), m, world frame, or None
-    acceleration : array, shape (time, 3), m/s^2, world frame, or None
-    specific_force : array, shape (time, 3), m/s^2, body frame, or None
-        What an accelerometer senses; with attitude it follows from the acceleration too.
-    rotor_speed : array, shape (time, rotor), rad/s, or None
-        Measured, or commanded where `commanded`.
-    commanded : bool
-        Whether actuation is what was asked for, not what was measured.
-    rotor_command : array, shape (time, rotor), rad/s, or None
-        What was asked for beside speeds that were measured.
-    stated_torque : array, shape (time, 3), N m, body frame, or None
-        Torque of a log that has no rotor speeds.
-    stated_thrust : array, shape (time,), N, or None
-        Thrust of such a log.
-    voltage : array, shape (time,), or None
-        As a fraction of the full battery.
-    ground_height_m : float
-        Height of the ground in the world frame.
-    wind : array, shape (3,), m/s, world frame, or None
-        None for still air.
-    beside : array, shape (time, 6), N m and N, body frame, or None
-        Torque and force of a known model beyond the squares of its rotor speeds.
-    setpoints : mapping of str to array, shape (time, column)
-        What was asked of the autopilot and of its loops, where it is known at all samples: ``position`` and
-        ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad; ``body_rate``, rad/s, body
-        frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks`` as roll, pitch, yaw,
-        throttle, shares of full deflection as logged. Each stays until the next sample.
-    """
-
-    time: Array
-    body_rate: Array
+    time: Array  # Shape (time,), s.
+    body_rate: Array  # Shape (time, 3), rad/s, body frame.
     vehicle: VehicleSettings
-    attitude: Array | None = None
-    velocity: Array | None = None
-    position: Array | None = None
-    acceleration: Array | None = None
+    attitude: Array | None = None  # Shape (time, 3), rad: roll, pitch, yaw.
+    velocity: Array | None = None  # Shape (time, 3), m/s, world frame: relative to the ground.
+    position: Array | None = None  # Shape (time, 3), m, world frame.
+    acceleration: Array | None = None  # Shape (time, 3), m/s^2, world frame.
+    # Shape (time, 3), m/s^2, body frame: what an accelerometer senses; with attitude it follows from the acceleration
+    # too.
     specific_force: Array | None = None
-    rotor_speed: Array | None = None
-    commanded: bool = False
+    rotor_speed: Array | None = None  # Shape (time, rotor), rad/s: measured, or commanded where `commanded`.
+    commanded: bool = False  # Whether actuation is what was asked for, not what was measured.
+    # Shape (time, rotor), rad/s: what was asked for, where speeds were measured too.
     rotor_command: Array | None = None
-    stated_torque: Array | None = None
-    stated_thrust: Array | None = None
-    voltage: Array | None = None
-    ground_height_m: float = 0.0
-    wind: Array | None = None
-    beside: Array | None = None
+    stated_torque: Array | None = None  # Shape (time, 3), N m, body frame: torque of a log that has no rotor speeds.
+    stated_thrust: Array | None = None  # Shape (time,), N: thrust of such a log.
+    voltage: Array | None = None  # Shape (time,): as a fraction of the full battery.
+    ground_height_m: float = 0.0  # Height of the ground in the world frame.
+    wind: Array | None = None  # Shape (3,), m/s, world frame: None for still air.
+    # Shape (time, 6), N m and N, body frame: torque and force of a known model beyond the squares of its rotor speeds.
+    known_wrench: Array | None = None
+    # Each shape (time, column): what was asked of the autopilot and of its loops, where it is known at all samples:
+    # ``position`` and ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad; ``body_rate``,
+    # rad/s, body frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks`` as roll,
+    # pitch, yaw, throttle, shares of full deflection as logged. Each stays until the next sample.
     setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -120,10 +88,7 @@ class Signals:
     def to_log(self, missing: Iterable[str]) -> tuple[str, ...]:
         """Name what a log has to hold for signals that are not available; world axes take the attitude, too.
 
-        Parameters
-        ----------
-        missing : iterable of str
-            Names that `available` lacks.
+        `missing`: names that `available` lacks.
         """
         in_world = {"velocity": self.velocity, "height": self.position}
         wanted = {name for name in missing if name not in in_world or in_world[name] is None}
@@ -159,8 +124,8 @@ class Signals:
 
     @cached_property
     def wrench(self) -> Array:
-        """Torque and force of the rotors, and of what is known beside them, shape (time, 6); unknown parts are 0."""
-        wrench = np.zeros((len(self), 6)) if self.beside is None else self.beside.copy()
+        """Torque and force of the rotors, and of a known model, shape (time, 6); unknown parts are 0."""
+        wrench = np.zeros((len(self), 6)) if self.known_wrench is None else self.known_wrench.copy()
         if self.torque is not None:
             wrench[:, :3] += self.torque
         if self.thrust is not None:
@@ -256,10 +221,7 @@ class Signals:
     def once(self, key: Hashable, make: Callable[[], _T]) -> _T:
         """Make what follows from the flight, or give what was made before: no stage of a workflow makes it again.
 
-        Parameters
-        ----------
-        key : hashable
-            Who makes it, and all that it depends on beside the flight.
+        `key`: who makes it, and all that it depends on other than the flight.
         """
         made = self.__dict__.setdefault("made", {})
         if key not in made:
@@ -269,9 +231,7 @@ class Signals:
     def with_rotor_speed(self, rotor_speed: Array) -> Signals:
         """Exchange the rotor speeds.
 
-        Parameters
-        ----------
-        rotor_speed : array, shape (time, rotor), rad/s
+        `rotor_speed`: shape (time, rotor), rad/s.
         """
         changed = replace(self, rotor_speed=rotor_speed)
         # What the motion alone gives is not computed again for each of a search's thousand lags.
@@ -334,12 +294,7 @@ def fused(values: Array, rate: Array | None, period: float) -> Array:
     Minimises ``sum (x - values)^2 / s^2 + sum (x' - rate)^2 / r^2`` with s and r from third differences. What is curved
     in a noisy signal, such as a thrust over a height, is biased by its variance; that of the average is not.
 
-    Parameters
-    ----------
-    values : array, shape (time,)
-    rate : array, shape (time,), per second, or None
-        None: the signal as it is.
-    period : float, s
+    `values`: shape (time,); `rate`, shape (time,), per second: None: the signal as it is; `period`: s.
     """
     if rate is None:
         return values

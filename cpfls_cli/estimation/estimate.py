@@ -215,7 +215,7 @@ def conditional_strength(normal: Normal, prior: Prior) -> Array:
     """
     inverse = np.linalg.inv(normal.information.sum(axis=0) + np.diag(prior.precision + _RIDGE))
     alone = np.where(np.diag(inverse) == 0, _TINY, np.diag(inverse))
-    # Columns: what is left of each number when the others have moved with it.
+    # Columns: the rest of each number when the others have moved with it.
     cleared = inverse / alone
     each = np.einsum("ji,bjk,ki->bi", inverse.T / alone, normal.information, cleared)
     explained = np.maximum(each.sum(axis=0), 0.0)

@@ -1,7 +1,5 @@
 """A model before and after its effects, on held-out flights: playback, whiteness, and the worst stretches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, NamedTuple, Self
@@ -14,7 +12,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.results import BODY
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
@@ -27,21 +25,14 @@ from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
-_EVERY = 5
-"""Samples between starts of free runs, which are alike."""
+_EVERY = 5  # Samples between starts of free runs, which are alike.
 
 
 @dataclass(frozen=True)
 class PlayedPair(Played):
-    """A flight, a model with effects, and the model as given, which takes the log as it is.
+    """A flight, a model with effects, and the model as given, which takes the log as it is."""
 
-    Attributes
-    ----------
-    logged : PlaybackFlight
-        With the faults of the sensors, so that a fault shows.
-    """
-
-    logged: PlaybackFlight
+    logged: PlaybackFlight  # With the faults of the sensors, so that a fault shows.
 
     def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
         """Predict from samples of the flight."""
@@ -61,15 +52,8 @@ def played_pairs(
 ) -> list[PlayedPair]:
     """Make flights, a model with effects and the model as given ready for playback.
 
-    Parameters
-    ----------
-    fading_s : float or None, s
-        How fast rates of the flights fade that the effects were found in (`rates_fade`); None where none train.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that an effect needs.
+    `fading_s`: how fast rates of the flights fade that the effects were found in (`rates_fade`); None where none train.
+    Raises InputError if a flight lacks a signal that an effect needs.
     """
     pairs = []
     for recording in recordings:
@@ -84,10 +68,7 @@ class LeftOut(NamedTuple):
     """What one effect of a model does along flights."""
 
     name: Annotated[str, About("identifier, see `cpfls effects`")]
-    wrench: Annotated[
-        Array,
-        About("root mean square of torque (x y z, N m) and force (x y z, N)", ("6",), "SI", BODY),
-    ]
+    wrench: Annotated[Array, About("root mean square of torque (x y z, N m) and force (x y z, N)", ("6",), "SI", BODY)]
     ends: Annotated[
         Array,
         About(
@@ -105,17 +86,9 @@ def left_out(
 ) -> list[LeftOut]:
     """Play a model back along flights, as it is and without single effects.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of effects.
-    horizon_s : float, s
-        At which the ends of free runs are compared; errors still add up there.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that an effect needs.
+    `names`: of effects.
+    `horizon_s`, s: at which the ends of free runs are compared; errors still add up there.
+    Raises InputError if a flight lacks a signal that an effect needs.
     """
     found = []
     for name in names:
@@ -136,12 +109,7 @@ def left_out(
 def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
     """Play back from every fifth sample of the flights.
 
-    Parameters
-    ----------
-    pairs : sequence of PlayedPair
-        Of one rate.
-    horizon_s : float, s
-        At most; one sample at least.
+    `pairs`: of one rate; `horizon_s`, s: at most; one sample at least.
     """
     asked = max(1, round(horizon_s / pairs[0].flight.motion.period))
     longest = min(asked, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
@@ -166,15 +134,8 @@ def worst_stretch(
 ) -> FreeRuns:
     """Find where free runs of the model as given, one after another, are farthest off.
 
-    Parameters
-    ----------
-    horizon_s, shown_s : float, s
-        Length of a run, and of all that are shown.
-
-    Raises
-    ------
-    InputError
-        If a flight is shorter than one run.
+    `horizon_s`, `shown_s`, s: length of a run, and of all that are shown.
+    Raises InputError if a flight is shorter than one run.
     """
     samples = max(2, round(horizon_s / pairs[0].flight.motion.period))
     most = max(1, round(shown_s / horizon_s))
@@ -292,24 +253,16 @@ class PlaybackChange(AlongFlights):
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Errors of the model as given and of the model with effects on held-out flights.
-
-    Attributes
-    ----------
-    stretches : tuple of GapStretch
-        Of the model as given, largest gap first.
-    again_before, again_after : ComesAgain or None
-        What of the gap comes again, of training flights too; None where no flight repeats another.
-    """
+    """Errors of the model as given and of the model with effects on held-out flights."""
 
     playback: PlaybackChange
     residual: ResidualChange
-    stretches: tuple[GapStretch, ...]
+    stretches: tuple[GapStretch, ...]  # Of the model as given, largest gap first.
     whiteness: WhitenessChange
     picture: WorstWindows
     run: FreeRuns
-    again_before: ComesAgain | None
-    again_after: ComesAgain | None
+    repeatability_before: Repeatability | None  # Of training flights too; None where no flight repeats another.
+    repeatability_after: Repeatability | None  # The same.
 
 
 def before_after(
@@ -322,14 +275,10 @@ def before_after(
 ) -> BeforeAfter:
     """Compare a model with effects with the model as given on held-out flights.
 
-    Parameters
-    ----------
-    training, held : sequence of Recording
-        Flights that the effects were found in, and that they are judged on.
-    unseen : HeldOut
-        Their residuals.
-    base : VehicleModel or None
-        A vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is part.
+    `training`, `held`: flights that the effects were found in, and that they are judged on.
+    `unseen`: their residuals.
+    `base`: a vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is
+    part.
     """
     windows = common_windows(held, settings)
     centres = [windows.centres(recording.signals.time) for recording in held]
@@ -358,7 +307,7 @@ def before_after(
 
 def _again(
     training: Sequence[Recording], held: Sequence[Recording], model: ExtendedModel, settings: GapSettings
-) -> tuple[ComesAgain | None, ComesAgain | None]:
+) -> tuple[Repeatability | None, Repeatability | None]:
     """Split the gap of the model as given, of signals as logged, and of the model with effects where paths repeat."""
     recordings = [*training, *held]
     repeated = RepeatedRuns.of(recordings, len(held))
@@ -387,10 +336,5 @@ def _picture(
     logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
     return WorstWindows(
-        flight=recording.name,
-        channel=stretch.channel,
-        time=time[shown],
-        measured=measured,
-        before=logged,
-        after=after,
+        flight=recording.name, channel=stretch.channel, time=time[shown], measured=measured, before=logged, after=after
     )

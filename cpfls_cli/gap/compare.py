@@ -1,7 +1,5 @@
 """Comparison of a model with flights: the gap by axis, time and state, and effects that were not excited."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,11 +12,11 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
-from cpfls_cli.gap.naming.leftover import not_excited
+from cpfls_cli.gap.naming.open_questions import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
-from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
+from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
@@ -34,7 +32,9 @@ class ResidualWindows:
 
     time: Array = about("middle of each window, on the clock of its flight", "window", unit="s")
     flight: IntArray = about("index of its flight", "window")
-    value: Array = about("what inertia and rotors leave, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True)
+    value: Array = about(
+        "residual of inertial and rotor wrench, N m and N", "window", "6", unit="SI", frame=BODY, gaps=True
+    )
 
 
 @result
@@ -75,7 +75,7 @@ class Comparison:
     """The gap between a model and flights."""
 
     sizes: ChannelGaps = part(brief=False)
-    comes_again: ComesAgain | None = part(None)
+    repeatability: Repeatability | None = part(None)
     worst: tuple[GapStretch, ...] = part(brief=False)
     dependence: tuple[Dependence, ...] = part()
     heat_map: HeatMap | None = part(None)
@@ -119,21 +119,11 @@ def compare(
 
     Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
-    rng : numpy.random.Generator
-        Of the shifts that say what chance explains.
-    progress : callable
-        Takes the share of the work that is done and a note.
-    whole : sequence of Recording
-        Flights that rotors and attitude are held against, where there are more than these, or longer ones.
-
-    Raises
-    ------
-    InputError
-        If the flights are too short or of different rates, or lack a signal that the model needs.
+    `model`: its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
+    `rng`: of the shifts that say what chance explains.
+    `progress`: takes the share of the work that is done and a note.
+    `whole`: flights that rotors and attitude are held against, where there are more than these, or longer ones.
+    Raises InputError if the flights are too short or of different rates, or lack a signal that the model needs.
     """
     windows = common_windows(recordings, settings)
     progress(0.0, "sensor audit")
@@ -147,7 +137,7 @@ def compare(
     progress(0.3, "noise floor")
     hypothesis = extended.system(flights)
     floor = best_floor(hypothesis)
-    residual = hypothesis.left(extended.linear)
+    residual = hypothesis.residual_at(extended.linear)
     progress(0.5, "what the gap depends on")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)
@@ -168,7 +158,7 @@ def compare(
             floors=np.where(known.any(axis=0), rms / floor, np.nan),
             share=rms / _activity(hypothesis, known),
         ),
-        comes_again=None if repeated is None else repeated.split(hypothesis, extended.linear),
+        repeatability=None if repeated is None else repeated.split(hypothesis, extended.linear),
         worst=stretches(residual / floor, centres, index),
         dependence=dependence,
         heat_map=_worst(residual, rms / floor, dependence, states),

@@ -22,7 +22,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, that_stand, untold, untold_axes
+from cpfls_cli.gap.naming.actuation import decided_by_instruments
+from cpfls_cli.gap.naming.by_instruments import by_instruments, significant_effects, unidentified, unidentified_axes
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
@@ -34,8 +35,7 @@ from cpfls_cli.gap.naming.causes import (
 )
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
-from cpfls_cli.gap.naming.lateness import told_apart
-from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
+from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
     Alternative,
@@ -59,20 +59,13 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 @dataclass(frozen=True)
 class DiagnosisRun:
-    """A diagnosis with the fits and residuals that it was made from.
-
-    Attributes
-    ----------
-    air : Air or None
-        Gusts in the training flights; None where nothing but noise is left, or the flights are too short.
-    hypothesis : System
-        Of the training flights, with the chosen effects.
-    """
+    """A diagnosis with the fits and residuals that it was made from."""
 
     diagnosis: Conclusion
+    # Gusts in the training flights; None where nothing but noise is left, or the flights are too short.
     air: Air | None
     audit: Audit
-    hypothesis: System
+    hypothesis: System  # Of the training flights, with the chosen effects.
     estimates: Estimates
     held_out: HeldOut
 
@@ -95,24 +88,14 @@ def diagnose(
 
     The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
     explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
-    the held-out flights, once. Where instruments tell that what is left is gusts, these are a part of the noise, the
-    effects are sought once more beside them, and their numbers come by instruments.
+    the held-out flights, once. Where the residual is gusts by instruments, these are a part of the noise, the effects
+    are sought once more above them, and their numbers come by instruments.
 
-    Parameters
-    ----------
-    training, held : sequence of Recording
-        At least one each.
-    whole : sequence of Recording
-        The flights that these are parts of, where they are.
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-    progress : callable
-        Takes the share of the work that is done and a note.
-
-    Raises
-    ------
-    InputError
-        If the flights are too short, of different rates, or have nothing in common with the catalogue.
+    `training`, `held`: at least one each.
+    `whole`: the flights that these are parts of, where they are.
+    `model`: None for the rigid body of the vehicle.
+    `progress`: takes the share of the work that is done and a note.
+    Raises InputError if the flights are too short, of different rates, or have nothing in common with the catalogue.
     """
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)
@@ -120,32 +103,35 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, told = None, named.judgement.found.floor, -1
-    if named.judge.remainder(named.judgement.found):
+    gusts, quiet, only = None, named.judgement.found.floor, -1
+    if unexplained_channels(named.judgement.found, rng):
         given = known_motion(training)
         gusts = _gusts(named, given, settings, rng)
-        # Beside what is named then, more channels may turn out to be nothing but gusts.
-        while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
-            told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            axes = untold_axes(named.judgement.found, given)
+        # With what is named then, more channels may turn out to be nothing but gusts.
+        while gusts is not None and gusts.split.any() and gusts.gusts_only.sum() > only:
+            only, quiet = int(gusts.gusts_only.sum()), np.minimum(quiet, gusts.noise(windows))
+            axes = unidentified_axes(named.judgement.found, given)
             flights = flights.in_air(gusts, axes)
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
-    # What makes rotors late in gusts instruments have decided.
-    tried = [each for each in named.effects if gusts is None or not each.late]
-    wider, unnamed = beside_the_unnamed(found, named.steps[-1], tried, rng)
+    # Lags of rotors in gusts instruments have decided.
+    tried = [each for each in named.effects if gusts is None or not each.is_lag]
+    wider, unnamed = with_unnamed(found, named.steps[-1], tried, rng)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
-    held_by = tuple(own if each.effect.late and named.sure else with_it for each, own, with_it in pairs)
+    held_by = tuple(own if each.effect.is_lag and named.sure else with_it for each, own, with_it in pairs)
     estimates = replace(wider, effects=held_by)
-    told_of = judge_effects(found._replace(estimates=estimates), named.effects, rng)
-    judged = [named.in_gusts(each) for each in told_of]
+    fit = found._replace(estimates=estimates)
+    judged = [named.in_gusts(each) for each in judge_effects(fit, named.effects, rng)]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, named.effects)
-    doubts = [*_doubts(unnamed, judged, named.untold, settings), *(refused.sentence for refused in named.refusals)]
+    doubts = [
+        *_doubts(unnamed, judged, named.unidentified, settings),
+        *(refused.sentence for refused in named.refusals),
+    ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     # Above the floor of the sensors alone.
@@ -189,13 +175,13 @@ class _Flights(NamedTuple):
     repaired: Sequence[WeakFlight]
 
     def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
-        """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
+        """Give all of them the floor of their air; inertia that instruments do not identify is the loop's."""
         in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self)
         return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 
 class _Named(NamedTuple):
-    """What was named, on which grounds, what was refused, and what has numbers that instruments do not tell."""
+    """What was named, by which evidence, what was refused, and whose numbers instruments do not identify."""
 
     effects: list[Effect]
     steps: list[RankedStep]
@@ -205,14 +191,14 @@ class _Named(NamedTuple):
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
     sure: Mapping[str, float] = MappingProxyType({})
-    untold: tuple[str, ...] = ()
+    unidentified: tuple[str, ...] = ()
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
-        """Take what instruments tell of an effect, and of what is late of its rivals too: a fit sees the loop."""
+        """Take the p-value of an effect by instruments, and drop rivals of a lag: a fit sees the loop."""
         if judged.effect.name not in self.sure:
             return judged
         effect = replace(judged.effect, p_value=self.sure[judged.effect.name])
-        return replace(judged, effect=effect, alternatives=() if CATALOGUE[effect.name].late else judged.alternatives)
+        return replace(judged, effect=effect, alternatives=() if CATALOGUE[effect.name].is_lag else judged.alternatives)
 
 
 def _named(
@@ -229,63 +215,63 @@ def _named(
 
 
 def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
-    """Find gusts in what is left of the training flights."""
+    """Find gusts in the residual of the training flights."""
     found = named.judgement.found
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
-    """Judge what was named with the numbers that instruments tell, without what is 0 by them.
+    """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
-    A loop that answers gusts looks as late: what makes the rotors late stands where instruments tell that it does.
+    A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given)
-        stand = that_stand(found, given)
-        names = {each.effect.name for each, _ in stand}
+        kept = significant_effects(found, given)
+        names = {each.effect.name for each, _ in kept}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(judge.training, [each for each, _ in stand], found.floor, settings)
-        # A gap above the gusts is none of them: what it takes to explain it stands.
-        if (fewer.left > np.maximum(found.left, CLEAR)).any():
+        fewer = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
+        # A gap above the gusts is none of them: what it takes to explain it stays.
+        if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
-            refusals.append(Refusal(effect.name, f"judged by what instruments tell, {what} may be 0"))
+            refusals.append(Refusal(effect.name, f"by instruments {what} may be 0"))
         fit = fewer
-    loose = tuple(effect.name for effect in untold(fit, found))
-    late = told_apart(found, named.effects, given)
-    judgement, without = judge.judge(late.found), judge.judge(late.without)
-    left, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
-    if not late.chances or np.nanmax(more**2 - left**2) < VISIBLE**2:
-        late, judgement = late._replace(chances={}, alike=()), without
+    loose = tuple(effect.name for effect in unidentified(fit, found))
+    lags = decided_by_instruments(found, named.effects, given)
+    judgement, without = judge.judge(lags.found), judge.judge(lags.without)
+    after, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
+    if not lags.chances or np.nanmax(more**2 - after**2) < VISIBLE**2:
+        lags, judgement = lags._replace(chances={}, alike=()), without
         refusals += [
-            Refusal(each.effect.name, "a loop that answers gusts looks as late, and instruments tell no more of it")
+            Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
             for each in found.hypothesis.chosen
-            if each.effect.late
+            if each.effect.is_lag
         ]
-    sure = {each.effect.name: chance for each, chance in stand if np.isfinite(chance)} | late.chances
-    return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=sure, untold=loose)
+    sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)} | lags.chances
+    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
 
 
 def _doubts(
     unnamed: Sequence[str], judged: Sequence[JudgedEffect], loose: Sequence[str], settings: GapSettings
 ) -> Iterator[str]:
-    """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
+    """Say what intervals cover, and which effects are not significant jointly with the others."""
     if unnamed:
         yield (
-            f"beside these, something unnamed explains more than chance ({', '.join(unnamed)}); the intervals cover the"
-            " numbers with and without it"
+            f"something unnamed explains more than chance ({', '.join(unnamed)}); the intervals cover the numbers with"
+            " and without it"
         )
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
-            yield f"{effect.name} is not certain: chance explains as much beside the others, p = {effect.p_value:.2g}"
+            yield f"{effect.name} is not significant jointly with the others, p = {effect.p_value:.2g}"
         if effect.name in loose:
             yield (
-                f"instruments do not tell the numbers of {effect.name}: those of a fit to all motion stand, in which"
-                " the loop answers gusts, so they may be off by more than their intervals"
+                f"instruments do not identify the numbers of {effect.name}: they come from a fit to all motion, in"
+                " which the loop answers gusts, and may be off by more than their intervals"
             )
 
 
@@ -301,7 +287,7 @@ def not_judged(unseen: HeldOut) -> Iterator[str]:
 def _searched(
     weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
 ) -> tuple[list[Effect], list[RankedStep], NamedFit, list[Refusal]]:
-    """Search for effects that earn their names; once more without those that stand on a bound, or beyond.
+    """Search for effects that earn their names; once more without those on a bound, or beyond.
 
     Such an effect takes up what others would explain, and has to go before they can be seen.
     """
@@ -350,11 +336,11 @@ def _concluded(
     settings: GapSettings,
 ) -> Conclusion:
     (hypothesis, estimates, *_), held_out = found.judgement
-    remainder = found.judge.remainder(found.judgement.found)
+    remainder = unexplained_channels(found.judgement.found, found.judge.rng)
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
     floor, differ = found.steps[-1].floor, found.differ
-    # In gusts instruments tell the numbers, and a gap need not stand out.
+    # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
     numbers = wrong_numbers(estimates, effects, taken)
@@ -366,8 +352,8 @@ def _concluded(
         by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
         removed = removed if effects and (remainder or by_numbers) else {}
     share = min(removed.values(), default=1.0)
-    told = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
-    once = {(rival.name, rival.instead_of, rival.beside): rival for rival in told}
+    listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
+    once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors
     least = settings.named_share
@@ -385,6 +371,7 @@ def _concluded(
         verdict = GapVerdict.CONTRADICTED
     elif differ:
         verdict = GapVerdict.FLIGHTS_DIFFER
+    lags = any(CATALOGUE[each.effect.name].is_lag for each in judged)
     refused = verdict in (GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER, GapVerdict.CONTRADICTED)
     return Conclusion(
         verdict=verdict,
@@ -395,7 +382,8 @@ def _concluded(
         effects=tuple(faults if refused else effects),
         closest=tuple(named) if refused else (),
         alternatives=rivals,
-        sets=likely_sets(judged) if still or not _late(judged) else (),
+        # In gusts fits of lags see the loop, and do not compare.
+        sets=() if lags and not still else likely_sets(judged),
         unexplained=tuple(known) if verdict is GapVerdict.NAMED else remainder,
         not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         vehicle_numbers=all_numbers(estimates),
@@ -403,8 +391,3 @@ def _concluded(
         torque_alone=torque_alone,
         notes=(*audited.filtered, *audited.settled, *differ, *wrong, *notes, *audited.warnings, *audited.notes),
     )
-
-
-def _late(judged: Sequence[JudgedEffect]) -> bool:
-    """Tell whether anything makes the rotors late: in gusts its fits see the loop, and do not compare."""
-    return any(CATALOGUE[each.effect.name].late for each in judged)

@@ -16,14 +16,8 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import (
-    CHANNELS,
-    Candidate,
-    Preparation,
-    WeakFlight,
-    nuisance,
-)
-from cpfls_cli.gap.naming.by_instruments import by_instruments, untold_axes
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, Preparation, WeakFlight, nuisance
+from cpfls_cli.gap.naming.by_instruments import by_instruments, unidentified_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor
@@ -34,36 +28,21 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
 class FittedEffect(NamedTuple):
-    """An effect of a model with its linear coefficients.
-
-    Attributes
-    ----------
-    linear : array, shape (coefficient,)
-        Of its columns; empty where everything is in the shape.
-    """
+    """An effect of a model with its linear coefficients."""
 
     candidate: Candidate
-    linear: Array
+    linear: Array  # Shape (coefficient,): of its columns; empty where everything is in the shape.
 
 
 @dataclass(frozen=True)
 class ExtendedModel:
-    """A model with effects; without any and with zero parameters it is the base.
+    """A model with effects; without any and with zero parameters it is the base."""
 
-    Attributes
-    ----------
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    parameters : array, shape (parameter,)
-        Relative errors of the vehicle's own numbers, in the order of the catalogue.
-    audit : Audit or None
-        Faults of the sensors, which are taken out of signals first.
-    """
-
-    base: InertiaModel | None
+    base: InertiaModel | None  # None for the rigid body of the vehicle.
+    # Shape (parameter,): relative errors of the vehicle's own numbers, in the order of the catalogue.
     parameters: Array
     effects: tuple[FittedEffect, ...] = ()
-    audit: Audit | None = None
+    audit: Audit | None = None  # Faults of the sensors, which are taken out of signals first.
 
     @classmethod
     def of(cls, base: InertiaModel | None, hypothesis: System, estimates: Estimates, audit: Audit) -> ExtendedModel:
@@ -88,15 +67,8 @@ class ExtendedModel:
     def system(self, flights: Sequence[WeakFlight]) -> System:
         """Set up the balance of flights under the model's effects.
 
-        Parameters
-        ----------
-        flights : sequence of WeakFlight
-            Made with `base`, of repaired signals.
-
-        Raises
-        ------
-        InputError
-            If a flight lacks a signal that an effect needs.
+        `flights`: made with `base`, of repaired signals.
+        Raises InputError if a flight lacks a signal that an effect needs.
         """
         for flight, candidate in product(flights, self.chosen):
             missing = candidate.effect.missing(flight.signals)
@@ -109,7 +81,7 @@ class ExtendedModel:
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
         """Compute the gap that the model leaves, shape (window, 6), N m and N."""
         hypothesis = self.system(flights)
-        return hypothesis.left(self.linear)
+        return hypothesis.residual_at(self.linear)
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
@@ -119,16 +91,10 @@ def plain(base: InertiaModel | None) -> ExtendedModel:
 
 @dataclass(frozen=True)
 class Refit:
-    """A refitted model with effects and its residuals on held-out flights.
-
-    Attributes
-    ----------
-    effects : tuple of NamedEffect
-        With refitted numbers.
-    """
+    """A refitted model with effects and its residuals on held-out flights."""
 
     model: ExtendedModel
-    effects: tuple[NamedEffect, ...]
+    effects: tuple[NamedEffect, ...]  # With refitted numbers.
     estimates: Estimates
     unseen: HeldOut
 
@@ -144,21 +110,12 @@ def extend(
 ) -> Refit:
     """Refit a model together with effects and evaluate it on held-out flights.
 
-    Parameters
-    ----------
-    effects : sequence of NamedEffect
-        To become part of the model; shapes start from theirs.
-    audit : Audit
-        Faults of the sensors that are repaired.
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    gusty_floor : array, shape (6,), N m and N, or None
-        Noise floor with the gusts of the flights, beside which the numbers come by instruments; None for no gusts.
-
-    Raises
-    ------
-    ComputationError
-        If the gap on the held-out flights does not shrink in the channels that change.
+    `effects`: to become part of the model; shapes start from theirs.
+    `audit`: faults of the sensors that are repaired.
+    `base`: None for the rigid body of the vehicle.
+    `gusty_floor`, shape (6,), N m and N: noise floor with the gusts of the flights, above which the numbers come by
+    instruments; None for no gusts.
+    Raises ComputationError if the gap on the held-out flights does not shrink in the channels that change.
     """
     prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
     flights, logged, repaired = prepared.repaired(training), prepared.logged(held), prepared.repaired(held)
@@ -170,8 +127,8 @@ def extend(
     found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
         given = known_motion(training)
-        untold = untold_axes(found, given)
-        flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
+        unidentified = unidentified_axes(found, given)
+        flights, logged, repaired = ([f.as_stated(unidentified) for f in each] for each in (flights, logged, repaired))
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
     hypothesis, estimates, *_ = found
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)

@@ -1,7 +1,5 @@
 """Flights as the results of the gap workflow hold them, so that later stages need no logs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Self
 
@@ -11,11 +9,9 @@ from cpfls_cli.result import about, described_fields, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
-GIVEN, TRAINING, HELD_OUT = "given", "training", "held-out"
-"""Roles of flights: of a comparison, and of a diagnosis."""
+GIVEN, TRAINING, HELD_OUT = "given", "training", "held-out"  # Roles of flights: of a comparison, and of a diagnosis.
 _BODY, _WORLD = "body (FLU)", "world (z up)"
-_ASKED = "setpoint_"
-"""Before the name of a signal that was asked for."""
+_ASKED = "setpoint_"  # Before the name of a signal that was asked for.
 
 
 @result

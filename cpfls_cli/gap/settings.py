@@ -1,7 +1,5 @@
 """Settings of the section `gap`: how flights and simulation are compared, and how an effect is named."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -11,37 +9,27 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
+# Root mean square in floors above which a gap is there.  Without a gap half of the channels exceed 1 floor, and floors
+# of coloured noise are off by a third.
 CLEAR = 1.5
-"""Root mean square in floors above which a gap is there.
-
-Without a gap half of the channels exceed 1 floor, and floors of coloured noise are off by a third.
-"""
-
 NOISE = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
 OFF = 0.1
 """Share of its torque and force that a formula may be off by: laws of drag, lift and rotors are known to a tenth."""
 
+# Root mean square in floors of one channel from which on an effect shows.  With noise it makes the channel 4 % larger;
+# less than that floors are off by.
 VISIBLE = 0.3
-"""Root mean square in floors of one channel from which on an effect shows.
-
-Beside noise it makes the channel 4 % larger; less than that floors are off by.
-"""
-
-ERRORS = 2.0
-"""Standard errors by which a difference is sure, 95 % two-sided."""
-
+ERRORS = 2.0  # Standard errors by which a difference is sure, 95 % two-sided.
 COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
+# Probability of chance from which on something makes an answer more careful: an unnamed effect, a form of lag.
 CHANCE = 0.05
-"""Probability of chance from which on something makes an answer more careful: an unnamed effect, a form of
-what is late."""
-
 RARE = 0.01
-"""The rate of errors that names are given at, gusts among them: of chance, of an effect that is 0 by what instruments
-tell, and of a rival beside the chosen set."""
+"""The rate of errors that names are given at, gusts among them: of chance, of an effect that is 0 by
+instruments, and of a rival against the chosen set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,9 +63,7 @@ class GapSettings(Settings):
     def __post_init__(self) -> None:
         """Check the shares against each other.
 
-        Raises
-        ------
-        SettingError
+        Raises SettingError.
         """
         if self.partial_share >= self.named_share:
             raise SettingError("partial_share", "must be below named_share")

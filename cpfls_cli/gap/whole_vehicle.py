@@ -1,7 +1,5 @@
 """Between what a balance is fitted with and the model of a whole vehicle: each as the other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -28,15 +26,8 @@ from cpfls_cli.weak_form.windows import Recording
 def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        That the effects were fitted with.
-
-    Returns
-    -------
-    VehicleModel
-        With the inertia of before where the one that comes with the effects is that of no body.
+    `vehicle`: that the effects were fitted with.
+    Result: with the inertia of before where the one that comes with the effects is that of no body.
     """
     given, fuzzy = inertia_tensor(vehicle), extended.base
     parts, times = _parts(extended, vehicle)
@@ -56,7 +47,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleM
 
 
 def _parts(extended: ExtendedModel, vehicle: VehicleSettings) -> tuple[VehicleParts, dict[str, float]]:
-    """Put each effect where the model of a whole vehicle has it, and tell how late the rotors are, s."""
+    """Put each effect where the model of a whole vehicle has it, and give lag and delay of the rotors, s."""
     parts = VehicleParts(vehicle, inertia_correction(extended.parameters, vehicle))
     times = {"delay_s": 0.0, "lag_s": 0.0}
     for (known, shape), linear in extended.effects:
@@ -84,14 +75,7 @@ def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     """Refuse effects with which the inertia is that of no body.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        That they were fitted with.
-
-    Raises
-    ------
-    ComputationError
+    `vehicle`: that they were fitted with. Raises ComputationError.
     """
     inertia = inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia
     if extended.base is None and not positive_definite(inertia[None]).all():
@@ -113,10 +97,7 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
 
     A model with more than effects of the catalogue has a single one: all that it has beyond its rigid body.
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Signals have to be those of its vehicle, see `of_vehicle`.
+    `model`: signals have to be those of its vehicle, see `of_vehicle`.
     """
     base = replace(plain(model.fuzzy), audit=model.repairs)
     numbers = next((one.coefficients for one in model.effects if one.name == VEHICLE_NUMBERS.name), base.parameters)
@@ -134,10 +115,7 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
 def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Exchange the stated vehicle of flights for that of a model.
 
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that the model needs.
+    Raises InputError if a flight lacks a signal that the model needs.
     """
     wind, given = np.array(model.wind) if any(model.wind) else None, []
     for recording in recordings:
@@ -153,30 +131,27 @@ def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Rec
 
 
 def has_effects(model: VehicleModel) -> bool:
-    """Tell a vehicle that was found from what a search begins with: a rigid body, or an inertia over attitude."""
+    """Separate a vehicle that was found from what a search begins with: a rigid body, or an inertia over attitude."""
     return not model.is_rigid_body and model.fuzzy is None
 
 
-def beside_rotors(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
 
-    Raises
-    ------
-    InputError
-        If a flight lacks a signal that the model needs.
+    Raises InputError if a flight lacks a signal that the model needs.
     """
     if not has_effects(model):
         return list(recordings)
     given = []
     for recording in of_vehicle(recordings, model):
         signals = recording.signals
-        beside = model.wrench_along(model.acting(signals)) - signals.wrench
-        given.append(replace(recording, signals=replace(signals, beside=beside)))
+        known = model.wrench_along(model.acting(signals)) - signals.wrench
+        given.append(replace(recording, signals=replace(signals, known_wrench=known)))
     return given
 
 
 def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
-    """Add what a balance has found beside a model to it."""
+    """Add to a model what a balance has found above it."""
     if not has_effects(base):
         return found
     known = {effect.name: effect for effect in base.effects}
@@ -192,9 +167,9 @@ def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
 
 
 def known_already(model: VehicleModel) -> tuple[str, ...]:
-    """Name the effects that a model has: a search beside it does not look for them again."""
-    late = [known.name for known, _ in late_effects(model.response)]
-    return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
+    """Name the effects that a model has: a search above it does not look for them again."""
+    lags = [known.name for known, _ in late_effects(model.response)]
+    return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *lags)
 
 
 def _beyond_rigid_body(model: VehicleModel) -> Effect:

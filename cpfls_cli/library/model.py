@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from cpfls_cli.artifacts.job import Job
     from cpfls_cli.config.study import Study
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.playback.motion import State
     from cpfls_cli.playback.rotors import Hold
     from cpfls_cli.report.outcome import Outcome
+    from cpfls_cli.stage import Run
 
 
 def run(*words: str | os.PathLike[str]) -> None:
@@ -267,7 +267,7 @@ class Model:
     @property
     def formats(self) -> tuple[str, ...]:
         """The forms in which it can be exported."""
-        from cpfls_cli.commands.export import ENDINGS
+        from cpfls_cli.stages.export import ENDINGS
 
         return tuple(ENDINGS)
 
@@ -290,9 +290,12 @@ class Model:
         list of Path
             The files written.
         """
-        from cpfls_cli.commands import export
+        from cpfls_cli.stages.export import Formats, export
 
-        outcome = export.run(self._job(Path(path), force), self._file("export"), form, name, anyway=force)
+        chosen = None if form is None else Formats(form)
+        outcome = export.run(
+            self._run(Path(path), force), model=self._file("export"), format=chosen, name=name, anyway=force
+        )
         _warn(outcome, 3)
         return [Path(file) for file in outcome.summary["output"]]
 
@@ -324,18 +327,17 @@ class Model:
         """Run a stage, and keep in memory what it writes."""
         from tempfile import TemporaryDirectory
 
-        from cpfls_cli.stage import Run, loaded
+        from cpfls_cli.stage import loaded
 
         with TemporaryDirectory(prefix="cpfls-") as folder:
             output = Path(folder, "artifact.h5")
-            run = Run(self._study, output, False, dry_run=False, progress=lambda *_: None, reads=lambda _: None)
-            _warn(loaded(name).run(run, **given), 4)
+            _warn(loaded(name).run(self._run(output, force=False), **given), 4)
             return _read(output)
 
-    def _job(self, output: Path, force: bool) -> Job:
-        from cpfls_cli.artifacts.job import Job
+    def _run(self, output: Path, force: bool) -> Run:
+        from cpfls_cli.stage import Run
 
-        return Job(self._study, output, force, dry_run=False, progress=lambda *_: None, reads=lambda _: None)
+        return Run(self._study, output, force, dry_run=False, progress=lambda *_: None, reads=lambda _: None)
 
 
 def _path_of(flight: str | os.PathLike[str] | Artifact) -> Path:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.load import flat_keys
@@ -50,7 +49,7 @@ _LONGEST = 60
 _ABSENT = "not there"
 # What a page looks like does not change a model.
 _LEFT_OUT = ("report",)
-_BEYOND = "beyond both intervals"
+BEYOND = "beyond both intervals"
 
 _Model = Source[IdentifiedModel]
 
@@ -361,7 +360,7 @@ def compared_vehicles_section(sources: Sources) -> Section | None:
         apart = _apart(known)
         tone: Tone = "warning" if apart else "plain"
         values = [Cell(_with_interval(each), tone) for each in constants]
-        rows.append([f"{known[0].name}, {known[0].unit}", *values, _BEYOND if apart else ""])
+        rows.append([f"{known[0].name}, {known[0].unit}", *values, BEYOND if apart else ""])
     header = ("Constant", *(vehicle.label for vehicle in vehicles), "Differ")
     caption = (
         "Constants with 95 % intervals; in brackets what the flights do not tell. Marked where two of them lie beyond "
@@ -372,15 +371,12 @@ def compared_vehicles_section(sources: Sources) -> Section | None:
     return Section("vehicles", "The vehicles side by side", [_judged(vehicles), table])
 
 
-def model_verdicts(sources: Sources) -> Iterator[Block]:
-    """Say in a word how far to trust each model, and which constants of several vehicles differ."""
-    models = sources.of_kind(AnyModel)
-    if models:
-        yield _judged(models)
-    if len(sources.vehicles) > 1:
-        listed = ([each for each in constants if each is not None] for constants in _constants(sources.vehicles))
-        apart = [known[0].name for known in listed if _apart(known)]
-        yield Text(f"differ {_BEYOND}: {joined(apart)}" if apart else f"no constant differs {_BEYOND}")
+def differing(sources: Sources) -> tuple[str, ...] | None:
+    """Name the constants of vehicles that differ beyond their intervals; None of fewer than two vehicles."""
+    if len(sources.vehicles) < 2:
+        return None
+    listed = ([each for each in constants if each is not None] for constants in _constants(sources.vehicles))
+    return tuple(known[0].name for known in listed if _apart(known))
 
 
 def _judged(models: Sequence[Source[Any]]) -> Facts:

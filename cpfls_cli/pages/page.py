@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
+from markupsafe import Markup
+
+from cpfls_cli import page
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
@@ -17,11 +22,24 @@ from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
-from cpfls_cli.report.content import Block, Document, Section
+from cpfls_cli.report.content import (
+    Block,
+    Box,
+    Facts,
+    Folded,
+    Heading,
+    Listing,
+    Plot,
+    Section,
+    Table,
+    Text,
+    Tone,
+    unfolded,
+)
+from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
-from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
-from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.report.source import Document
 from cpfls_cli.stage import stage_named
 
 
@@ -64,6 +82,7 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     return sections
 
 
+_HASH_SHOWN = 12
 _MODELS = attrgetter("models")
 _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
@@ -106,8 +125,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     provenance_section,
 )
 
-_WRITE = {Form.HTML: html_page, Form.MARKDOWN: markdown_page, Form.JSON: json_page}
-
 
 @dataclass(frozen=True)
 class Page:
@@ -134,9 +151,61 @@ def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
 def page_of(sources: Sources, sections: Sequence[Section], version: str, form: Form = Form.HTML) -> Page:
     """Write sections about artifacts as one page: those of `sections_of`, and what a study adds of its own."""
     return Page(
-        text=_WRITE[form](Document(sources.title, version, sections, sources.all)),
+        text=written(Document(sources.title, version, sections, sources.all), form),
         sections=tuple(section.name for section in sections),
         figures=tuple(name for section in sections for name in section.plots),
         tables=tuple(name for section in sections for name in section.tables),
         missing=tuple(missing(sources)),
     )
+
+
+def written(document: Document, form: Form) -> str:
+    """Write a report in a form."""
+    if form is Form.JSON:
+        return json_page(document)
+    files = ", ".join(f"{page.escaped(each.label)} {page.code(each.sha256[:_HASH_SHOWN])}" for each in document.origins)
+    parts = [f"# {page.escaped(document.title)}", f"Made by cpfls {page.escaped(document.version)} from {files}."]
+    for section in document.sections:
+        parts += [f"## {page.escaped(section.title)} {{#{section.name}}}", *_words(section.blocks)]
+    text = "\n\n".join(parts)
+    if form is Form.MARKDOWN:
+        return page.markdown(text)
+    shown = (block for section in document.sections for block in unfolded(section.blocks))
+    figures = {block.name: partial(figure_html, block.picture) for block in shown if isinstance(block, Plot)}
+    return page.html(document.title, text, figures)
+
+
+def _words(blocks: Iterable[Block]) -> Iterator[str]:
+    """Write blocks as Markdown with what pages add to it."""
+    for block in blocks:
+        match block:
+            case Heading():
+                yield f"#### {page.said(block.text)}"
+            case Text():
+                yield f"{'> ' if block.tone == 'warning' else ''}{_toned(block.text, block.tone)}"
+            case Facts():
+                yield "\n".join(f"- **{page.said(term)}**: {page.said(value)}" for term, value in block.rows)
+            case Table():
+                yield f"{page.said(block.explained)} {{#{block.name}}}"
+                rows = [[_toned(cell.text, cell.tone) for cell in row] for row in block.cells]
+                yield page.table([page.said(name) for name in block.header], rows, block.words)
+            case Plot():
+                more = f" [{page.said(block.see[1])}](#{block.see[0]})" if block.see else ""
+                yield f"![{page.said(block.caption)}{more}]({block.name})"
+            case Listing():
+                fence = "`" * max(3, 1 + max(map(len, re.findall("`+", block.text)), default=0))
+                yield f"::: {page.said(block.summary)}{' {open wide}' if block.shown else ''}"
+                yield f"{fence}text\n{block.text.rstrip()}\n{fence}\n:::"
+            case Folded():
+                yield f"::: {page.said(block.summary)}{' {open wide}' if block.shown else ''}"
+                yield from _words(block.blocks)
+                yield ":::"
+            case Box():
+                yield f"::: {page.said(f'{block.label}: {block.title}')} {{{block.tone} open wide}}"
+                yield from map(page.said, block.sentences)
+                yield ":::"
+
+
+def _toned(text: str, tone: Tone) -> Markup:
+    """Write a text or a cell with its tone."""
+    return Markup(f"{page.said(text)} {{{tone}}}") if tone != "plain" and text.strip() else page.said(text)

@@ -1,4 +1,4 @@
-"""What of a gap comes again where flights repeat their path, on a page: an effect that is missing, or gusts."""
+"""The repeatable part of a gap where flights repeat their path, on a page: a missing effect, or gusts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.residual.repeated import ComesAgain
+from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.pages.gap import channel_words
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over
 from cpfls_cli.report.numbers import plain
@@ -25,23 +25,23 @@ FLOWN_BY_HAND = frozenset({"bbl", "bfl"})
 """Formats of logs whose autopilot flies no mission file."""
 
 NOT_SPLIT = (
-    "No two of these flights repeat a path, so the gap cannot be split into what comes again (an effect that the model "
-    "lacks) and what does not (gusts, noise). Logged setpoints of position or velocity tell that too. To fly: "
+    "No two of these flights repeat a path, so the gap cannot be split into a repeatable part (an effect that the "
+    "model lacks) and the rest (gusts, noise). Logged setpoints of position or velocity do that too. To fly: "
     f"{WHAT_TO_FLY}"
 )
 _COLUMNS = 3
 _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("again, explained", {"facecolor": "white"}),
-    ("again, not explained", {"facecolor": "#1b4f8a"}),
-    ("not again", {"facecolor": "#d9d9d9", "hatch": "////"}),
+    ("repeatable, explained", {"facecolor": "white"}),
+    ("repeatable, not explained", {"facecolor": "#1b4f8a"}),
+    ("not repeatable", {"facecolor": "#d9d9d9", "hatch": "////"}),
     ("sensor noise", {"facecolor": "white", "hatch": "...."}),
 )
 
 
-def again_drawn(groups: Callable[[Any], tuple[ComesAgain | None, ComesAgain | None]]) -> Drawn:
-    """Make the figure of what comes again of a result: of the model as given, and with effects or None."""
+def repeatability_drawn(groups: Callable[[Any], tuple[Repeatability | None, Repeatability | None]]) -> Drawn:
+    """Make the figure of what is repeatable: of the model as given, and with effects or None."""
 
-    def held(r: Any) -> list[ComesAgain]:
+    def held(r: Any) -> list[Repeatability]:
         return [each for each in groups(r) if each is not None]
 
     def height(r: Any) -> float:
@@ -50,11 +50,11 @@ def again_drawn(groups: Callable[[Any], tuple[ComesAgain | None, ComesAgain | No
     def draw(r: Any, figure: Figure) -> None:
         _draw(held(r), figure)
 
-    return Drawn("What comes again of torque and force, by channel and band", height, draw, held)
+    return Drawn("Repeatable part of torque and force, by channel and band", height, draw, held)
 
 
-def _draw(groups: Sequence[ComesAgain], figure: Figure) -> None:
-    """Draw by channel and band what comes again, explained and not, and what does not."""
+def _draw(groups: Sequence[Repeatability], figure: Figure) -> None:
+    """Draw by channel and band what is repeatable, explained and not, and the rest."""
     before = groups[0]
     channels, bands = before.known, np.arange(1, len(before.low))[::-1]
     ends = zip(before.low.tolist(), before.high.tolist(), strict=True)
@@ -70,11 +70,11 @@ def _draw(groups: Sequence[ComesAgain], figure: Figure) -> None:
     legend_over(figure, panels.flat[0])
 
 
-def _draw_channel(axes: Axes, groups: Sequence[ComesAgain], channel: int, bands: Any) -> None:
+def _draw_channel(axes: Axes, groups: Sequence[Repeatability], channel: int, bands: Any) -> None:
     width = 0.8 / len(groups)
-    for place, again in enumerate(groups):
+    for place, found in enumerate(groups):
         x = np.arange(len(bands)) - 0.4 + width * (place + 0.5)
-        heights, bottom = _heights(again, channel)[:, bands], np.zeros(len(bands))
+        heights, bottom = _heights(found, channel)[:, bands], np.zeros(len(bands))
         for (label, style), height in zip(_PARTS, heights, strict=True):
             shown = label if place == 0 else None
             axes.bar(x, height, 0.92 * width, bottom=bottom, label=shown, edgecolor=GREY, linewidth=0.6, **style)
@@ -84,10 +84,10 @@ def _draw_channel(axes: Axes, groups: Sequence[ComesAgain], channel: int, bands:
     axes.set_axisbelow(True)
 
 
-def _heights(again: ComesAgain, channel: int) -> Any:
+def _heights(found: Repeatability, channel: int) -> Any:
     """Give the parts of a bar in per cent, shape (part, band)."""
-    left = np.clip(again.again[channel], 0.0, again.total[channel])
-    noise = np.clip(np.nan_to_num(again.noise[channel]), 0.0, again.total[channel] - left)
-    explained = np.clip(again.taken[channel] - left, 0.0, None)
-    parts = np.nan_to_num(np.array([explained, left, again.total[channel] - left - noise, noise]))
+    gap = np.clip(found.repeatable[channel], 0.0, found.total[channel])
+    noise = np.clip(np.nan_to_num(found.noise[channel]), 0.0, found.total[channel] - gap)
+    explained = np.clip(found.motion[channel] - gap, 0.0, None)
+    parts = np.nan_to_num(np.array([explained, gap, found.total[channel] - gap - noise, noise]))
     return 100 * parts / np.maximum(parts.sum(axis=0), np.finfo(float).tiny)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic
+from typing import Any
 
 from typing_extensions import TypeVar
 
@@ -15,34 +15,16 @@ from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.report.source import Source as Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-if TYPE_CHECKING:
-    # A page loads the records that it is about, not all others.
-    from cpfls_cli.artifacts.diagnosis import Diagnosis
-    from cpfls_cli.artifacts.disagreement import Disagreement
-    from cpfls_cli.artifacts.extended import Extended
-    from cpfls_cli.artifacts.identified import IdentifiedModel
-    from cpfls_cli.artifacts.vehicle_model import Vehicle
-    from cpfls_cli.changes.results import Changed, Trend
-    from cpfls_cli.flights.flight import Flight
-    from cpfls_cli.flights.path import PlannedPath
-    from cpfls_cli.identification.replicates import Sweep
-    from cpfls_cli.playback.along_flights import Playback
-    from cpfls_cli.reduction.selection import Selection
-    from cpfls_cli.response.flown import Responses
-    from cpfls_cli.simulation.twin import Twin
-    from cpfls_cli.tuning.vehicle import Gains
-    from cpfls_cli.validation.prediction import AlongFlight
-
 R = TypeVar("R", default=Any)
 
 
-class _OfFormat(Generic[R]):
+class _OfFormat:
     """The artifacts of one format, as an attribute."""
 
     def __init__(self, name: str) -> None:
-        self.format = name
+        self.format = f"cpfls/{name}"
 
-    def __get__(self, sources: Sources, _: type[Sources]) -> list[Source[R]]:
+    def __get__(self, sources: Sources, _: type[Sources]) -> list[Source]:
         return [source for source in sources.all if source.format == self.format]
 
 
@@ -50,29 +32,19 @@ class _OfFormat(Generic[R]):
 class Sources:
     """Everything that a report is about, with vehicle and settings of the study that it is made with."""
 
-    all: Sequence[Source[Any]]
+    all: Sequence[Source]
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    trajectories: ClassVar[_OfFormat[PlannedPath]] = _OfFormat("cpfls/trajectory")
-    flights: ClassVar[_OfFormat[Flight]] = _OfFormat("cpfls/flight")
-    selections: ClassVar[_OfFormat[Selection]] = _OfFormat("cpfls/selection")
-    models: ClassVar[_OfFormat[IdentifiedModel]] = _OfFormat("cpfls/identified")
-    sweeps: ClassVar[_OfFormat[Sweep]] = _OfFormat("cpfls/sweep")
-    predictions: ClassVar[_OfFormat[AlongFlight]] = _OfFormat("cpfls/prediction")
-    replays: ClassVar[_OfFormat[Playback]] = _OfFormat("cpfls/replay")
-    responses: ClassVar[_OfFormat[Responses]] = _OfFormat("cpfls/response")
-    twins: ClassVar[_OfFormat[Twin]] = _OfFormat("cpfls/twin")
-    gains: ClassVar[_OfFormat[Gains]] = _OfFormat("cpfls/gains")
-    disagreements: ClassVar[_OfFormat[Disagreement]] = _OfFormat("cpfls/disagreement")
-    diagnoses: ClassVar[_OfFormat[Diagnosis]] = _OfFormat("cpfls/diagnosis")
-    vehicles: ClassVar[_OfFormat[Vehicle]] = _OfFormat("cpfls/vehicle")
-    trends: ClassVar[_OfFormat[Trend]] = _OfFormat("cpfls/trend")
-    changes: ClassVar[_OfFormat[Changed]] = _OfFormat("cpfls/changed")
-    extensions: ClassVar[_OfFormat[Extended]] = _OfFormat("cpfls/extended")
+    trajectories, flights, selections = _OfFormat("trajectory"), _OfFormat("flight"), _OfFormat("selection")
+    models, sweeps, predictions = _OfFormat("identified"), _OfFormat("sweep"), _OfFormat("prediction")
+    replays, responses, twins = _OfFormat("replay"), _OfFormat("response"), _OfFormat("twin")
+    gains, vehicles, extensions = _OfFormat("gains"), _OfFormat("vehicle"), _OfFormat("extended")
+    disagreements, diagnoses = _OfFormat("disagreement"), _OfFormat("diagnosis")
+    trends, changes = _OfFormat("trend"), _OfFormat("changed")
 
     @property
-    def gap(self) -> list[Source[Any]]:
+    def gap(self) -> list[Source]:
         """Everything that the gap workflow wrote, answers before their grounds."""
         return [*self.diagnoses, *self.extensions, *self.disagreements]
 
@@ -110,7 +82,7 @@ class Sources:
         """List the artifacts of one kind, in the order given."""
         return [source for source in self.all if isinstance(source.record, kind)]
 
-    def by_hash(self, sha256: str | None) -> Source[Any] | None:
+    def by_hash(self, sha256: str | None) -> Source | None:
         """Look up an artifact by its hash."""
         return next((source for source in self.all if source.sha256 == sha256), None)
 

@@ -1,7 +1,5 @@
 """Changes of a vehicle in words, by the table `templates/causes.yaml`: what changed, how much, what to look at."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
@@ -17,9 +15,7 @@ from cpfls_cli.report.numbers import number
 from cpfls_cli.result import Estimate
 from cpfls_cli.words import joined
 
-_HEAVY = 1000.0
-"""Grams that are written in kg."""
-
+_HEAVY = 1000.0  # Grams that are written in kg.
 _SCALES: Mapping[str, Callable[[float], float]] = {
     "%": lambda size: 100 * size,
     "root": lambda size: 100 * math.expm1(0.5 * size),
@@ -31,24 +27,19 @@ _SCALES: Mapping[str, Callable[[float], float]] = {
 }
 """From the unit of a change to what the table writes: of logarithms of squares the root, or near 0 half of it."""
 _UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times"}
-
-_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
+_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "delay", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
-_OTHERS = 3
-"""Of what would have shown, where nothing of that does."""
-
+_OTHERS = 3  # Of what would have shown, where nothing of that does.
 _CHECKED = 2
-MOST_MOVED = 3
-"""Numbers that are named where no known change explains them."""
-
+MOST_MOVED = 3  # Numbers that are named where no known change explains them.
 _NATURAL = {
-    "load": "",
+    "thrust": "",
     "turn": "",
     "vibration gyroscope": "rad/s",
     "vibration accelerometer": "m/s²",
     "unbalance": "m/s²",
-    "follow": "",
+    "gain": "",
     "scale": "",
     "gusts": "rad/s²",
 }
@@ -154,7 +145,7 @@ def _place(sizes: Sequence[Estimate]) -> str:
 
 
 def is_within(other: str, cause: str) -> bool:
-    """Tell whether a pair of rotors holds the one that changed, or a mass what it does."""
+    """Check whether a pair of rotors holds the one that changed, or a mass what it does."""
     of_pair = cause.startswith("rotor ") and other.startswith("rotors ") and cause.split()[-1] in other.split()
     return of_pair or (cause in ("hover", "centre of mass") and other == "mass")
 

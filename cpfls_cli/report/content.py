@@ -5,16 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from cpfls_cli import store
 from cpfls_cli.arrays import Array
-from cpfls_cli.files import text_sha256
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-HASH_SHOWN = 12
 
 Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
@@ -255,51 +251,3 @@ class Section:
     def tables(self) -> list[str]:
         """Names of its tables, also of those folded away, in order."""
         return [block.name for block in unfolded(self.blocks) if isinstance(block, Table)]
-
-
-@dataclass(frozen=True)
-class Origin:
-    """An artifact that a document is about, with a label that is unique there and the hash of the file.
-
-    Attributes
-    ----------
-    record : object
-        The result.
-    header : store.Origin
-        Where it comes from.
-    """
-
-    label: str
-    sha256: str
-    record: Any
-    header: store.Origin = field(kw_only=True)
-
-    @property
-    def format(self) -> str:
-        """Name of its format."""
-        return str(self.record.FORMAT)
-
-    @property
-    def stage(self) -> str:
-        """Stage that made it."""
-        return self.header.stage
-
-    @property
-    def short_hash(self) -> str:
-        """First digits of the hash."""
-        return self.sha256[:HASH_SHOWN]
-
-    @property
-    def config_sha256(self) -> str:
-        """Hash of the config that made it."""
-        return text_sha256(self.header.config)
-
-
-@dataclass(frozen=True)
-class Document:
-    """A report in any form: its sections, the artifacts that it is about, and the version of the program."""
-
-    title: str
-    version: str
-    sections: Sequence[Section]
-    origins: Sequence[Origin]

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.report.content import STRUCK, Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table, Text
+from cpfls_cli.report.content import STRUCK, Block, Facts, Folded, Panel, Plot, Series, Table, Text
+from cpfls_cli.report.source import Document, Source
 
 _DIGITS = 6
 
@@ -88,7 +89,7 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.{_DIGITS}g}") + 0.0 if np.isfinite(value) else None
 
 
-def _origin(origin: Origin) -> dict[str, Any]:
+def _origin(origin: Source) -> dict[str, Any]:
     header = origin.header
     return {
         "file": origin.label,

@@ -1,7 +1,5 @@
 """Which responses flights and a model have: torque to angular acceleration, thrust to specific force, and others."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -33,12 +31,10 @@ from cpfls_cli.response.mismatch import (
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
 from cpfls_cli.result import about, part, result
 
+# Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
+# The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
+# not depend on them.
 InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
-"""Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
-
-The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
-not depend on them.
-"""
 
 
 NO_INSTRUMENTS = "none"
@@ -107,18 +103,9 @@ def vehicle_responses(
     what a window does to a curve it does to both. A command of the rotors knows no gust that the speeds do not know, so
     the response of the speeds needs no instruments. What instruments do not move is estimated without.
 
-    Parameters
-    ----------
-    model : VehicleModel
-    flights : sequence of LoggedFlight
-        Of one sampling period.
-    instruments : callable
-        See `InstrumentSource`.
-
-    Raises
-    ------
-    InputError
-        If a flight lacks what the model needs, or all are too short for a window.
+    `flights`: of one sampling period.
+    `instruments`: see `InstrumentSource`.
+    Raises InputError if a flight lacks what the model needs, or all are too short for a window.
     """
     by_flight = [_of_flight(model, flight) for flight in flights]
     found: dict[str, list[Stretch]] = {}

@@ -17,29 +17,18 @@ if TYPE_CHECKING:
 ROTATION, THRUST, ROTOR_SPEED = ("roll", "pitch", "yaw"), "thrust", "rotor speed"
 """Names of the responses of rotation and specific force, and of that of the rotors' speeds to their commands."""
 
-COHERENT = 0.6
-"""Coherence above which a response is judged (Tischler and Remple)."""
-
-ACCEPTABLE, GOOD = 100.0, 50.0
-"""Costs up to which a model is acceptable and good (Tischler and Remple)."""
-
-_SURE_WINDOWS = 33
-"""With which a coherence of 0.6 leaves a random error of 10 %."""
+COHERENT = 0.6  # Coherence above which a response is judged (Tischler and Remple).
+ACCEPTABLE, GOOD = 100.0, 50.0  # Costs up to which a model is acceptable and good (Tischler and Remple).
+_SURE_WINDOWS = 33  # With which a coherence of 0.6 leaves a random error of 10 %.
 _STRONG = 10.0
 """F statistic from which on instruments are strong (Staiger and Stock 1997): weaker ones give the loop again."""
 _MOST_POINTS = 20
-_FEWEST_POINTS = 8
-"""Of a band that is judged: an octave."""
-_DIP = 2
-"""Points in which the coherence may dip without ending a band."""
-_PHASE = 0.01745
-"""Weight of a squared degree against a squared decibel: 7.6 degrees count as 1 dB."""
-_SURE = 2.0
-"""Random errors from which on a difference is none of chance."""
-_SHORTEST = 3
-"""Points of a stretch: a single one is scatter."""
-_LEAST = 1e-6
-"""Gain over another, to which a model that does nothing is set: decibels of nothing are none."""
+_FEWEST_POINTS = 8  # Of a band that is judged: an octave.
+_DIP = 2  # Points in which the coherence may dip without ending a band.
+_PHASE = 0.01745  # Weight of a squared degree against a squared decibel: 7.6 degrees count as 1 dB.
+_SURE = 2.0  # Random errors from which on a difference is none of chance.
+_SHORTEST = 3  # Points of a stretch: a single one is scatter.
+_LEAST = 1e-6  # Gain over another, to which a model that does nothing is set: decibels of nothing are none.
 
 
 NOT_JUDGED, NOT_ACCEPTABLE = "not-judged", "not-acceptable"
@@ -77,14 +66,11 @@ class Mismatch:
 def clearness(coherence: Array, random_error: Array, averages: Array, instrumented: bool) -> Array:
     """Give the coherence that counts: with instruments that of 33 windows with the same random error, where it is more.
 
-    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 stands
-    for the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
+    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 means
+    the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
     is the share that may be the loop's.
 
-    Parameters
-    ----------
-    coherence, random_error, averages : array, shape (..., frequency)
-        See `FrequencyResponse`.
+    `coherence`, `random_error`, `averages`, shape (..., frequency): see `FrequencyResponse`.
     """
     if not instrumented:
         return coherence
@@ -112,9 +98,7 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     evenly spread on a logarithmic scale. A model is off where this sum, without W, is above 100 for one frequency
     alone, and by more than twice the random error.
 
-    References
-    ----------
-    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapter 11.
+    Reference: Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapter 11.
     """
     part = judged_band(response)
     if part is None:
@@ -124,18 +108,13 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     if response.model is None:
         return Mismatch(cost=np.nan, band=band)
     ratio = response.model[part] / response.gain[part]
-    apart = _apart(ratio)
+    # Squared differences in decibels and degrees.
+    apart = _decibels(ratio) ** 2 + _PHASE * np.degrees(np.angle(ratio)) ** 2
     chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
     weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
     cost = 20.0 * float((weight * apart[chosen]).mean())
     off = (20.0 * apart > ACCEPTABLE) & (np.abs(ratio - 1) > _SURE * response.random_error[part])
     return Mismatch(cost=cost, band=band, deviations=tuple(_deviations(frequency, ratio, off)))
-
-
-def _apart(ratio: ComplexArray) -> Array:
-    """Add squared differences in decibels and degrees."""
-    phase = np.degrees(np.angle(ratio))
-    return np.asarray(_decibels(ratio) ** 2 + _PHASE * phase**2)
 
 
 def _decibels(ratio: ComplexArray) -> Array:
@@ -144,15 +123,11 @@ def _decibels(ratio: ComplexArray) -> Array:
 
 def _deviations(frequency: Array, ratio: ComplexArray, off: BoolArray) -> list[Deviation]:
     """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
-    kind = np.where(off, _kinds(ratio), 0)
-    kind = _without_scatter(kind)
-    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
-
-
-def _kinds(ratio: ComplexArray) -> Array:
-    """Tell what a difference is: 1 too strong, -1 too weak, 2 early, -2 late."""
     gain, phase = _decibels(ratio), np.degrees(np.angle(ratio))
-    return np.asarray(np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)), dtype=int)
+    # 1 too strong, -1 too weak, 2 early, -2 late.
+    kinds = np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)).astype(int)
+    kind = _without_scatter(np.where(off, kinds, 0))
+    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
 
 
 def _without_scatter(kind: Array) -> Array:

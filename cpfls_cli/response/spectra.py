@@ -18,14 +18,11 @@ from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, 
 from cpfls_cli.response.mismatch import clearness
 from cpfls_cli.result import about, result
 
-_LENGTHS = 5
-"""Windows of so many lengths, from the shortest to the longest by equal ratios."""
+_LENGTHS = 5  # Windows of so many lengths, from the shortest to the longest by equal ratios.
 _LONGEST_S = 20.0
 _SHORTEST_S = 1.0
-_FEWEST_SAMPLES = 16
-"""Of a window: fewer do not follow its curve."""
-_FEWEST_WINDOWS = 5
-"""Lengths of the longest window that all flights together have: fewer say nothing of the error."""
+_FEWEST_SAMPLES = 16  # Of a window: fewer do not follow its curve.
+_FEWEST_WINDOWS = 5  # Lengths of the longest window that all flights together have: fewer say nothing of the error.
 _PERIODS, _FEWEST_PERIODS = 8.0, 2.0
 """Of a frequency in windows that identify it, and in the longest: within fewer, lower ones leak in by some per cent."""
 _OVERLAP = 0.75
@@ -34,28 +31,18 @@ _LOWEST_HZ = 0.1
 _HIGHEST_HZ = 100.0
 _OF_SAMPLING = 0.2
 """Highest frequency, share of that of sampling: above it a straight line between samples is no signal any more."""
-_MOST_BLOCKS = 40
-"""Of windows, in which combinations of instruments are found apart: more cost time."""
-_BLOCKS_BESIDE = 2
-"""Blocks of half a window: windows of those further away have no sample in common."""
-_RIDGE = 1e-6
-"""Share of the power of a column of instruments, so that two equal ones leave something to solve."""
+_MOST_BLOCKS = 40  # Of windows, in which combinations of instruments are found apart: more cost time.
+_BLOCKS_BESIDE = 2  # Blocks of half a window: windows of those further away have no sample in common.
+_RIDGE = 1e-6  # Share of the power of a column of instruments, so that two equal ones leave something to solve.
 _ROUNDING = 1e-9
 _TINY = np.finfo(float).tiny
 
 
 class Channel(NamedTuple):
-    """A signal, or the derivative of one that is never differentiated, or the sum of both.
+    """A signal, or the derivative of one that is never differentiated, or the sum of both."""
 
-    Attributes
-    ----------
-    values : array, shape (time,), or None
-    integral : array, shape (time,), or None
-        Of which the derivative is meant, unit times s.
-    """
-
-    values: Array | None = None
-    integral: Array | None = None
+    values: Array | None = None  # Shape (time,).
+    integral: Array | None = None  # Shape (time,): of which the derivative is meant, unit times s.
 
     def cut(self, part: slice) -> Channel:
         """Take a part of it."""
@@ -63,25 +50,14 @@ class Channel(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Signals without a pause, evenly sampled.
+    """Signals without a pause, evenly sampled."""
 
-    Attributes
-    ----------
-    input : array, shape (time,)
-    output : Channel
-    model : Channel or None
-        What a model gives for the output.
-    instrument : array, shape (time, column), or None
-        NaN where there is none. None: the input, which is right where nothing disturbs the output.
-    start : int
-        First sample, counted from where the path begins that a flight has in common with its repeats.
-    """
-
-    input: Array
+    input: Array  # Shape (time,).
     output: Channel
-    model: Channel | None = None
+    model: Channel | None = None  # What a model gives for the output.
+    # Shape (time, column): NaN where there is none. None: the input, which is right where nothing disturbs the output.
     instrument: Array | None = None
-    start: int = 0
+    start: int = 0  # First sample, counted from where the path begins that a flight has in common with its repeats.
 
 
 @result
@@ -179,23 +155,13 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
     ``sqrt(S_ee / (2 n |G|^2 S_uu g^2))``, g^2 the coherence of instrument and input; with the input for instrument it
     is Bendat and Piersol's ``sqrt((1 - g^2) / (2 n g^2))``.
 
-    Parameters
-    ----------
-    stretches : sequence of Stretch
-        All with a model, or none; all with as many instruments, or none. One without them among others that have
-        some is left out.
-    period : float, s
-
-    Returns
-    -------
-    FrequencyResponse or None
-        None where no stretch is long enough.
-
-    References
-    ----------
-    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapters 7 and 10 (random error; composite
-    windows: spectra are averaged with the squares of ``(error / least error)^-4``); Bendat and Piersol, *Random Data*;
-    Angrist, Imbens and Krueger 1999 (instruments found without the sample that they are used in).
+    `stretches`: all with a model, or none; all with as many instruments, or none. One without them among others that
+    have some is left out.
+    `period`: s.
+    None where no stretch is long enough.
+    Reference: Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapters 7 and 10 (random error;
+    composite windows: spectra are averaged with the squares of ``(error / least error)^-4``); Bendat and Piersol,
+    *Random Data*; Angrist, Imbens and Krueger 1999 (instruments found without the sample that they are used in).
     """
     instrumented = any(stretch.instrument is not None for stretch in stretches)
     usable = [part for stretch in stretches for part in _known(stretch, instrumented)]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.flights.flight import Flight
-from cpfls_cli.identification.scores import AXES
 from cpfls_cli.report.canvas import Drawn, legend_above, line, stacked, style_of
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.stages._demand import infeasible_sentence

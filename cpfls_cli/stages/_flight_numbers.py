@@ -57,13 +57,13 @@ def of_other_vehicles(stated: Sequence[tuple[str, Mapping[str, str]]], *, anyway
     return warnings
 
 
-def of_other_autopilots(flights: Sequence[FlightNumbers], *, loads: bool) -> tuple[list[str], list[str]]:
-    """List where logs state another board, version or range of outputs than the first, and whose loads that touches.
+def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> tuple[list[str], list[str]]:
+    """List where logs state another board, version or range of outputs, and whose shares of thrust that touches.
 
     Parameters
     ----------
-    loads : bool
-        Whether loads are compared; of commands they are shares of what full throttle stands for.
+    thrusts : bool
+        Whether shares of thrust are compared; of commands they are shares of what full throttle stands for.
     """
     (first, own), *others = [each for each in stated_by(flights) if each[1]] or [("", {})]
     unlike, ranges = [], []
@@ -71,7 +71,7 @@ def of_other_autopilots(flights: Sequence[FlightNumbers], *, loads: bool) -> tup
         apart = autopilots_apart(own, facts)
         if apart:
             unlike.append(f"the logs of {first} and {name} state {', '.join(apart)}")
-        if loads and flights[0].commanded and ranges_apart(own, facts):
+        if thrusts and flights[0].commanded and ranges_apart(own, facts):
             ranges.append(name)
     return unlike, ranges
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
@@ -29,7 +28,7 @@ from cpfls_cli.gap.next_flight.logged import (
     needed_signals,
     planned_signals,
 )
-from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, questions_left, require_tellable
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
@@ -39,6 +38,7 @@ from cpfls_cli.report.numbers import number
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.stage import Run
 from cpfls_cli.stages._demand import demand_sentences
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.weak_form.windows import common_windows
@@ -53,7 +53,7 @@ _OPEN = (GapVerdict.NOT_EXCITED, GapVerdict.NO_GAP)
 
 @dataclass(frozen=True)
 class Case:
-    """What is to be told, from which flights on.
+    """What is to be separated, from which flights on.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def _effects(study: Study) -> list[Effect]:
     key = "trajectory.next_flight.to_tell"
     with about(key, InputError):
         effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.to_tell)]
-    require_tellable(effects, key, study.vehicle)
+    require_visible(effects, key, study.vehicle)
     return effects
 
 
@@ -116,7 +116,7 @@ def _between(study: Study) -> tuple[Question, ...]:
     if not questions:
         names = ", ".join(each.name for each in effects)
         raise InputError(
-            f"trajectory.next_flight.to_tell = [{names}]: nothing to tell; name effects with --to-tell A,B (`cpfls "
+            f"trajectory.next_flight.to_tell = [{names}]: nothing to separate; name effects with --to-tell A,B (`cpfls "
             "effects` lists them), or give a diagnosis with --for DIAGNOSIS"
         )
     return questions
@@ -151,12 +151,12 @@ def _left_open(study: Study, path: Path) -> Case:
     floor = best_floor(explained)
     rivals, unseen = _open_effects(study, found, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
-    weighed = questions_left(named, rivals, unseen, flights, floor, study.gap)
+    weighed = open_questions(named, rivals, unseen, flights, floor, study.gap)
     questions = weighed or _between(study)
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
-    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can tell",)
+    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can show it",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
     logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, floor))
     return Case(questions, flights, logging, notes if more else ())
@@ -168,22 +168,22 @@ def _open_effects(
     """List the rivals that a diagnosis leaves, or what its flights could not show; nothing for effects not weighed."""
     asked = _effects(study)
     # Between an effect and two that together do the same no path decides: the log has to.
-    rivals = [each for each in found.alternatives if not each.beside]
-    told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
-    rivals = [each for each in rivals if each.name in told and each.instead_of in found.effects_of_motion]
+    rivals = [each for each in found.alternatives if not each.jointly_with]
+    visible = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
+    rivals = [each for each in rivals if each.name in visible and each.instead_of in found.effects_of_motion]
     if asked:
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
-        require_tellable([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
+        require_visible([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
-    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in told]
+    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in visible]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
         return [], []
     if found.verdict not in _OPEN or not unseen:
         raise InputError(
-            f"{path}: its verdict is {found.verdict}, and it leaves nothing to tell apart; to plan a flight all the "
+            f"{path}: its verdict is {found.verdict}, and it leaves nothing to separate; to plan a flight all the "
             "same name effects with --to-tell A,B"
         )
     return [], unseen

@@ -44,23 +44,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NO_COLUMN = re.compile(r"import\.signals\.(?P<signal>\w+)\.columns: the log has no column '(?P<column>[^']+)'")
-
-_RATE = 0.01
-"""By which sampling rates differ that are another."""
-
+_RATE = 0.01  # By which sampling rates differ that are another.
 _UNLIKE = 0.7
 """Share of what a number may be off by that is not known for how flights are flown, from which on it is said: a half of
 the variance."""
 
-_MARKERS = "osD^vP"
-"""Of today's flights; more look alike."""
-
-_LONG = 18
-"""Letters of a flight's name from which on names stand one below the other."""
-
-_ROW, _HEAD = 0.19, 0.8
-"""Inches of a picture for each number, and around them."""
-
+_MARKERS = "osD^vP"  # Of today's flights; more look alike.
+_LONG = 18  # Letters of a flight's name from which on names stand one below the other.
+_ROW, _HEAD = 0.19, 0.8  # Inches of a picture for each number, and around them.
 _REFERENCE: dict[str, Any] = {"color": GREY, "marker": "|", "markersize": 7, "linestyle": "none", "zorder": 2}
 _TODAY: dict[str, Any] = {
     "color": "black",
@@ -221,8 +212,8 @@ def _compared(run: Run, flights: Mapping[str, FlightNumbers], notes: Sequence[st
     today, before = ([own for role, own in flights.items() if role.startswith(side)] for side in ("today", "since"))
     found = compared(today, before, run.study.vehicle, np.random.default_rng(run.study.seed))
     names = column(found.numbers, "name")
-    loads = any(name.startswith("load ") for name in names)
-    unlike, ranges = of_other_autopilots([*before, *today], loads=loads)
+    thrusts = any(name.startswith("thrust ") for name in names)
+    unlike, ranges = of_other_autopilots([*before, *today], thrusts=thrusts)
     warnings = [
         *notes,
         *_warnings(today, before, names),
@@ -244,8 +235,8 @@ def _warnings(today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], n
     if len({own.commanded for own in flights}) > 1:
         speeds, commands = ([own.name for own in flights if own.commanded == of] for of in (False, True))
         yield (
-            f"speeds of rotors in {joined(speeds)}, commands in {joined(commands)}: loads are not compared; import the "
-            "same signal of all"
+            f"speeds of rotors in {joined(speeds)}, commands in {joined(commands)}: shares of thrust are not "
+            "compared; import the same signal of all"
         )
     elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):
         without = [own.name for own in flights if not np.isfinite(own.voltage)]
@@ -291,7 +282,7 @@ def flown_unlike(
         now, then = ([flight.agility for flight in side if np.isfinite(flight.agility)] for side in (today, before))
         yield (
             f"flown unlike the reference: with accelerations of {_range(now)} m/s^2 (root mean square), those of "
-            f"{_range(then)}; {joined(kinds)} count for less, as they go with it; take reference flights that are "
+            f"{_range(then)}; {joined(kinds)} count for less, as they depend on it; take reference flights that are "
             "flown alike"
         )
 

@@ -15,7 +15,6 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
-from cpfls_cli.commands.numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
@@ -28,13 +27,14 @@ from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
-from cpfls_cli.pages.repeats import again_drawn
+from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import did_you_mean
 
@@ -169,7 +169,7 @@ def _signal_words(signal: str) -> str:
 
 
 FIGURES = {
-    "comes-again": again_drawn(lambda r: (r.comes_again, None)),
+    "repeatable": repeatability_drawn(lambda r: (r.repeatability, None)),
     "gap-over-time": Drawn(
         "Gap of each channel over time in noise floors",
         lambda r: 0.7 + 1.1 * len(r.sizes.known),

@@ -18,7 +18,6 @@ from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.errors import InputError
@@ -46,7 +45,7 @@ from cpfls_cli.pages.gap import (
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
 from cpfls_cli.pages.playback import SIGNALS, WHO
-from cpfls_cli.pages.repeats import again_drawn
+from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
@@ -54,6 +53,7 @@ from cpfls_cli.report.outcome import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
 from cpfls_cli.words import joined
 
@@ -62,8 +62,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BAND = 1.96
-_VISIBLE = 0.05
-"""Share of the error without a model by which a playback has to grow to be called worse."""
+_VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
 
 
 def _curves(run: FreeRuns) -> dict[str, Array]:
@@ -181,7 +180,7 @@ def _finite(value: Any) -> bool:
 
 
 FIGURES = {
-    "comes-again": again_drawn(lambda r: (r.again_before, r.again_after)),
+    "repeatable": repeatability_drawn(lambda r: (r.repeatability_before, r.repeatability_after)),
     "free-runs": Drawn(
         "Body rates about three axes, measured and simulated before and after, over time",
         6.4,

@@ -10,7 +10,6 @@ from cpfls_cli.arguments import DiagnosisArgument, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import ComputationError
@@ -21,7 +20,7 @@ from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
-from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import has_effects, on_top_of, require_body, whole_vehicle, with_known_wrench
 from cpfls_cli.pages.effects import intervals_drawn
 from cpfls_cli.pages.gap import sizes_drawn
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
@@ -29,6 +28,7 @@ from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.weak_form.windows import Recording
 
 _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
@@ -53,7 +53,7 @@ def extend(run: Run, diagnosis: DiagnosisArgument, model: ModelOption = None) ->
         return None
     flights = (in_roles(diagnosed.recorded, role) for role in (TRAINING, HELD_OUT))
     training, held = (
-        beside_rotors([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
+        with_known_wrench([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
         for own in flights
     )
     known = diagnosed.learned if model is None else learned_by(model)

@@ -14,18 +14,18 @@ from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
+from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
+from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 
@@ -64,12 +64,7 @@ class Gap:
         return getattr(self.diagnosis, name)
 
 
-@stage(
-    Gap,
-    words={**WORDS, **of_diagnosis.WORDS},
-    fills=Filled(PARTS),
-    study=True,
-)
+@stage(Gap, words={**WORDS, **of_diagnosis.WORDS}, fills=Filled(PARTS), study=True)
 def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, model: ModelOption = None) -> Gap | None:
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 
@@ -81,7 +76,7 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     if why:
         raise InputError(
             f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
-            f"arms, or fly what tells its inertia: {WHAT_TO_FLY}"
+            f"arms, or fly what identifies its inertia: {WHAT_TO_FLY}"
         )
     trained = numbered_roles("flight", flights)
     inputs = dict(run.take(trained | ({} if model is None else {"model": model}), "disagreement"))
@@ -125,7 +120,7 @@ def _flights(
     """Read all flights together, so that one battery is full in all of them, and split them."""
     read = read_flights([*flights, *held_out], run.study)
     flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
-    balanced = beside_rotors(read.recordings, base)
+    balanced = with_known_wrench(read.recordings, base)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
     refuse_seen(files[: len(split.training)], files[len(split.training) :])

@@ -24,7 +24,6 @@ from cpfls_cli.arguments import (
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
 from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
@@ -42,9 +41,11 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._stopped import stop_note, without_model
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
@@ -79,7 +80,7 @@ def identify(
     held_out = held_out_parts(run.study, data.rests, inputs, others)
     wrong = _contradictions([*flights, *choosing, *others], run.study)
     for sentence in other_vehicles([*flights, *choosing, *others], run.study):
-        run.note(sentence)
+        run.said.append(Text(sentence, "warning", always=True))
     tell_before_search(wrong)
     if run.dry_run:
         return None

@@ -13,7 +13,7 @@ from cpfls_cli.arguments import FlightArgument, ModelArgument
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
@@ -27,7 +27,6 @@ from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
-from cpfls_cli.identification.scores import AXES
 from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.trust import seen_words
@@ -36,6 +35,7 @@ from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.canvas import BASELINE, Drawn, band, legend_above, line, stacked, style_of
 from cpfls_cli.rotations import attitude_rate, generalised_torque
 from cpfls_cli.stage import Parts, Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.store import count_rows, read_first
 from cpfls_cli.validation.prediction import AlongFlight, Totals
 from cpfls_cli.weak_form.windows import Recording

@@ -10,7 +10,6 @@ import numpy as np
 
 from cpfls_cli.arguments import EveryOption, FlightsArgument, HistoryOption, HoldOption, HorizonOption, PlayedArgument
 from cpfls_cli.arrays import Array
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
@@ -28,6 +27,7 @@ from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import HELD, Drawn, legend_over, line, plain_ticks, stacked, style_of
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,7 +14,6 @@ from cpfls_cli.arguments import FlightsArgument, JudgedOption
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs
 from cpfls_cli.artifacts.output import refuse_own
-from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
@@ -52,6 +51,7 @@ from cpfls_cli.response.mismatch import (
 )
 from cpfls_cli.response.spectra import decibels, degrees
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.stages.compare import to_correct, to_gap
 
 if TYPE_CHECKING:

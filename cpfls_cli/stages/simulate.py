@@ -152,7 +152,7 @@ def _take_numbers(run: Run, model: Path | None) -> None:
     if model is None:
         require_numbers(run, "simulate", whole=False)
         return
-    import_module("cpfls_cli.commands.numbers").with_numbers(run, "simulate", model)
+    import_module("cpfls_cli.stages._numbers").with_numbers(run, "simulate", model)
 
 
 def _in_closed_loop(study: Study) -> Study:

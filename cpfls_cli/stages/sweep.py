@@ -20,7 +20,6 @@ from cpfls_cli.arguments import (
 )
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs, origin_before
-from cpfls_cli.commands.stopped import stop_note
 from cpfls_cli.flights.inputs import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.identification.replicates import Spread, Sweep, spread
@@ -31,6 +30,7 @@ from cpfls_cli.report.source import Source
 from cpfls_cli.search.resumable import SearchOptions, Watch
 from cpfls_cli.search.sweep_runs import PartialSweep, finish_runs, sweep_plan
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._stopped import stop_note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

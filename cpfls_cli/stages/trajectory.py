@@ -14,11 +14,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs, require_numbers
+from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
 from cpfls_cli.flights.path import DERIVATIVES, Excited, PlannedPath
-from cpfls_cli.identification.scores import AXES
 from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.effects import effect_title
 from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, style_of
@@ -176,7 +176,8 @@ def trajectory(
     if planned is None or written is None or run.dry_run:
         return None
     pictures = (picture_of(FIGURES[name], name, planned) for name in names)
-    run.texts = {path: each.svg for path, each in zip(figures, pictures, strict=True) if each} | written
+    run.texts |= {path: each.svg for path, each in zip(figures, pictures, strict=True) if each}
+    run.texts |= written
     if figures:
         run.say(f"drawn: {', '.join(map(str, figures))}")
     if texts:

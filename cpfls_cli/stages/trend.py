@@ -286,7 +286,9 @@ def _trend(
     ordered, by, about = _ordered(numbers, order)
     apart = of_other_vehicles(stated_by(ordered), anyway=anyway)
     found = over_flights(ordered, run.study.vehicle, generator(run.study, "trend"), reference)
-    unlike, ranges = of_other_autopilots(ordered, loads=any(each.name.startswith("load ") for each in found.numbers))
+    unlike, ranges = of_other_autopilots(
+        ordered, thrusts=any(each.name.startswith("thrust ") for each in found.numbers)
+    )
     lacking = (
         f"left out, for they lack some of {len(found.numbers)} numbers that most have: {', '.join(found.left_out)}"
     )
@@ -310,7 +312,7 @@ def _trend(
 
 def _of_commands(flights: Sequence[FlightNumbers]) -> Iterator[str]:
     if len({own.commanded for own in flights}) > 1:
-        yield "some flights log speeds of rotors, others commands: loads are not compared; import one signal of all"
+        yield "some log rotor speeds, others commands: shares of thrust are not compared; import one signal of all"
     without = [own.name for own in flights if own.commanded and not np.isfinite(own.voltage)]
     if without:
         yield (

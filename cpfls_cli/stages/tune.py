@@ -19,7 +19,6 @@ from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import parameter_file
@@ -51,6 +50,7 @@ from cpfls_cli.report.canvas import (
 from cpfls_cli.report.numbers import UNKNOWN
 from cpfls_cli.report.outcome import command_line
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.noise import LEAST, Noise, noise_of
 from cpfls_cli.tuning.plant import Spread, spread_of

@@ -12,7 +12,6 @@ import numpy as np
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
@@ -56,6 +55,7 @@ from cpfls_cli.simulation.twin_flight import (
     measured_channels,
 )
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
 
 if TYPE_CHECKING:

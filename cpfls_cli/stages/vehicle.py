@@ -35,8 +35,6 @@ from cpfls_cli.artifacts.parameters import (
 )
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle, mismatches
-from cpfls_cli.commands.numbers import to_fly
-from cpfls_cli.commands.stopped import stop_note, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
@@ -69,6 +67,8 @@ from cpfls_cli.rounding import levelled
 from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._numbers import to_fly
+from cpfls_cli.stages._stopped import stop_note, without_model
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import did_you_mean, joined
 

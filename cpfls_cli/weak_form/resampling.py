@@ -8,34 +8,22 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous
 
-BLOCK_S = 4.0
-"""Length of the blocks that are left out in turn, s: longer than noise and motion remember."""
+BLOCK_S = 4.0  # Length of the blocks that are left out in turn, s: longer than noise and motion remember.
 
 # Of blocks: the work grows with them, and intervals by Student's t are 6 % wider than for infinitely many.
 _LARGEST_NUMBER = 24
-# Of columns brought to one length: far below noise, far above rounding.
-_RIDGE = 1e-9
-# A shift is at least this part of a flight, so that slow motion does not meet itself.
-_LEAST_SHARE = 10
-_ALONE = 0.95
-"""Share of the information on a coefficient from which on one block alone shows it."""
+_RIDGE = 1e-9  # Of columns brought to one length: far below noise, far above rounding.
+_LEAST_SHARE = 10  # A shift is at least this part of a flight, so that slow motion does not meet itself.
+_ALONE = 0.95  # Share of the information on a coefficient from which on one block alone shows it.
 
 
 @dataclass(frozen=True)
 class BlockRows:
-    """What normal equations are made of.
+    """What normal equations are made of."""
 
-    Attributes
-    ----------
-    columns : array, shape (window, channel, column)
-    right : array, shape (window, channel, draw)
-    parts : list of slice or array of bool
-        Windows of each block.
-    """
-
-    columns: Array
-    right: Array
-    parts: list[slice | BoolArray]
+    columns: Array  # Shape (window, channel, column).
+    right: Array  # Shape (window, channel, draw).
+    parts: list[slice | BoolArray]  # Windows of each block.
 
     def products(self, first: Array, second: Array) -> Array:
         """Multiply columns, shape (window, channel, column), over each block: shape (block, first, second column)."""
@@ -55,22 +43,13 @@ class BlockRows:
 
 @dataclass(frozen=True)
 class Folds:
-    """Normal equations of each block.
+    """Normal equations of each block."""
 
-    Attributes
-    ----------
-    gram : array, shape (block, column, column)
-    moment : array, shape (block, column, draw)
-        Columns times right side; several right sides are draws.
-    square : array, shape (block, draw)
-        Sums of squares of the right side.
-    prior : array, shape (column,)
-        Information that bounds give before any data: one over the square of the largest possible coefficient.
-    """
-
-    gram: Array
-    moment: Array
-    square: Array
+    gram: Array  # Shape (block, column, column).
+    moment: Array  # Shape (block, column, draw): columns times right side; several right sides are draws.
+    square: Array  # Shape (block, draw): sums of squares of the right side.
+    # Shape (column,): information that bounds give before any data: one over the square of the largest possible
+    # coefficient.
     prior: Array
     made_of: BlockRows
 
@@ -82,17 +61,10 @@ class Folds:
     def solve(self, columns: IntArray, believed: int = 0) -> tuple[Array, Array]:
         """Fit a subset of columns without each block and evaluate it on that block.
 
-        Parameters
-        ----------
-        believed : int
-            So many of the first columns are not in question: a block that alone shows one of these stays in the fit,
-            because without it nothing is known of that coefficient.
-
-        Returns
-        -------
-        coefficients : array, shape (block, column, draw)
-        error : array, shape (block, draw)
-            Sum of squares left on the block that the fit did not see.
+        `believed`: so many of the first columns are not in question: a block that alone shows one of these stays in the
+        fit, because without it nothing is known of that coefficient.
+        Result `coefficients`: shape (block, column, draw).
+        Result `error`, shape (block, draw): sum of squares left on the block that the fit did not see.
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
         out = np.where(self.alone(columns[:believed]), 0.0, 1.0)[:, None, None]
@@ -107,10 +79,7 @@ class Folds:
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns on all blocks.
 
-        Returns
-        -------
-        coefficients : array, shape (column, draw)
-        error : array, shape (block, draw)
+        Result `coefficients`: shape (column, draw); Result `error`: shape (block, draw).
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
         coefficients = _solve(gram.sum(axis=0) + self._known(columns), moment.sum(axis=0))
@@ -125,16 +94,13 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def beside(self, base: IntArray) -> "Beside":
+    def conditional_on(self, base: IntArray) -> "ConditionalNormalEquations":
         """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
 
-        Parameters
-        ----------
-        base : array of int
-            Not in question: a block that alone shows one of these stays in the fit.
+        `base`: not in question: a block that alone shows one of these stays in the fit.
         """
         gram, moment, out = self.gram, self.moment, np.where(self.alone(base), 0.0, 1.0)[:, None, None]
-        # Behind the blocks stands the fit on all of them, judged on all of them.
+        # After the blocks comes the fit on all of them, judged on all of them.
         whole = gram.sum(axis=0, keepdims=True), moment.sum(axis=0, keepdims=True)
         seen, right = (np.concatenate([w - out * own, w]) for w, own in zip(whole, (gram, moment), strict=True))
         own, own_right = (np.concatenate([own, w]) for w, own in zip(whole, (gram, moment), strict=True))
@@ -144,7 +110,7 @@ class Folds:
         shadow, fitted = solved[..., : seen.shape[2]], solved[..., seen.shape[2] :]
         turned, rest = shadow.swapaxes(1, 2), inner - inner[:, :, base] @ shadow
         missed = inner_right - inner[:, :, base] @ fitted
-        return Beside(
+        return ConditionalNormalEquations(
             normal=self,
             base=base,
             gram=seen - across.swapaxes(1, 2) @ shadow,
@@ -157,30 +123,19 @@ class Folds:
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all.
-
-    Attributes
-    ----------
-    gram : array, shape (block + 1, column, column)
-        Of columns without what the base explains of them, over the blocks that a fit sees.
-    moment : array, shape (block + 1, column, draw)
-    length : array, shape (block + 1, column)
-        Of whole columns.
-    own, own_moment : array
-        As `gram` and `moment`, on the block that a fit does not see, or on all blocks.
-    left : array, shape (block + 1, draw)
-        Sum of squares that the base leaves there.
-    """
+class ConditionalNormalEquations:
+    """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all."""
 
     normal: Folds
     base: IntArray
+    # Shape (block + 1, column, column): of columns without what the base explains of them, over the blocks that a fit
+    # sees.
     gram: Array
-    moment: Array
-    length: Array
-    own: Array
-    own_moment: Array
-    left: Array
+    moment: Array  # Shape (block + 1, column, draw).
+    length: Array  # Shape (block + 1, column): of whole columns.
+    own: Array  # As `gram`, on the block that a fit does not see, or on all blocks.
+    own_moment: Array  # As `moment`, alike.
+    left: Array  # Shape (block + 1, draw): sum of squares that the base leaves there.
 
     @property
     def before(self) -> Array:
@@ -194,11 +149,8 @@ class Beside:
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit base and columns on all blocks to the first right side.
 
-        Returns
-        -------
-        coefficients : array, shape (column,)
-        errors : array, shape (column,)
-            Standard errors as if rows were independent.
+        Result `coefficients`: shape (column,).
+        Result `errors`, shape (column,): standard errors as if rows were independent.
         """
         coefficients, left = self._fit(columns, slice(-1, None))
         gram, length = self._part(columns, slice(-1, None))
@@ -209,15 +161,8 @@ class Beside:
     def subtracted(self, column: int, weight: Array) -> Array:
         """Subtract a column with coefficient 1 from the right side, weigh the channels and fit the base anew.
 
-        Parameters
-        ----------
-        weight : array, shape (channel,)
-            On the rows.
-
-        Returns
-        -------
-        array, shape (block, draw)
-            Left of each block that the fit did not see.
+        `weight`, shape (channel,): on the rows.
+        Result: shape (block, draw); left of each block that the fit did not see.
         """
         if (weight == 1.0).all():
             own = self.own[:-1, column, column, None]
@@ -255,15 +200,10 @@ class Beside:
 def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = None) -> Folds:
     """Build the normal equations of each block.
 
-    Parameters
-    ----------
-    columns : array, shape (window, channel, column)
-        Weighted.
-    right : array, shape (window, channel) or (window, channel, draw)
-        Weighted.
-    block : array of int, shape (window,)
-    prior : array, shape (column,), or None
-        None for nothing known.
+    `columns`, shape (window, channel, column): weighted.
+    `right`, shape (window, channel) or (window, channel, draw): weighted.
+    `block`: shape (window,).
+    `prior`, shape (column,): None for nothing known.
     """
     parts = [_rows(block == number) for number in range(int(block.max()) + 1)]
     rows = BlockRows(columns, right.reshape(*right.shape[:2], -1), parts)
@@ -286,18 +226,10 @@ def _rows(marked: BoolArray) -> slice | BoolArray:
 def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArray:
     """Cut flights into contiguous blocks of about equal length.
 
-    Parameters
-    ----------
-    flight_index : array of int, shape (window,)
-    centres : array, shape (window,), s
-        Middle of each window in its own flight.
-    block_s : float
-        Wanted length; longer where there would be too many.
-
-    Returns
-    -------
-    array of int, shape (window,)
-        Blocks from 0, without gaps.
+    `flight_index`: shape (window,).
+    `centres`, shape (window,), s: middle of each window in its own flight.
+    `block_s`: wanted length; longer where there would be too many.
+    Result: shape (window,); blocks from 0, without gaps.
     """
     spans = [np.ptp(centres[flight_index == f]) for f in np.unique(flight_index)]
     length = max(block_s, sum(spans) / _LARGEST_NUMBER)
@@ -334,15 +266,9 @@ def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np
     explains less of the shifted residual than of a residual without any cause: with neighbouring windows correlated
     by 0.9, a test at 5 % is then wrong in 8 to 10 % of the cases. The mirrored circle has no seam.
 
-    Parameters
-    ----------
-    residual : array, shape (window, channel)
-    flight_index : array of int, shape (window,)
-
-    Returns
-    -------
-    array, shape (window, channel, shift)
-        About the mean of each flight.
+    `residual`: shape (window, channel).
+    `flight_index`: shape (window,).
+    Result: shape (window, channel, shift); about the mean of each flight.
     """
     draws = np.zeros((*residual.shape, shifts))
     for flight in np.unique(flight_index):

@@ -12,34 +12,19 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
-FEWEST_SAMPLES = 8
-"""Of a window: fewer do not follow its curve."""
-FEWEST_WINDOWS = 16
-"""Windows below which a flight tells too little."""
-_SAME_RATE = 1e-3
-"""Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
+FEWEST_SAMPLES = 8  # Of a window: fewer do not follow its curve.
+FEWEST_WINDOWS = 16  # Windows below which a flight is too short.
+_SAME_RATE = 1e-3  # Relative difference of sampling periods that clocks of one logger have, and that no floor shows.
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop.
+    """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop."""
 
-    Attributes
-    ----------
-    weight : array, shape (window,)
-        phi dt.
-    slope : array, shape (window,), 1/s
-        phi' dt.
-    hop : int
-        Samples from one window to the next.
-    period : float
-        Sampling period, s.
-    """
-
-    weight: Array
-    slope: Array
-    hop: int
-    period: float
+    weight: Array  # Shape (window,): phi dt.
+    slope: Array  # Shape (window,), 1/s: phi' dt.
+    hop: int  # Samples from one window to the next.
+    period: float  # Sampling period, s.
 
     def count(self, samples: int) -> int:
         """Count the windows that fit into a flight."""
@@ -81,23 +66,11 @@ class Windows:
 def windows(period: float, window_s: float, overlap: float) -> Windows:
     """Make windows of a length for a sampling period.
 
-    Parameters
-    ----------
-    period : float
-        s.
-    window_s : float
-        Length, s.
-    overlap : float
-        Share that neighbours have in common.
-
-    Raises
-    ------
-    InputError
-        If a window holds too few samples.
-
-    References
-    ----------
-    Weak form of differential equations: Shinbrot 1957 (modulating functions); Messenger and Bortz 2021.
+    `period`: s.
+    `window_s`: length, s.
+    `overlap`: share that neighbours have in common.
+    Raises InputError if a window holds too few samples.
+    Reference: Weak form of differential equations: Shinbrot 1957 (modulating functions); Messenger and Bortz 2021.
     """
     samples = round(window_s / period)
     if samples < FEWEST_SAMPLES:
@@ -141,10 +114,7 @@ def fitting_windows(period: float, settings: WindowSettings) -> Windows:
 def common_windows(recordings: Sequence[Recording], settings: WindowSettings) -> Windows:
     """Make the windows that all flights share.
 
-    Raises
-    ------
-    InputError
-        If a flight is too short or has another sampling period than the first.
+    Raises InputError if a flight is too short or has another sampling period than the first.
     """
     period = recordings[0].signals.period
     for recording in recordings:

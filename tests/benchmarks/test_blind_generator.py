@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from benchmarks.blind import generator
+from benchmarks.blind import generator, measure
 from benchmarks.blind.cases import NAMES, cases, in_air, make
 from benchmarks.blind.drive import Notch
 from benchmarks.blind.gusts import gusts
@@ -246,7 +246,7 @@ def test_controller_speed_hides_only_the_voltage():
     np.testing.assert_allclose(flight.table[:, 16:20] * flight.table[:, 24:] ** exponent, flight.truth["speed"])
 
 
-@pytest.mark.parametrize("kind", generator.KINDS)
+@pytest.mark.parametrize("kind", measure.KINDS)
 def test_noise_has_its_stated_size(flown, kind):
     flight = flown["none-sixkg"].flights[0]
     long = np.tile(flight.table, (40, 1))

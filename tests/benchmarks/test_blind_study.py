@@ -111,7 +111,7 @@ def test_answers_are_told_apart(truth, verdict, names, expected):
     }
     rivals = [
         {"name": "com_offset", "instead_of": "inflow"},
-        {"name": "motor_lag", "instead_of": "low_pass_filter", "beside": "command_delay"},
+        {"name": "motor_lag", "instead_of": "low_pass_filter", "jointly_with": "command_delay"},
     ]
     said = {
         "verdict": verdict,

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
-from benchmarks.shared import nanobench_files, nanodrone_files, neurobem_files
+from benchmarks.shared import nanodrone_files, neurobem_files
 from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.playback_scores import HORIZON, Runs, as_published, nothing_moves, rate_stays, score
 from cpfls_cli.config.load import load_study
@@ -111,25 +111,6 @@ def flight_of(position, rate):
     return PlaybackFlight(
         name="made up", motion=motion, speed=np.ones((samples, 4)), hold="previous", stretches=(slice(0, samples),)
     )
-
-
-def test_commands_become_torque_in_proportion_to_the_thrust_and_each_flight_is_read_once(tmp_path):
-    """The left motors ask for more: at rest the thrust is the weight, and the torque raises the left side."""
-    samples, right, left = 1200, 0.6, 0.66
-    constant = {"pz": 1.0, "qw": 1.0, "imu_acc_z": 1.0, "px": 0.5}
-    constant |= {f"motor_motor_m{n}": 65535 * (right if n < 3 else left) for n in (1, 2, 3, 4)}
-    zero = ("py", "vx", "vy", "vz", "qx", "qy", "qz", "imu_gyro_x", "imu_gyro_y", "imu_gyro_z")
-    columns = constant | dict.fromkeys(zero, 0.0)
-    lines = [",".join(columns), *[",".join(f"{value:g}" for value in columns.values())] * samples]
-    for repetition in (1, 2):
-        (tmp_path / f"B2_circle_slow_rep{repetition}.csv").write_text("\n".join(lines), encoding="utf-8")
-    (flight,) = nanobench_files.commanded_flights(tmp_path)
-    more, less = left**nanobench_files.EXPONENT, right**nanobench_files.EXPONENT
-    weight = nanobench_files.MASS * nanobench_files.GRAVITY
-    assert flight.path == "B2_circle_slow"
-    np.testing.assert_allclose(flight.thrust, weight)
-    roll = nanobench_files.ARM * weight * (more - less) / (more + less)
-    np.testing.assert_allclose(flight.torque, np.tile([roll, 0.0], (len(flight.thrust), 1)), atol=1e-15)
 
 
 def test_counted_as_published_the_last_windows_meet_the_next_flight():

@@ -13,9 +13,9 @@ from tests.builders.studies import VEHICLE
 
 QUAD = validate(parse_config(VEHICLE, "drawn"), "drawn").vehicle
 NAMES = (
-    *(f"load M{index}" for index in range(1, 5)),
+    *(f"thrust M{index}" for index in range(1, 5)),
     *(f"vibration gyroscope {axis}" for axis in "xyz"),
-    *(f"late {axis}" for axis in ("roll", "pitch", "yaw")),
+    *(f"delay {axis}" for axis in ("roll", "pitch", "yaw")),
 )
 DEVIATION = np.sqrt(np.diag(usual_covariance(NAMES, QUAD)))
 """Of each number from day to day."""

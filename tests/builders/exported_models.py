@@ -12,7 +12,6 @@ import yaml
 from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.points import expected, reference_run
 from cpfls_cli.export.sheet import Sheet
@@ -22,6 +21,7 @@ from cpfls_cli.identification.scores import Judged
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.stages._sheets import bare_sheet
 from cpfls_cli.validation.reasons import Reason
 from cpfls_cli.validation.verdict import Verdict
 from cpfls_cli.vehicle.settings import VehicleSettings

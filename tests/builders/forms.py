@@ -9,13 +9,11 @@ from types import SimpleNamespace
 from unittest.mock import patch
 
 from cpfls_cli.config.study import Study
-from cpfls_cli.pages.page import report_page
+from cpfls_cli.pages.page import report_page, written
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Box, Document, Facts, Folded, Plot, Section, Table, Text
+from cpfls_cli.report.content import Box, Facts, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.forms import Form
-from cpfls_cli.report.html import html_page
-from cpfls_cli.report.json_page import json_page
-from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.report.source import Document
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
 
 
@@ -62,7 +60,7 @@ def in_all_forms(source, blocks, beside=()):
 def blocks_in_all_forms(blocks):
     """Write blocks alone in each form; give the text, one line for each row of a table."""
     document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
-    pages = {Form.HTML: html_page(document), Form.MARKDOWN: markdown_page(document), Form.JSON: json_page(document)}
+    pages = {form: written(document, form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
     shown = [*terminal_lines(blocks, whole=True), *(warning.text for warning in warnings_of(blocks))]
     return _plain({"terminal": "\n".join(shown), **pages})
 
@@ -89,7 +87,8 @@ def _of_html(page):
 
 
 def _of_markdown(page):
-    plain = page.replace("**", "").replace("> ", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
+    plain = re.sub(r"^> ", "", page, flags=re.MULTILINE)
+    plain = plain.replace("**", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
     return unescape(re.sub(r"\\(.)", r"\1", plain))
 
 

@@ -25,7 +25,7 @@ from cpfls_cli.gap.naming.results import (
 )
 from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.dependence import Dependence
-from cpfls_cli.gap.residual.repeated import ComesAgain
+from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
@@ -282,7 +282,7 @@ def disagreement(force=True, **changed):
     } | changed
     return Disagreement(
         sizes=part(ChannelGaps, {path: each for path, each in data.items() if path != "gap/channel"}, "gap"),
-        comes_again=None,
+        repeatability=None,
         worst=stretches(data),
         dependence=tuple(Dependence(*row) for row in rows(data, "dependence", "channel", "signal", "r2", "p_value")),
         heat_map=HeatMap(
@@ -438,18 +438,18 @@ def extended(**changed):
     )
 
 
-def comes_again(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):
+def repeatability(share, *, error=0.02, gap=4.0, noise=0.1, motion=8.0):
     """What of gaps comes again, shares by channel and band, of rad/s^2 and m/s^2 about a body of 1 kg m^2 and 1 kg."""
     share = np.array(share, dtype=float)
     total = np.full(share.shape, gap**2)
     low, high = [0.0, 2.0, 1.0, 0.5, 0.25, 0.0], [6.0, 6.0, 3.0, 1.5, 0.75, 0.25]
-    return ComesAgain(
+    return Repeatability(
         low=np.array(low),
         high=np.array(high),
         total=total,
-        again=share * total,
+        repeatable=share * total,
         noise=np.full(share.shape, noise**2),
-        taken=np.full(share.shape, taken**2),
+        motion=np.full(share.shape, motion**2),
         share_error=np.full(share.shape, error),
         explained_error=np.full(share.shape, 0.05),
         resists=np.ones(6),

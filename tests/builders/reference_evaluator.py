@@ -20,17 +20,7 @@ from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
 @dataclass(frozen=True)
 class ReferenceEvaluator:
-    """Evaluate chromosomes step by step as the paper writes it; for tests and benchmarks.
-
-    Attributes
-    ----------
-    training : TorqueData
-        Judges, and gives the input ranges.
-    learned : TorqueData
-        Solves.
-    settings : IdentificationSettings
-        Of a model without a rigid-body base.
-    """
+    """Evaluate chromosomes step by step as the paper writes it; for tests and benchmarks."""
 
     training: TorqueData
     learned: TorqueData
@@ -42,37 +32,13 @@ class ReferenceEvaluator:
         return model_structure(self.settings)
 
     def __call__(self, genes: IntArray) -> Evaluation:
-        """Evaluate chromosomes, refining each by local search if enabled.
-
-        Parameters
-        ----------
-        genes : array of int, shape (individuals, genes)
-
-        Returns
-        -------
-        Evaluation
-            Refined genes and objectives; a chromosome without a finite model gets infinite objectives.
-        """
+        """Evaluate chromosomes, refining each by local search if enabled."""
         results = [self._evaluate(chromosome) for chromosome in genes]
         refined = np.array([chromosome for chromosome, _ in results]).reshape(genes.shape)
         return Evaluation(refined, np.array([objectives for _, objectives in results]).reshape(-1, OBJECTIVES))
 
     def fit(self, chromosome: IntArray) -> Fit | None:
-        """Solve for the coefficients of one chromosome, ``c = V S^-1 U^T tau``.
-
-        Parameters
-        ----------
-        chromosome : array of int, shape (genes,)
-
-        Returns
-        -------
-        Fit or None
-            None where a partition is not defined or the model is not finite.
-
-        References
-        ----------
-        Paper section 5.
-        """
+        """Solve for the coefficients of one chromosome, ``c = V S^-1 U^T tau``. None where it is not finite."""
         partitions = self._decode(chromosome)
         if not all(np.isfinite(part).all() for part in partitions):
             return None
@@ -86,35 +52,13 @@ class ReferenceEvaluator:
         return Fit(coefficients, NO_RIGID_BODY, 0.0, mean_squared, conditioning, np.ones(3), np.ones(Q.shape[1]))
 
     def objectives(self, chromosome: IntArray, fit: Fit) -> Array:
-        """Judge a fit by all objectives.
-
-        Parameters
-        ----------
-        chromosome : array of int, shape (genes,)
-        fit : Fit
-
-        Returns
-        -------
-        array, shape (3,)
-            Mean squared error, largest error, condition number; all infinite where one is not finite.
-        """
+        """Judge a fit by all objectives."""
         error = self.training.torque.reshape(-1) - _matrix(self._whole, self._decode(chromosome)) @ fit.coefficients
         objectives = np.array([np.mean(error**2), np.max(np.abs(error)), fit.conditioning])
         return objectives if np.isfinite(objectives).all() else NOT_DEFINED
 
     def refine(self, weights: Array) -> Array:
-        """Refine partition weights by nonlinear least squares, differentiated through the whole solve.
-
-        Parameters
-        ----------
-        weights : array, shape (genes,)
-            On [0, 1], no partition all zero.
-
-        Returns
-        -------
-        array, shape (genes,)
-            On [0, 1].
-        """
+        """Refine partition weights by nonlinear least squares, differentiated through the whole solve."""
         torque, evaluations = self.learned.torque.reshape(-1), self.settings.local_search.evaluations
 
         def residual(weights: Array) -> Array:

@@ -41,7 +41,7 @@ def test_of_few_reference_flights_it_is_said_that_what_they_differ_by_is_assumed
     result = changed("same.csv", before=(1, 2), options=["--fail-on-change"])
     assert result.exit_code == 0
     assert result.stdout.startswith("NO CHANGE SEEN: nothing beyond what is usual of vehicles")
-    assert "which 2 reference flights cannot tell; give 1 more" in " ".join(result.stdout.split())
+    assert "2 reference flights are too few; give 1 more" in " ".join(result.stdout.split())
     told = json.loads((folder / "out" / "changed.json").read_text())
     assert (told["verdict"], told["reference_flights_lacking"]) == ("NO CHANGE SEEN", 1)
     assert "NO CHANGE SEEN" in (folder / "out" / "report.html").read_text()
@@ -53,7 +53,7 @@ def test_where_no_load_would_have_shown_it_cannot_be_told(changed):
     said = " ".join(result.stdout.split())
     assert result.exit_code == 3
     assert said.startswith("CANNOT TELL: no weak rotor, mass or centre of mass of any size that is looked for would")
-    assert "which 1 reference flight cannot tell; give 2 more" in said
+    assert "1 reference flight is too few; give 2 more" in said
     assert "times the vibration" in said
     assert "a rotor that pulls" not in said.lower()
 
@@ -69,7 +69,7 @@ def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
     assert size["low"] < 0.2 < size["high"]
     assert told["since"] == "weak1.csv"
     # Of a cross each rotor carries a quarter alone.
-    load = next(each for each in told["numbers"] if each["name"] == "load M3")
+    load = next(each for each in told["numbers"] if each["name"] == "thrust M3")
     assert np.mean(load["today"]) - load["reference"] == pytest.approx(-np.log(0.8), abs=0.03)
 
 

@@ -55,7 +55,7 @@ def test_unknown_section(refuse, study):
 
 def test_overrides_need_a_config(refuse):
     (line,) = refuse("config", "--set", "seed=2")
-    assert line.startswith("--section, --set and --seed need a CONFIG")
+    assert line == "--set seed=2: needs a CONFIG"
 
 
 def test_overrides_show(cpfls, study):

@@ -6,12 +6,12 @@ from html import unescape
 
 import pytest
 
-from cpfls_cli.commands.init import _findings as of_proposal
-from cpfls_cli.commands.init import _parted as parted
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.result import plain
+from cpfls_cli.stages.init import _findings as of_proposal
+from cpfls_cli.stages.init import _parted as parted
 from tests.builders.closed_loop_flights import COARSE, VEHICLE, flown, signals_of
 from tests.builders.command_line import run, undrawn
 from tests.builders.wrong_logs import WRONG, config_of, log_of

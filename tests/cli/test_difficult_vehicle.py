@@ -161,8 +161,7 @@ def test_no_gap_is_told_from_an_inertia_of_no_body(refuse, command, vehicle):
     assert line == (
         f"{vehicle}: no body has this inertia: its largest principal moment, 0.05, exceeds the sum of the other two, "
         f"0.0119, so no gap can be measured against it; --accept-guesses takes guesses from mass and arms, or fly "
-        f"what tells its "
-        f"inertia: {WHAT_TO_FLY}"
+        f"what identifies its inertia: {WHAT_TO_FLY}"
     )
 
 

@@ -2,9 +2,11 @@
 
 import re
 
-from cpfls_cli.commands.effects import run as effects
+from cpfls_cli import page
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.report.terminal import terminal_lines
+from cpfls_cli.stages.effects import Catalogue, described, effects
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def test_table_lists_every_effect(cpfls):
@@ -41,5 +43,7 @@ def test_an_unknown_name_is_refused(refuse):
 
 
 def test_all_of_it_fits_a_terminal_of_80_columns():
-    outcomes = [effects(None), *map(effects, CATALOGUE)]
-    assert max(len(line) for outcome in outcomes for line in terminal_lines(outcome.blocks, 80, whole=True)) <= 80
+    vehicle = VehicleSettings()
+    shown = [described(each, vehicle) for each in CATALOGUE.values()]
+    pages = [effects.text(Catalogue(vehicle="default", effects=own)) for own in (shown, *([each] for each in shown))]
+    assert max(len(line) for text in pages for line in terminal_lines(page.blocks(text), 80, whole=True)) <= 80

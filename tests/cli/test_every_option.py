@@ -80,7 +80,7 @@ LINES = (
     "compare study.yaml flight.h5 flight3.h5 -o gap.h5 --model model.h5",
     "diagnose study.yaml gap.h5 -o 13.h5 --held-out flight2.h5",
     "gap study.yaml flight.h5 -o gap --held-out flight3.h5",
-    "trajectory study.yaml -o 14.h5 --for gap/diagnosis.h5 --duration 10 # leaves nothing to tell apart",
+    "trajectory study.yaml -o 14.h5 --for gap/diagnosis.h5 --duration 10 # leaves nothing to separate",
     "extend study.yaml gap/diagnosis.h5 -o 15.h5 # not extended",
     "changed study.yaml flight.h5 -o changed --since flight2.h5 --since flight3.h5 --fail-on-change --anyway",
     "trend study.yaml flight.h5 flight2.h5 flight3.h5 -o trend --reference 2 --order name --workers 1 --anyway",

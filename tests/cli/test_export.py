@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.builders.artifacts import edited
+from cpfls_cli.validation.verdict import Reason, Verdict
+from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
 
 HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
@@ -147,8 +148,8 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     words = ("--format", "json", "-o", tmp_path / "m.json")
     (line,) = refuse("export", pipeline.flight, *words)
     assert line == (
-        f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify` or "
-        "`cpfls extend` or `cpfls gap` or `cpfls vehicle`)"
+        f"{pipeline.flight}: is a cpfls/flight; this command needs a model (made by `cpfls identify`, "
+        "`cpfls extend`, `cpfls gap` or `cpfls vehicle`)"
     )
     (line,) = refuse("export", study, *words)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
@@ -162,7 +163,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
         file.attrs["format"] = "cpfls/extended"
     (line,) = refuse("export", model, *words)
     assert line.startswith(f"{model}: was written by cpfls ")
-    assert line.endswith("whose files this version does not read; make it again with `cpfls identify`")
+    assert line.endswith("whose files this version does not read; make it again with `cpfls extend`")
 
 
 @pytest.mark.parametrize(
@@ -177,7 +178,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
             "model/fuzzy/partitions: those of D13(pitch) make no partition; identify it again",
         ),
         (
-            {"model__fuzzy__visited": np.zeros((71, 71))},
+            {"model__fuzzy__visited": np.zeros((71, 71), dtype=bool)},
             "model/fuzzy/visited: is (71, 71), not (72, 72); identify it again",
         ),
         (
@@ -208,7 +209,7 @@ def test_output_rules(cpfls, refuse, model, tmp_path):
         missing = tmp_path / "none" / f"m.{ending}"
         (line,) = refuse("export", model, "--format", form, "-o", missing)
         assert line == f"{missing}: cannot write into the folder {missing.parent}: No such file or directory"
-    for form, name, ending in (("c", "m.h", ".c"), ("json", "m.h5", ".json")):
+    for form, name, ending in (("c", "n.h", ".c"), ("json", "n.h5", ".json")):
         (line,) = refuse("export", model, "--format", form, "-o", tmp_path / name)
         assert line == f"{tmp_path / name}: --format {form} writes a file that ends in {ending}; name it so"
     (line,) = refuse("export", model, "--format", "c", "-o", tmp_path / 'a"b.c')
@@ -310,11 +311,10 @@ def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
 
 
 def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path):
-    change(
+    with_fields(
         model,
-        verdict__label=np.array("do-not-use"),
-        verdict__reason=np.array(["it is fast", "it explains nothing"]),
-        verdict__speaks=np.array([1, -1]),
+        model,
+        verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1))),
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
     assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"

@@ -8,7 +8,6 @@ from typing import ClassVar
 import pytest
 
 from cpfls_cli.artifacts.job import input_file
-from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.report.content import Box, Text
@@ -60,8 +59,8 @@ def filled(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
     monkeypatch.setattr(
-        "cpfls_cli.commands.report.run",
-        lambda job, paths: write_text(job.output, " ".join(path.name for path in paths)),
+        "cpfls_cli.stages.report.page_about",
+        lambda _, paths: " ".join(path.name for path in paths),
     )
     log = tmp_path / "log.csv"
     log.write_text("1")

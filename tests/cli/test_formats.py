@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
-from cpfls_cli.commands.formats import formats
 from cpfls_cli.result import datasets
+from cpfls_cli.stages.info import formats
 
 PAGE = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
 

@@ -3,9 +3,10 @@
 import json
 from pathlib import Path
 
-import h5py
 import pytest
 import yaml
+
+from tests.builders.artifacts import read_result
 
 CONFIG = Path(__file__).parents[2] / "configs" / "full-circle.yaml"
 SHORT = (
@@ -67,6 +68,5 @@ def test_its_sweep_tells_structures_apart(cpfls, flights, tmp_path):
     search = {"population": 4, "generations": 1, "local_search": {"enabled": False}}
     less = [word for key, value in search.items() for word in ("--set", f"identification.{key}={json.dumps(value)}")]
     cpfls.done(*words, "--set", f"sweep.settings={json.dumps(settings)}", *less)
-    with h5py.File(output) as file:
-        error = dict(zip(file["setting/name"].asstr(), file["run/relative_error"][:, 1], strict=True))
+    error = {each.name: each.replicates[0].relative_error[1] for each in read_result(output).settings}
     assert error[best] < 1e-8 < 0.05 < error[small]

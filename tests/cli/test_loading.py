@@ -7,7 +7,7 @@ from pkgutil import iter_modules
 
 import pytest
 
-from cpfls_cli import commands, pages, stages
+from cpfls_cli import pages, stages
 
 HEAVY = {"h5py", "jinja2", "matplotlib", "numba", "numpy", "pydantic", "scipy", "yaml"}
 LOADS = """
@@ -77,15 +77,13 @@ def test_what_is_printed_loads_no_plotting(after):
 @pytest.fixture(scope="module")
 def imported():
     """Modules after imports, one after the other."""
-    names = [
-        module.name for room in (commands, pages, stages) for module in iter_modules(room.__path__, f"{room.__name__}.")
-    ]
+    names = [module.name for room in (pages, stages) for module in iter_modules(room.__path__, f"{room.__name__}.")]
     assert len(names) > 20
     codes = {
         "the package": "import cpfls_cli",
         "flying": "from cpfls_cli.stages import simulate, trajectory",
         "searches": "from cpfls_cli.stages import identify, reduce, sweep",
-        "report": "import cpfls_cli.commands.report",
+        "report": "import cpfls_cli.stages.report",
         "all commands and pages": f"import {', '.join(names)}",
     }
     return dict(zip(codes, loading([*codes.values()]), strict=True))

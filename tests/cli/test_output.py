@@ -100,7 +100,10 @@ def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
     assert "unknown key" in refuse("trajectory", study, *words, "--set", "vehicle.mass=1")[0]
     for command in ("simulate", "reduce", "identify"):
         assert "this command needs a" in refuse(command, study, pipeline.model, *words)[0]
-    assert "this command needs a cpfls/model" in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
+    assert (
+        "this command needs a model (made by `cpfls identify`"
+        in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
+    )
 
 
 def test_no_file_that_a_command_reads_is_its_output(refuse, pipeline, study, tmp_path):

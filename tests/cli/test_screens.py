@@ -56,7 +56,6 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
 
         with (
             undrawn(),
-            patch("cpfls_cli.cli.app.tell", tell),
             patch("cpfls_cli.cli.stages.tell", tell),
             patch.object(terminal, "_columns", lambda *_: COLUMNS),
             pytest.MonkeyPatch.context() as environment,

@@ -106,9 +106,10 @@ def test_guesses_are_held_and_named(cpfls, tmp_path):
     path = tmp_path / "vehicle.h5"
     write_vehicle(path, found_record(guessed=("drag_factor",), disturbance=None, gusts=False))
     result, output = written(cpfls, path, "json")
-    assert "Not drawn, because it is a guess and no flight tells it: drag factor." in result.stderr
+    assert "Not drawn, because it is a guess and no flight identifies it: drag factor." in result.stderr
     assert (
-        "No gusts about roll, pitch and yaw and along x, y and z: the flights do not tell their size" in result.stderr
+        "No gusts about roll, pitch and yaw and along x, y and z: the flights do not identify their size"
+        in result.stderr
     )
     document = json.loads(output.read_text())
     assert document["held_at_guesses"] == ["drag_factor"]
@@ -120,9 +121,9 @@ def test_nothing_is_drawn_or_written_on_a_dry_run(cpfls, vehicle, monkeypatch):
     def never(*_):
         raise AssertionError("nothing is computed")
 
-    monkeypatch.setattr("cpfls_cli.commands.spread.drawn", never)
+    monkeypatch.setattr("cpfls_cli.stages.spread.drawn", never)
     result = cpfls.done("spread", vehicle, "-o", vehicle.with_name("s.json"), "-n", "5", "--dry-run")
-    assert "s.json: would be written; 5 vehicles would be drawn from" in " ".join(
+    assert "s.json: would be written; all inputs are good 5 vehicles would be drawn from" in " ".join(
         (result.stdout + result.stderr).split()
     )
     assert not vehicle.with_name("s.json").exists()

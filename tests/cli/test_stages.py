@@ -11,7 +11,8 @@ import pytest
 import typer
 
 import cpfls_cli.stages
-from cpfls_cli.cli.stages import AllCommands, stage_commands
+from cpfls_cli.cli.app import AllCommands
+from cpfls_cli.cli.stages import stage_commands
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
@@ -270,7 +271,7 @@ def test_info_check_and_report_know_results(cpfls, looked):
 def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
     log = looked.parents[1] / "log.csv"
     for words, message in (
-        (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a cpfls/model"),
+        (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a model"),
         (("look", looked), "is an artifact of this program"),
         (("look", log, "-o", "x.html"), "-o x\n"),
         (("look", log, "-o", "out"), "--force"),

@@ -109,7 +109,7 @@ def test_what_the_folder_holds(cpfls, told):
     rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
     assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 14)]
     assert [row["part"] for row in rows] == ["1"] * 10 + ["2"] * 3
-    assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
+    assert float(rows[-1]["thrust M3"]) - float(rows[0]["thrust M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
     summary = json.loads((told.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
     cpfls.done("check", told.out / "trend.h5")
@@ -173,7 +173,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["log1.csv", "log2.csv"], "flights that tell the same numbers: 2, and a trend needs 4 at least"),
+        (["log1.csv", "log2.csv"], "flights with the same numbers: 2, and a trend needs 4 at least"),
         (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log says when it was flown"),
         (["log14.csv"], "log14.csv"),
         (["empty"], "holds no flight and no log"),

@@ -371,12 +371,12 @@ def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehic
 
 
 def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
-    told = cpfls.told("info", gusty)["gusts"]
-    assert told["torque_n_m"] == [0.02, 0.03, 0.01]
-    assert told["force_memory_s"] == [1.0, 1.0, 1.0]
+    held = cpfls.told("info", gusty)["result"]["model"]["gusts"]
+    assert held["size"] == [0.02, 0.03, 0.01, 0.2, 0.2, 0.2]
     cpfls.done("export", gusty, "-o", folder / "gusty.json")
     exported = json.loads((folder / "gusty.json").read_text())
-    assert told.items() <= exported["gusts"].items()
+    assert exported["gusts"]["torque_n_m"] == held["size"][:3]
+    assert exported["gusts"]["force_memory_s"] == held["memory"][3:] == [1.0, 1.0, 1.0]
     assert "x = k x" in exported["gusts"]["how_to_play"]
 
 

@@ -14,7 +14,7 @@ RATE, FORCE, SPEED = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z")
 TODAY = flight(seed=11)
 RPM = TODAY.speed * 60 / (2 * np.pi)
 WRONG = {
-    "gyroscope mirrored": ({"rate": named(TODAY.rate * [-1, 1, 1], *RATE)}, "follow roll"),
+    "gyroscope mirrored": ({"rate": named(TODAY.rate * [-1, 1, 1], *RATE)}, "gain roll"),
     "motors exchanged": ({"speed": named(RPM[:, [1, 0, 2, 3]], *SPEED)}, "judged by the motion, the rotors are"),
     "gyroscope dead": ({"rate": named(0 * TODAY.rate, *RATE)}, "barely agree"),
     "deg/s as rad/s": ({"rate": named(np.degrees(TODAY.rate), *RATE)}, "does the log give rates in deg/s"),
@@ -81,7 +81,7 @@ def by_torque(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(("today", "number"), [("mirrored.csv", "follow roll"), ("exchanged.csv", "follow pitch")])
+@pytest.mark.parametrize(("today", "number"), [("mirrored.csv", "gain roll"), ("exchanged.csv", "gain pitch")])
 def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, number):
     result = changed(cpfls, by_torque, today)
     assert result.exit_code == 1, result.output

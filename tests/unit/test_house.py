@@ -10,8 +10,8 @@ from statistics import median
 import pytest
 
 import cpfls_cli
-from cpfls_cli.commands.formats import formats
 from cpfls_cli.result import datasets
+from cpfls_cli.stages.info import formats
 
 PACKAGE = Path(cpfls_cli.__file__).parent
 TESTS = Path(__file__).parents[1]
@@ -170,14 +170,13 @@ def test_tests_import_from_shared_builders_alone():
 
 # A module lives for two users or for more than about 80 lines of code. These are one thing of many of a kind, each
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to, a form of the report.
-ONE_OF_A_KIND = ("autopilots/catalogue/", "commands/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
+ONE_OF_A_KIND = ("autopilots/catalogue/", "effects/catalogue/", "export/simulators/", "logs/", "stages/")
 SMALL_ALL_THE_SAME = {
     "cli/command_lines.py": "reads sources",
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "report/json_page.py": "a form",
-    "report/markdown.py": "a form",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

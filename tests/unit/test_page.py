@@ -206,6 +206,6 @@ def test_a_figure_of_nothing_is_left_out():
 def test_markdown_is_what_every_reader_knows():
     said = page.markdown(PAGE)
     assert "{" not in said
-    assert "### More of it\nInside." in said
+    assert "### More of it\n\nInside." in said
     assert "*Figure: Shares of *thrust**" in said
-    assert "| M1 | yes | it does" in said
+    assert "| M1 | **yes** | it does" in said

@@ -33,7 +33,12 @@ def inner(hint):
 
 def attribute(kind, name):
     """Type of an attribute of a class, None where it is nothing of ours; what does not exist is an error."""
-    hints = get_type_hints(kind)
+    try:
+        hints = get_type_hints(kind)
+    except NameError:
+        # What is imported for types alone cannot be looked into.
+        assert name in kind.__annotations__, f"{kind.__name__} has no {name}"
+        return None
     if name in hints:
         return inner(hints[name])
     own = getattr(kind, name, None)

@@ -1,7 +1,5 @@
 """Battery sag: a motor turns slower than commanded on an empty battery."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cpfls_cli.effects.effect import Effect, Shape, a_few_percent

@@ -1,7 +1,5 @@
 """Rotor speeds that are logged on another clock than the gyro."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cpfls_cli.arrays import Array

@@ -1,6 +1,4 @@
-"""Centre of mass beside the point that the hub positions are measured from."""
-
-from __future__ import annotations
+"""Centre of mass off the point that the hub positions are measured from."""
 
 from dataclasses import replace
 
@@ -38,7 +36,7 @@ _EFFECT = Effect(
     acts=_acts,
 )
 
-# Height alone is the moment of a flapping disc; beside the other two it is the third number of one cause.
+# Height alone is the moment of a flapping disc; with the other two it is the third number of one cause.
 _HEIGHT = Coefficient(
     "c_z", "m", -0.4, 0.4, "true centre of mass, above that of the model; shown by forces across the rotors", scales.arm
 )

@@ -1,7 +1,5 @@
 """Wrong drag (yaw) factor of the rotors, the least known number of most vehicles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -31,14 +29,12 @@ EFFECT = Effect(
     title="wrong drag (yaw) factor",
     kind="actuator",
     formula="M_z = -e b sum(s_i w_i^2)",
-    sentence="The rotors turn the vehicle in yaw with a torque other than the config says. It shows beside an effect "
-    "that also pushes the vehicle, because the force tells how large its torque is; yaw alone shows only the ratio of "
+    sentence="The rotors turn the vehicle in yaw with a torque other than the config says. It shows with an effect "
+    "that also pushes the vehicle, because the force identifies its torque; yaw alone shows only the ratio of "
     "the drag factor to Izz.",
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="turns in yaw while flying fast; or weigh and swing the vehicle, so that Izz is known",
-    rivals={
-        "linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed",
-    },
+    rivals={"linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed"},
     source="definition; the drag factor is the number that data sheets lack",
     shapes=(Shape("error", "1", (-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8, 1.5), "true factor over stated, less 1"),),
     apply=lambda signals, shape: replace(signals, vehicle=_vehicle(signals.vehicle, shape)),

@@ -1,7 +1,5 @@
 """Flexible mount: a part of the vehicle turns on springs against the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -56,12 +54,7 @@ EFFECT = Effect(
     source="two bodies on a spring, e.g. Meirovitch, Elements of Vibration Analysis",
     columns=_columns,
     shapes=(
-        Shape(
-            "frequency_hz",
-            "Hz",
-            (1.2, 1.5, 1.9, 2.4, 3.0, 3.8, 4.8, 6.5),
-            "frequency with the rest held still",
-        ),
+        Shape("frequency_hz", "Hz", (1.2, 1.5, 1.9, 2.4, 3.0, 3.8, 4.8, 6.5), "frequency with the rest held still"),
         Shape("damping", "1", (0.02, 0.1, 0.3), "their damping ratio", first=0.1),
     ),
     rate_derivative=True,

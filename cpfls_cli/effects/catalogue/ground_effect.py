@@ -5,8 +5,7 @@ from __future__ import annotations
 from cpfls_cli.effects.effect import Effect, Shape, a_few_percent
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
-# Below this share the formula leaves its range: the thrust at most doubles.
-_SMALLEST_DENOMINATOR = 0.5
+_SMALLEST_DENOMINATOR = 0.5  # Below this share the formula leaves its range: the thrust at most doubles.
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:

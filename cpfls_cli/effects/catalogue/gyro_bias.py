@@ -1,7 +1,5 @@
 """A gyro that reads a rate at rest."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.effects.hooks import ReadingError, SensorTest, gyroscope_log
 

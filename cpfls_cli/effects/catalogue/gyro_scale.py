@@ -1,16 +1,9 @@
 """A gyro that reads too much or too little of each rate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.effects.hooks import ReadingError, SensorTest, gyroscope_log
-
-
-def _number(axis: str, value: float) -> str:
-    return f"{100 * abs(value):.2g} % too {'much' if value > 0 else 'little'} about {axis}"
-
 
 EFFECT = Effect(
     name="gyro_scale",
@@ -28,7 +21,7 @@ EFFECT = Effect(
     test=SensorTest(
         estimate="scale",
         smallest=0.003,
-        number=_number,
+        number=lambda axis, value: f"{100 * abs(value):.2g} % too {'much' if value > 0 else 'little'} about {axis}",
         found="The gyroscope reads {}.",
         nothing="The gyroscope's scale agrees with the attitude.",
         error=lambda values: ReadingError(matrix=np.diag(1.0 + values)),

@@ -1,7 +1,5 @@
 """An IMU that is turned against the body."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cpfls_cli.arrays import Array

@@ -1,7 +1,5 @@
 """Inflow: thrust falls where air flows through a rotor from above."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
@@ -20,12 +18,7 @@ EFFECT = Effect(
     sentence="A rotor that moves up through the air pulls less, one that moves down pulls more.",
     coefficients=(
         Coefficient(
-            "k_z",
-            "N s^2/(m rad)",
-            0.0,
-            5.0,
-            "thrust lost per rotor speed and axial speed",
-            scales.drag_per_rotor_speed,
+            "k_z", "N s^2/(m rad)", 0.0, 5.0, "thrust lost per rotor speed and axial speed", scales.drag_per_rotor_speed
         ),
     ),
     needs=frozenset({"velocity", "rotor_speed"}),

@@ -1,7 +1,5 @@
 """Rotational damping in proportion to the rate."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench

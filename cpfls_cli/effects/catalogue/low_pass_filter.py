@@ -1,13 +1,10 @@
 """Second-order low-pass between the autopilot's command and the rotors: a filter, or a drive that swings."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 
 _FILTER = CommandFilter("damping", (0.0, 0.0, 1.0))
-
 EFFECT = Effect(
     name="low_pass_filter",
     order=156,

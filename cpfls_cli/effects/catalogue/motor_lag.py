@@ -1,20 +1,11 @@
 """Motor lag: rotors reach the commanded speed late."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
 from cpfls_cli.effects.actuation import with_actuation
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import lagged
 
-
-def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: lagged(values, shape["time_constant_s"] / signals.period).start)
-
-
+_TIMES = (0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.125, 0.15)
 EFFECT = Effect(
     name="motor_lag",
     order=150,
@@ -30,14 +21,9 @@ EFFECT = Effect(
         "parameter_error": "compare slow with fast torque: a wrong inertia acts in both",
     },
     source="RotorS and PX4 (first-order filter, 12.5 and 25 ms); RotorPy (tau_m)",
-    shapes=(
-        Shape(
-            "time_constant_s",
-            "s",
-            (0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.125, 0.15),
-            "time to reach 63 % of a step",
-        ),
+    shapes=(Shape("time_constant_s", "s", _TIMES, "time to reach 63 % of a step"),),
+    apply=lambda signals, shape: with_actuation(
+        signals, lambda values: lagged(values, shape["time_constant_s"] / signals.period).start
     ),
-    apply=_apply,
     actuation=Actuation(lag=lambda values: values["time_constant_s"]),
 )

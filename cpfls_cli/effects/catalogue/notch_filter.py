@@ -1,13 +1,10 @@
 """Notch filter of an autopilot between its command and the rotors."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 
 _FILTER = CommandFilter("width", (1.0, 0.0, 1.0))
-
 EFFECT = Effect(
     name="notch_filter",
     order=155,

@@ -13,7 +13,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
-    """Tell whether the lost lift can have the moment: it acts within the arms."""
+    """Check whether the lost lift can have the moment: it acts within the arms."""
     largest = scales.arm(vehicle) * max(float((linear + 2 * error)[0]), 0.0)
     return np.array([True, *(np.abs(linear[1:]) - 2 * error[1:] <= largest)])
 

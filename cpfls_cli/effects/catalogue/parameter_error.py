@@ -1,7 +1,5 @@
 """Wrong numbers of the vehicle: moments of inertia and scale of the thrust."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,8 +16,7 @@ from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import add, cross
 
-# Places among the coefficients.
-_THRUST_SCALE = 6
+_THRUST_SCALE = 6  # Places among the coefficients.
 # A tenth and four times of what is stated: farther off the number was not measured but mistyped.
 _BOUNDS = (-0.9, 3.0)
 _COUPLED = (
@@ -28,7 +25,6 @@ _COUPLED = (
 )
 _MEASURED = "where acceleration or velocity is measured, relative to the centre of mass; seen in force only"
 _MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
-
 NUMBERS = {
     "inertia_x": "the inertia about x",
     "inertia_y": "the inertia about y",
@@ -39,16 +35,9 @@ NUMBERS = {
 
 
 def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
-    """Compute what relative errors add to the inertia tensor.
+    """Compute what relative errors add to the inertia tensor, shape (3, 3), kg m^2.
 
-    Parameters
-    ----------
-    values : array, shape (10,)
-        The coefficients.
-
-    Returns
-    -------
-    array, shape (3, 3), kg m^2
+    `values`, shape (10,): the coefficients.
     """
     return np.diag(values[:3] * np.array(vehicle.inertia_kg_m2[:3]))
 
@@ -56,34 +45,18 @@ def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
 def shown(turns: BoolArray) -> Array:
     """Mark the coefficients that a flight can show: inertia and coupling only about axes that turn.
 
-    Parameters
-    ----------
-    turns : array of bool, shape (3,)
-        Whether the vehicle turns about x, y, z.
-
-    Returns
-    -------
-    array, shape (10,)
-        1 or 0.
+    `turns`, shape (3,): whether the vehicle turns about x, y, z; Result: shape (10,); 1 or 0.
     """
     return np.concatenate([turns, turns, np.ones(4)]).astype(float)
 
 
 class Change(NamedTuple):
-    """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle.
+    """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle."""
 
-    Attributes
-    ----------
-    offset : array, shape (10,)
-    matrix : array, shape (10, 10)
-        Columns of numbers that stay as they are, are zero.
-    low, high : array, shape (10,)
-    """
-
-    offset: Array
-    matrix: Array
-    low: Array
-    high: Array
+    offset: Array  # Shape (10,).
+    matrix: Array  # Shape (10, 10): columns of numbers that stay as they are, are zero.
+    low: Array  # Shape (10,).
+    high: Array  # Shape (10,).
 
 
 def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Change:
@@ -93,12 +66,8 @@ def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Ch
     ``M + C`` and ``M - C``, both of which are above zero. Rates show either by the scale of the rotor torque about this
     axis alone, so the bounds hold axis by axis.
 
-    Parameters
-    ----------
-    shown : array of bool, shape (3,)
-        Axes whose inertia the flights show.
-    least : array of bool, shape (3,)
-        Axes that are held at the least inertia, without coupling.
+    `shown`, shape (3,): axes whose inertia the flights show.
+    `least`, shape (3,): axes that are held at the least inertia, without coupling.
     """
     moments = np.array(vehicle.inertia_kg_m2[:3])
     moved = shown & ~least
@@ -130,7 +99,9 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     direct = np.zeros_like(momentum)
     momentum[:, :3, :3] = -turning
     direct[:, :3, :3] = -_across(signals.body_rate, turning)
-    direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
+    after, later = [1, 2, 0], [2, 0, 1]
+    coupling = 0.5 * (moments[after] + moments[later]) * signals.body_rate[:, after] * signals.body_rate[:, later]
+    direct[:, :3, 3:6] = -coupling[:, :, None] * np.eye(3)
     direct[:, 5, _THRUST_SCALE] = signals.wrench[:, 5]
     # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
     levers = _across(signals.body_rate, signals.vehicle.mass_kg * np.eye(3)[None])
@@ -151,20 +122,13 @@ def with_thrust(rows: Array, thrust: Array) -> Array:
     return rows
 
 
-def _coupling(body_rate: Array, moments: Array) -> Array:
-    """Multiply the two other rates by the mean of their moments of inertia, shape (time, 3), N m."""
-    after, later = (1, 2, 0), (2, 0, 1)
-    mean = 0.5 * (moments[list(after)] + moments[list(later)])
-    return np.asarray(mean * body_rate[:, after] * body_rate[:, later])
-
-
 def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
     """Log position, velocity and acceleration of a point of the body, ``v + omega x r`` and so on."""
     point = np.array([values.get(name, 0.0) for name in _MEASURING_POINT])
     moving = np.cross(motion.body_rate, point)
     turning = np.cross(motion.body_acceleration, point) + np.cross(motion.body_rate, moving)
-    beside = {"position": np.tile(point, (len(moving), 1)), "velocity": moving, "acceleration": turning}
-    return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in beside.items()}
+    added = {"position": np.tile(point, (len(moving), 1)), "velocity": moving, "acceleration": turning}
+    return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in added.items()}
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:

@@ -17,7 +17,7 @@ _TORQUES = of_axes("cr_{}", "N s^2/m", -0.2, 0.2, "drag times the {} of the cent
 
 
 def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
-    """Tell which torques a drag can have: its centre of pressure lies within a body length of the centre of mass."""
+    """Find which torques a drag can have: its centre of pressure lies within a body length of the centre of mass."""
     length, largest = 2 * scales.arm(vehicle), float((linear + 2 * error)[:3].max())
     possible = np.ones(6, dtype=bool)
     possible[3:] = np.abs(linear[3:]) - 2 * error[3:] <= length * max(largest, 0.0)

@@ -19,25 +19,18 @@ from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.values import Vector, add, apply, dot, plus, scaled, subtract, transposed
 from cpfls_cli.vehicle.values import cross as across
 
-# A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
-_STEP_S = 0.04
-# Half width of the parabolas: a tenth of the shortest swing, over which it hardly bends.
-_SMOOTHING_S = 0.1
+_STEP_S = 0.04  # A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
+_SMOOTHING_S = 0.1  # Half width of the parabolas: a tenth of the shortest swing, over which it hardly bends.
 # Of the cable across, 30 degrees: a larger free swing at the start is a fit to something else.
 _LARGEST_START = 0.5
 _AT_REST = np.zeros(4)
-# Of the start, for its derivatives: a swing bends by a thousandth of it over that.
-_NUDGE = 1e-4
-# Of Gauss and Newton over the first part; over each later one a single one, from so near.
-_MOVES = 2
-# Of a part over the one before: a start from two swings is not a swing off after eight.
-_LONGER = 4
-# Squares left at the beginning, over those of a start found there: some swings in gusts tell a start no better.
+_NUDGE = 1e-4  # Of the start, for its derivatives: a swing bends by a thousandth of it over that.
+_MOVES = 2  # Of Gauss and Newton over the first part; over each later one a single one, from so near.
+_LONGER = 4  # Of a part over the one before: a start from two swings is not a swing off after eight.
+# Squares left at the beginning, over those of a start found there: some swings in gusts identify a start no better.
 _WORSE = 2.0
-# As many as the grid of lengths and the dampings and depths beside the best one.
-_SWINGS_KEPT = 32
-# Of the swing, over which its start is sought first: two tell it from the driven one.
-_PERIODS = 2.0
+_SWINGS_KEPT = 32  # As many as the grid of lengths and the dampings and depths around the best one.
+_PERIODS = 2.0  # Of the swing, over which its start is sought first: two separate it from the driven one.
 
 _State = tuple[float, float, float, float, float, float]
 
@@ -79,22 +72,13 @@ def _unit(state: _State) -> _State:
 def integrate(nodes: Array, middles: Array, step: float, length: float, damping: float, start: Array) -> Array:
     """Integrate direction and rate of a cable by the classical Runge-Kutta method.
 
-    Parameters
-    ----------
-    nodes : array, shape (step, 3), m/s^2
-        Acceleration of the hook plus gravity at each step, world frame.
-    middles : array, shape (step - 1, 3), m/s^2
-        Half a step later.
-    step : float, s
-    length : float, m
-    damping : float, 1/s
-    start : array, shape (6,)
-        Direction, then rate in 1/s, at the first step.
-
-    Returns
-    -------
-    array, shape (step, 6)
-        Direction, then rate in 1/s.
+    `nodes`, shape (step, 3), m/s^2: acceleration of the hook plus gravity at each step, world frame.
+    `middles`, shape (step - 1, 3), m/s^2: half a step later.
+    `step`: s.
+    `length`: m.
+    `damping`: 1/s.
+    `start`, shape (6,): direction, then rate in 1/s, at the first step.
+    Result: shape (step, 6); direction, then rate in 1/s.
     """
     state = (start[0], start[1], start[2], start[3], start[4], start[5])
     states = np.zeros((len(nodes), 6))
@@ -118,25 +102,12 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
     so no filter will do.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    length : float, m
-        L.
-    damping : float, 1/s
-        c.
-    depth : float, m
-        Of the hook below the centre of mass, with which it swings to and fro itself.
-
-    Returns
-    -------
-    array, shape (time, 6)
-        Direction of the cable from the hook, world frame, and its rate in 1/s.
-
-    References
-    ----------
-    Equation of the spherical pendulum with a moving pivot.
+    `signals`: with velocity.
+    `length`, m: L.
+    `damping`, 1/s: c.
+    `depth`, m: of the hook below the centre of mass, with which it swings to and fro itself.
+    Result: shape (time, 6); direction of the cable from the hook, world frame, and its rate in 1/s.
+    Reference: Equation of the spherical pendulum with a moving pivot.
     """
     return _at_samples(signals, _Way.of(signals, length, damping, depth).swing(_AT_REST))
 
@@ -201,12 +172,7 @@ def _tension(length: float, states: Array, felt: Array) -> Array:
 def felt_acceleration(signals: Signals, depth: float) -> Array:
     """Add gravity to the acceleration of the hook, shape (time, 3), world frame.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    depth : float, m
-        Of the hook below the centre of mass.
+    `signals`: with velocity; `depth`, m: of the hook below the centre of mass.
     """
     key, kept = "felt", signals.of_motion
     if key not in kept:
@@ -238,19 +204,11 @@ def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> A
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
     """Integrate the swing from where the force balance says that it began.
 
-    Parameters
-    ----------
-    signals : Signals
-        With velocity. Without thrust and acceleration the cable starts at rest.
-    length : float, m
-    damping : float, 1/s
-    depth : float, m
-        Of the hook.
-
-    Returns
-    -------
-    array, shape (time, 6)
-        Direction of the cable from the hook, world frame, and its rate in 1/s.
+    `signals`: with velocity. Without thrust and acceleration the cable starts at rest.
+    `length`: m.
+    `damping`: 1/s.
+    `depth`, m: of the hook.
+    Result: shape (time, 6); direction of the cable from the hook, world frame, and its rate in 1/s.
     """
     way, start = _Way.of(signals, length, damping, depth), _AT_REST
     if signals.acceleration is not None and signals.thrust is not None and signals.attitude is not None:
@@ -268,14 +226,11 @@ def _start(signals: Signals, way: _Way) -> Array:
     """Find the start from which a load pulls on the vehicle as the force balance says, by least squares.
 
     Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
-    tell the start from the driven swing; from there the search goes on over four times as much, up to the whole flight,
-    so that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
-    contradicts: what rings late is no swing at the start.
+    separate the start from the driven swing; from there the search goes on over four times as much, up to the whole
+    flight, so that it never has to find its way among the swings of a load that has drifted apart. It ends where the
+    beginning contradicts: what rings late is no swing at the start.
 
-    Returns
-    -------
-    array, shape (4,)
-        As `_Way.swing` takes it; at rest where nothing pulls like a load.
+    Result: shape (4,); as `_Way.swing` takes it; at rest where nothing pulls like a load.
     """
     assert signals.acceleration is not None
     assert signals.thrust is not None
@@ -299,7 +254,7 @@ def _start(signals: Signals, way: _Way) -> Array:
 
 @dataclass(frozen=True)
 class _Balance:
-    """Horizontal forces that something but rotors and weight applies, beside the velocity that a drag goes with."""
+    """Horizontal forces that something but rotors and weight applies, and the velocity that a drag goes with."""
 
     way: _Way
     needed: Array

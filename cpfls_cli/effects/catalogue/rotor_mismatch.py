@@ -1,7 +1,5 @@
 """Rotors that pull or drag differently from what the model says."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,19 +9,15 @@ from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-# Share of the arm by which hubs may miss each other and be opposite: digits of a config.
-_SAME_PLACE = 1e-6
+_SAME_PLACE = 1e-6  # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
 
 
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
     """Find the pairs of rotors that face each other across the middle of all and spin the same way.
 
-    The centre of mass may lie beside the middle, as that of a vehicle out of trim does.
+    The centre of mass may lie off the middle, as that of a vehicle out of trim does.
 
-    Returns
-    -------
-    tuple of tuple of int
-        Indices from 0, in the order of the first rotor of each pair.
+    Result: indices from 0, in the order of the first rotor of each pair.
     """
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     hubs = hubs - hubs.mean(axis=0)
@@ -39,10 +33,7 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
     For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
     What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
 
-    Returns
-    -------
-    array, shape (rotor, 2)
-        Gain of each rotor for a difference of 1 from end to end.
+    Result: shape (rotor, 2); gain of each rotor for a difference of 1 from end to end.
     """
     spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
     common = np.column_stack([np.ones_like(spins), spins])
@@ -53,15 +44,9 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
 def gains(vehicle: VehicleSettings, differences: Array) -> Array:
     """Assign each difference to the weaker rotor of its pair.
 
-    Parameters
-    ----------
-    differences : array, shape (2,)
-        The first two coefficients.
-
-    Returns
-    -------
-    array, shape (rotor,)
-        Relative error of each thrust, at most 0; on vehicles without two opposite pairs, the patterns themselves.
+    `differences`, shape (2,): the first two coefficients.
+    Result: shape (rotor,); relative error of each thrust, at most 0; on vehicles without two opposite pairs, the
+    patterns themselves.
     """
     pairs = opposite_pairs(vehicle)
     patterns = gain_modes(vehicle) @ differences

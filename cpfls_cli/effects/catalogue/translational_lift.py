@@ -1,7 +1,5 @@
 """Translational lift: thrust grows with the air speed in the rotor plane."""
 
-from __future__ import annotations
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench

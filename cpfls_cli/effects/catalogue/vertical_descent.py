@@ -1,7 +1,5 @@
 """Vertical descent: vortex ring, turbulent wake and windmill brake change the thrust."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Steady wind: the rotor drag of a vehicle that does not move over the ground, and the air that all others meet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -14,8 +12,7 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, column
 from cpfls_cli.effects.hooks import PhysicalNumbers, VehicleParts
 from cpfls_cli.effects.signals import Signals
 
-_STRONGEST = 15.0
-"""Bound of either component in m/s, 7 Beaufort: nobody flies a multirotor to learn from in more."""
+_STRONGEST = 15.0  # Bound of either component in m/s, 7 Beaufort: nobody flies a multirotor to learn from in more.
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:

@@ -25,22 +25,12 @@ _QUIET_AXIS = 0.3
 
 @dataclass(frozen=True)
 class System:
-    """The balance of all flights under a hypothesis; windows of all flights one after another.
-
-    Attributes
-    ----------
-    chosen : tuple of Candidate
-        Effects of the hypothesis.
-    signals : tuple of Signals
-        Of each flight, with the actuator effects among `chosen` applied.
-    cache : dict
-        Columns by effect and shape.
-    """
+    """The balance of all flights under a hypothesis; windows of all flights one after another."""
 
     flights: tuple[WeakFlight, ...]
-    chosen: tuple[Candidate, ...]
-    signals: tuple[Signals, ...]
-    cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
+    chosen: tuple[Candidate, ...]  # Effects of the hypothesis.
+    signals: tuple[Signals, ...]  # Of each flight, with the actuator effects among `chosen` applied.
+    cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)  # Columns by effect and shape.
 
     def columns(self, candidate: Candidate) -> Array:
         """Evaluate a candidate, shape (window, 6, coefficient); zeros for a flight that lacks a signal it needs."""
@@ -60,14 +50,14 @@ class System:
 
     @cached_property
     def residual(self) -> Array:
-        """What inertia and rotors leave, without the effects of unit coefficient; shape (window, 6)."""
+        """Residual of inertial and rotor wrench, and of effects of unit coefficient; shape (window, 6)."""
         residual = self.by_flight(lambda flight, signals: flight.averaged(flight.residual(signals)))
         for candidate in self.fixed:
             residual = residual - self.columns(candidate)[..., 0]
         return residual
 
-    def left(self, linear: Array) -> Array:
-        """Compute what coefficients of `base` leave of the residual, shape (window, 6), N m and N."""
+    def residual_at(self, linear: Array) -> Array:
+        """Compute the residual with coefficients of `base`, shape (window, 6), N m and N."""
         return np.asarray(self.residual - self.base @ linear)
 
     @cached_property
@@ -151,14 +141,14 @@ class System:
 
     @property
     def most_noise(self) -> Array:
-        """Mean square in squared floors up to which what is left of each channel is noise, shape (6,).
+        """Mean square in squared floors up to which the residual of each channel is noise, shape (6,).
 
         In gusts it is as much as a gap begins at: they are drawn anew in each flight, and known to a third.
         """
         return np.where(self.gusty, CLEAR**2, NOISE)
 
     def can(self, candidate: Candidate) -> bool:
-        """Tell whether any flight has the signals that a candidate needs."""
+        """Check whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
 
 
@@ -169,7 +159,7 @@ def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> S
 
 
 def has_force(flights: Sequence[WeakFlight]) -> bool:
-    """Tell whether any flight has the force balance."""
+    """Check whether any flight has the force balance."""
     return any(flight.known[3:].any() for flight in flights)
 
 
@@ -186,26 +176,19 @@ def known_size(rows: Array, known: BoolArray) -> Array:
 
 
 def is_free(candidate: Candidate) -> bool:
-    """Tell whether an effect has columns with free coefficients."""
+    """Check whether an effect has columns with free coefficients."""
     return candidate.effect.kind == "wrench" and not candidate.effect.unit_coefficient
 
 
 def floors(hypothesis: System, coefficients: Array) -> Array:
     """Estimate the noise floor of each channel over all flights, the air in it where that is known.
 
-    Parameters
-    ----------
-    coefficients : array, shape (column,)
-        Of `hypothesis.base`.
-
-    Returns
-    -------
-    array, shape (6,), N m and N
-        1 for channels that no flight has.
+    `coefficients`, shape (column,): of `hypothesis.base`.
+    Result: shape (6,), N m and N; 1 for channels that no flight has.
     """
     square, count = np.zeros(6), np.zeros(6)
     for number, flight in enumerate(hypothesis.flights):
-        floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows, flight.cut_off)
+        floor = noise_floor(residual_along(hypothesis, number, coefficients), flight.windows, flight.cut_off)
         floor = np.maximum(floor, flight.air)
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
@@ -216,19 +199,10 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * moves), 1.0)
 
 
-def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
+def residual_along(hypothesis: System, number: int, coefficients: Array) -> Columns:
     """Compute the residual of a fitted hypothesis along one flight, sample by sample.
 
-    Parameters
-    ----------
-    number : int
-        Of the flight.
-    coefficients : array, shape (column,)
-
-    Returns
-    -------
-    Columns
-        Of shape (time, 6).
+    `number`: of the flight; `coefficients`: shape (column,); Result: shape (time, 6).
     """
     flight, signals = hypothesis.flights[number], hypothesis.signals[number]
     residual = flight.residual(signals)
@@ -246,10 +220,7 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
 def scatter_variance(hypothesis: System) -> Array:
     """Average over windows the variance of the random part of the chosen effects, for a unit of relative scatter.
 
-    Returns
-    -------
-    array, shape (window, 6)
-        Zero where no effect scatters.
+    Result: shape (window, 6); zero where no effect scatters.
     """
 
     def of_flight(flight: WeakFlight, signals: Signals) -> Array:
@@ -263,19 +234,13 @@ def scatter_variance(hypothesis: System) -> Array:
 
 
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
-    """Estimate the relative scatter of effects, one number for all channels, by its likelihood in what a fit leaves.
+    """Estimate the relative scatter of effects, one number for all channels, by its likelihood in a residual.
 
-    Parameters
-    ----------
-    variance : array, shape (window, 6)
-        For a unit of scatter.
-    residual : array, shape (window, 6)
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    float
-        Mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
+    `variance`, shape (window, 6): for a unit of scatter.
+    `residual`: shape (window, 6).
+    `floor`: shape (6,).
+    Result: mean square of the relative scatter over a window; 0 where stretches that should scatter are not
+    significant.
     """
     expected = variance / floor**2
     scatters = expected.any(axis=0)
@@ -283,29 +248,25 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
         return 0.0
     expected, square = expected[:, scatters], (residual / floor)[:, scatters] ** 2
 
-    def beside(size: float) -> tuple[Array, float]:
-        """Give the shape of the variance, and its scale: what is left everywhere is no scatter."""
+    def scaled(size: float) -> tuple[Array, float]:
+        """Give the shape of the variance, and its scale: a residual that is everywhere is no scatter."""
         shape = 1 + size * expected
         return shape, max(1.0, float(np.mean(square / shape)))
 
     def unlikely(size: float) -> float:
-        shape, scale = beside(size)
+        shape, scale = scaled(size)
         return float(np.sum(np.log(shape * scale) + square / (shape * scale)))
 
     most = float(np.max(square[expected > 0] / expected[expected > 0]))
     size = float(minimize_scalar(unlikely, bounds=(0.0, most), method="bounded").x) if most > 0 else 0.0
-    # One number more has to be worth its while (Schwarz 1978).
-    return size * beside(size)[1] if unlikely(0.0) - unlikely(size) > np.log(square.size) else 0.0
+    # One parameter more has to lower the information criterion (Schwarz 1978).
+    return size * scaled(size)[1] if unlikely(0.0) - unlikely(size) > np.log(square.size) else 0.0
 
 
 def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:
     """Add to the floor of each window what the chosen effects do there at random, shape (window, 6), N m and N.
 
-    Parameters
-    ----------
-    residual : array, shape (window, 6)
-        Of a fit; the size of the random part is read from it.
-    floor : array, shape (6,)
+    `residual`, shape (window, 6): of a fit; the size of the random part is read from it; `floor`: shape (6,).
     """
     variance = scatter_variance(hypothesis)
     return np.asarray(np.sqrt(floor**2 + scatter_size(variance, residual, floor) * variance))

@@ -1,7 +1,5 @@
 """The noise floor of each channel, from the residual at frequencies above the motion."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -19,37 +17,26 @@ _FREQUENCIES = 16
 _LONGER = 2
 # In reciprocals of a window: from near the first zero of its spectrum, at 3, it passes nothing of slow motion.
 _LOWEST_PER_WINDOW = 2.8
-# Of the sampling rate: above, filters against aliasing bend a spectrum.
-_HIGHEST_OF_RATE = 0.4
+_HIGHEST_OF_RATE = 0.4  # Of the sampling rate: above, filters against aliasing bend a spectrum.
 # Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
 _PASSED = 0.6
 _BAND = 1.5
-# From sample to sample; each halves the band of the one before about.
-CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
-# Frequencies for each that a window resolves, so that a sum over them is an integral.
-_PADDED = 8
+CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)  # From sample to sample; each halves the band of the one before about.
+_PADDED = 8  # Frequencies for each that a window resolves, so that a sum over them is an integral.
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
-    """Estimate the standard deviation of the window averages that noise causes.
+    """Estimate the standard deviation of the window averages that noise causes, shape (6,), N m and N.
 
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
     of noise that is correlated from sample to sample. The fit is read off at the frequencies that the windows average
-    over. Longer windows tell frequencies apart better, so that the fit can start lower; the median over the windows
+    over. Longer windows resolve frequencies better, so that the fit can start lower; the median over the windows
     keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: above
     it the filter has removed the noise as well.
 
-    Parameters
-    ----------
-    residual : Columns
-        What the model leaves, shape (time, 6).
-    cut_off : array, shape (6,), Hz, or None
-        Of the filter that each channel went through before it was logged, infinite for none.
-
-    Returns
-    -------
-    array, shape (6,), N m and N
+    `residual`: of the model, shape (time, 6).
+    `cut_off`, shape (6,), Hz: of the filter that each channel went through before it was logged, infinite for none.
     """
     limit = np.full(6, np.inf) if cut_off is None else np.asarray(cut_off)
     floor = np.empty(6)
@@ -62,15 +49,8 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
 def channel_cut_offs(signals: Signals, euler: bool) -> Array:
     """Find the lowest cut-off among the signals that each channel of the balance is made of.
 
-    Parameters
-    ----------
-    euler : bool
-        Whether the inertial torque takes the attitude.
-
-    Returns
-    -------
-    array, shape (6,), Hz
-        Infinite where nothing was filtered.
+    `euler`: whether the inertial torque takes the attitude.
+    Result: shape (6,), Hz; infinite where nothing was filtered.
     """
     found = known_up_to(signals)
     force = next(
@@ -135,8 +115,8 @@ def _terms(weights: bytes, period: float, centre: float) -> Array:
 
 
 def _best_pair(relative: Array) -> int:
-    """Choose a flat and a rising spectrum, neither negative, that leave least of one, of all pairs by formula."""
-    # What is left does not depend on the unit, and fourth powers stay within range.
+    """Choose a flat and a rising spectrum, neither negative, with the least residual, of all pairs by formula."""
+    # The residual does not depend on the unit, and fourth powers stay within range.
     scaled = relative / relative.max()
     flat, rising = scaled[:, ::2, None], scaled[:, None, 1::2]
     flat_squared, rising_squared, both = (each.sum(axis=0) for each in (flat**2, rising**2, flat * rising))
@@ -160,15 +140,7 @@ def _best_pair(relative: Array) -> int:
 def modulated(windows: Windows, frequency: float) -> Windows:
     """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``.
 
-    Parameters
-    ----------
-    frequency : float
-        Hz.
-
-    Returns
-    -------
-    Windows
-        Complex.
+    `frequency`: Hz; Result: complex.
     """
     turn = 2j * np.pi * frequency
     phase = np.exp(-turn * windows.period * np.arange(len(windows.weight)))

@@ -19,11 +19,11 @@ from cpfls_cli.gap.settings import VISIBLE
 from cpfls_cli.rounding import ROUNDING, at_most, levelled, smallest
 
 _MOST_NOISE = 0.5
-"""Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of
-it is uncertain."""
+"""Share of the squares of any combination of columns that is believed to be noise at most: beyond it, the rest is
+uncertain."""
 _SETTLED = 1e-2
-"""Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error; and share of
-a step, or of what it takes off, below which it is none."""
+"""Change of the sum of squares, in variances, below which a fit has converged: a tenth of a standard error; and share
+of a step, or of what it takes off, below which it is none."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -32,9 +32,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     The newest shapes first, one by one between the points of their grids; then, where there are several, all together
     (`refitted`), because a lag and a delay, say, trade with each other.
 
-    Parameters
-    ----------
-    floor : array, shape (6,)
+    `floor`: shape (6,).
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
     rotor_wrench = system(flights).rotor_wrench
@@ -42,7 +40,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     for shape in best[-1].effect.shapes if best else ():
         if shape.valley is not None:
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
-    # What took the place of a linear effect stands between no points of a grid.
+    # What took the place of a linear effect has no place on a grid.
     indices = [index for index, candidate in enumerate(best) if candidate.effect is chosen[-1].effect]
     newest = [(index, shape) for index in indices for shape in best[index].effect.shapes]
     # A second round where there are several: the best length of a cable depends on its damping.
@@ -60,16 +58,10 @@ class Equations:
     Noise in a column shrinks its coefficient, and what goes with it takes the rest: noisy rates and rotor speeds made
     Izz and the inertia of the rotors 4 % too small, both. So what noise adds is taken off the normal equations.
 
-    Attributes
-    ----------
-    columns : array, shape (row, column)
-    right : array, shape (row,)
-    noise : array, shape (row, column + 1)
-        That of the right side in the last column.
-
-    References
-    ----------
-    Fuller 1987, Measurement Error Models, section 2.2 (method of moments).
+    `columns`: shape (row, column).
+    `right`: shape (row,).
+    `noise`, shape (row, column + 1): that of the right side in the last column.
+    Reference: Fuller 1987, Measurement Error Models, section 2.2 (method of moments).
     """
 
     columns: Array
@@ -78,7 +70,7 @@ class Equations:
 
     @cached_property
     def _apart(self) -> tuple[Array, Array, Array, Array]:
-        """Tell signal from noise: root of the squares of all rows, its inverse, shares of noise, and their axes."""
+        """Separate signal from noise: root of the squares of all rows, its inverse, shares of noise, and their axes."""
         length = np.linalg.norm(self.columns, axis=0)
         scale = np.where(length > 0, length, 1.0)
         triangle = np.asarray(np.linalg.qr(self.columns / scale, mode="r"))
@@ -112,11 +104,7 @@ class Equations:
     def around(self, linear: Array, kept: BoolArray, moving: Array) -> Equations:
         """Subtract what coefficients explain, keep the columns of some, and add weighted columns without noise.
 
-        Parameters
-        ----------
-        linear : array, shape (column,)
-        kept : array of bool, shape (column,)
-        moving : array, shape (..., shape)
+        `linear`: shape (column,); `kept`: shape (column,); `moving`: shape (..., shape).
         """
         added = moving.reshape(len(self.right), -1)
         left = self.noise[:, -1] - self.noise[:, :-1] @ linear
@@ -131,10 +119,7 @@ class Equations:
 def equations(hypothesis: System, weight: Array) -> Equations:
     """Weigh the rows of a hypothesis.
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
     """
     columns, noise = (rows / weight[..., None] for rows in (hypothesis.base, hypothesis.noise))
     right = (hypothesis.residual / weight).reshape(-1)
@@ -142,15 +127,9 @@ def equations(hypothesis: System, weight: Array) -> Equations:
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns by weighted least squares, which leave the least but shrink numbers whose columns are noisy.
+    """Fit all free columns by weighted least squares, which shrink numbers whose columns are noisy.
 
-    Parameters
-    ----------
-    floor : array, shape (6,) or (window, 6)
-
-    Returns
-    -------
-    array, shape (column,)
+    `floor`: shape (6,) or (window, 6); Result: shape (column,).
     """
     matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
     return least_squares(matrix, (hypothesis.residual / floor).reshape(-1))
@@ -166,18 +145,11 @@ def least_squares(matrix: Array, right: Array) -> Array:
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
     """Fit all free columns by weighted least squares under the bounds of their coefficients.
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
-    of_vehicle : bool
-        Whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is wrong.
-
-    Returns
-    -------
-    linear : array, shape (column,)
-    held : array of bool, shape (column,)
-        Coefficients on a bound, and those that nothing shows, which are 0.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
+    `of_vehicle`: whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is
+    wrong.
+    Result `linear`: shape (column,).
+    Result `held`, shape (column,): coefficients on a bound, and those that nothing shows, which are 0.
     """
     rows = equations(hypothesis, weight)
     linear = rows.solve()
@@ -247,7 +219,7 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
 
 
 def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArray:
-    """Mark torques that are surely impossible beside the force of their effect."""
+    """Mark torques that are surely impossible with the force of their effect."""
     out = np.zeros(len(linear), dtype=bool)
     for candidate, place in hypothesis.places if has_force(hypothesis.flights) else ():
         if candidate.effect.lever is not None:
@@ -260,13 +232,10 @@ def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArra
 def refitted(hypothesis: System, weight: Array) -> System:
     """Move the shapes of all effects, together with all coefficients, to their least squares by Gauss-Newton steps.
 
-    The last fit of a hypothesis that is believed: it stands where the same linear system that gives the intervals asks
-    for no further step. As in the search, less torque with less inertia explains nothing (`compensation`).
+    The last fit of a hypothesis that is believed: it ends where the same linear system that gives the intervals asks
+    for no further step. As in the search, less torque with less inertia explains nothing (`torque_loss_ratio`).
 
-    Parameters
-    ----------
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
+    `weight`, shape (6,) or (window, 6), N m and N: standard deviation of each channel.
     """
     hypothesis = _exact(hypothesis, weight)
     if not hypothesis.shapes:
@@ -276,20 +245,20 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
     def fitted(there: System) -> tuple[float, tuple[Array, Array, BoolArray]]:
         """Compute the squares that are left, and weights, coefficients and those on bounds."""
-        own = weight / compensation(rotor_wrench, there.rotor_wrench)
+        own = weight / torque_loss_ratio(rotor_wrench, there.rotor_wrench)
         linear, held = fit_within_bounds(there, own)
-        return float(((there.left(linear) / own) ** 2).sum()), (own, linear, held)
+        return float(((there.residual_at(linear) / own) ** 2).sum()), (own, linear, held)
 
     error, (own, linear, held) = fitted(hypothesis)
     while True:
-        # The change of the shapes beside the coefficients that no bound holds, and what it takes off the squares where
-        # the residual is linear in them.
+        # The change of the shapes jointly with the coefficients that no bound holds, and what it takes off the squares
+        # where the residual is linear in them.
         moving = shape_columns(hypothesis, linear, rotor_wrench)
         rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
         step, (columns, right) = rows.solve(), rows.root
         step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
         # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it
-        # holds for no step: a filter and a lag that nothing tells apart would creep along with no end in sight.
+        # holds for no step: a filter and a lag that nothing separates would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
@@ -329,8 +298,8 @@ def _improved(
 
     def error(value: float) -> float:
         hypothesis = system(flights, [*chosen[:index], candidate.at({shape.name: float(value)}), *chosen[index + 1 :]])
-        weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
-        return float(((hypothesis.left(fit(hypothesis, floor)) * weight) ** 2).sum())
+        weight = torque_loss_ratio(rotor_wrench, hypothesis.rotor_wrench) / floor
+        return float(((hypothesis.residual_at(fit(hypothesis, floor)) * weight) ** 2).sum())
 
     value = candidate.shape[shape.name]
     bracket = _bracket(_steps(shape, value), value)
@@ -344,7 +313,7 @@ def _in_deepest_valley(
 ) -> Candidate:
     """Try one shape of the newest effect in steps of its valleys, with all that the grids of its others hold."""
     newest = chosen[-1]
-    # Where valleys are narrower than the steps of the grid, the best point of that lies beside its deepest one.
+    # Where valleys are narrower than the steps of the grid, the best point of that lies next to its deepest one.
     low, high = _bracket(shape.grid, newest.shape[shape.name])
     low, high = _bracket(shape.grid, low)[0], _bracket(shape.grid, high)[1]
     values = [value for value in _steps(shape, newest.shape[shape.name]) if low <= value <= high]
@@ -353,7 +322,7 @@ def _in_deepest_valley(
 
     def error(tried: Candidate) -> float:
         hypothesis = system(flights, [*chosen[:-1], tried])
-        return float(((hypothesis.left(fit(hypothesis, floor)) / floor) ** 2).sum())
+        return float(((hypothesis.residual_at(fit(hypothesis, floor)) / floor) ** 2).sum())
 
     tried = (Candidate(newest.effect, dict(zip(names, values, strict=True))) for values in product(*grids))
     return smallest(tried, error)
@@ -376,26 +345,20 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
 def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
     """Differentiate what the hypothesis explains by each of its shapes, by central differences.
 
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of the base, held.
-    rotor_wrench : array, shape (window, 6), N m and N, optional
-        Of the rotors without effects on the actuation, for which a change of the rotor torque is compensated.
-
-    Returns
-    -------
-    array, shape (window, 6, shape)
+    `linear`, shape (column,): coefficients of the base, held.
+    `rotor_wrench`, shape (window, 6), N m and N: of the rotors without effects on the actuation, for which a change of
+    the rotor torque is compensated.
+    Result: shape (window, 6, shape).
     """
     values = hypothesis.shape_values
     columns = np.zeros((*hypothesis.residual.shape, len(values)))
 
     def residual_at(shapes: Array) -> Array:
         there = hypothesis.with_shapes(shapes)
-        left = there.left(linear)
+        left = there.residual_at(linear)
         if rotor_wrench is None:
             return left
-        before, after = (compensation(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
+        before, after = (torque_loss_ratio(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
         return left * after / before
 
     for number, unit in enumerate(np.eye(len(values))):
@@ -406,7 +369,7 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
     return columns
 
 
-def compensation(before: Array, after: Array) -> Array:
+def torque_loss_ratio(before: Array, after: Array) -> Array:
     """Weigh the channels by how much an actuator effect reduces their rotor torque.
 
     Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the
@@ -414,15 +377,9 @@ def compensation(before: Array, after: Array) -> Array:
     times this factor, what counts is the share of the torque that the motion does not follow. A torque that grows, and
     the inertia with it, leaves the residual as it was and explains nothing either.
 
-    Parameters
-    ----------
-    before, after : array, shape (window, 6), N m and N
-        Wrench of the rotors without and with the effect.
-
-    Returns
-    -------
-    array, shape (6,)
-        Ratio of the standard deviations, at least 1; 1 for the forces, where weight and mass hold the scale.
+    `before`, `after`, shape (window, 6), N m and N: wrench of the rotors without and with the effect.
+    Result: shape (6,); ratio of the standard deviations, at least 1; 1 for the forces, where weight and mass hold the
+    scale.
     """
     factor = np.ones(before.shape[1])
     spread, shrunk = before[:, :3].std(axis=0), after[:, :3].std(axis=0)

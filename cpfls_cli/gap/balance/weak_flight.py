@@ -23,9 +23,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.newness import PER_WINDOW
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-TURNING = 4.0
-"""Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
-
+TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
 
@@ -52,32 +50,24 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WeakFlight:
-    """A flight with its inertial torque and force.
-
-    Attributes
-    ----------
-    inertial : Columns
-        Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
-    known : array of bool, shape (6,)
-        Channels that the flight has.
-    turns : array, shape (parameter,)
-        1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that hardly turn.
-    cut_off : array, shape (6,), Hz
-        Of the filters that the signals of each channel went through before they were logged; infinite for none.
-    air : array, shape (6,), N m and N
-        Standard deviation that gusts and noise give averages over the windows; 0 where no gusts are known.
-    seen : dict
-        Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
-    """
+    """A flight with its inertial torque and force."""
 
     name: str
     signals: Signals
     windows: Windows
+    # Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
     inertial: Columns
-    known: BoolArray
+    known: BoolArray  # Shape (6,): channels that the flight has.
+    # Shape (parameter,): 1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that
+    # hardly turn.
     turns: Array
+    # Shape (6,), Hz: of the filters that the signals of each channel went through before they were logged; infinite for
+    # none.
     cut_off: Array = field(default_factory=lambda: np.full(6, np.inf))
+    # Shape (6,), N m and N: standard deviation that gusts and noise give averages over the windows; 0 where no gusts
+    # are known.
     air: Array = field(default_factory=lambda: np.zeros(6))
+    # Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -86,31 +76,14 @@ class WeakFlight:
     def residual(self, signals: Signals) -> Columns:
         """Subtract what the rotors do from the inertial side.
 
-        Parameters
-        ----------
-        signals : Signals
-            As they are, or with actuator effects applied.
-
-        Returns
-        -------
-        Columns
-            Of shape (time, 6), N m and N.
+        `signals`: as they are, or with actuator effects applied; Result: shape (time, 6), N m and N.
         """
         return Columns((self.inertial.direct - signals.wrench) * self.known, self.inertial.momentum)
 
     def rows(self, candidate: Candidate, signals: Signals) -> Array:
-        """Average the columns of a candidate over the windows.
+        """Average the columns of a candidate over the windows, shape (window, 6, coefficient).
 
-        Parameters
-        ----------
-        candidate : Candidate
-            Of an effect with columns.
-        signals : Signals
-            As they are, or with actuator effects applied.
-
-        Returns
-        -------
-        array, shape (window, 6, coefficient)
+        `candidate`: of an effect with columns; `signals`: as they are, or with actuator effects applied.
         """
         of_vehicle, as_logged = candidate.effect.kind == "parameter", signals is self.signals
         if not (as_logged or of_vehicle):
@@ -127,10 +100,8 @@ class WeakFlight:
 
         Only what is differentiated has noise that counts: averages smooth it.
 
-        Returns
-        -------
-        array, shape (window, 6, ...)
-            Zero unless the noise of the signals is white: what a filter took off it shows nowhere.
+        Result: shape (window, 6, ...); zero unless the noise of the signals is white: what a filter took off it shows
+        nowhere.
         """
         if columns.momentum is None:
             return np.zeros((len(self), *columns.direct.shape[1:]))
@@ -167,14 +138,9 @@ def weak_flight(
 ) -> WeakFlight:
     """Compute the inertial torque and force of a flight.
 
-    Parameters
-    ----------
-    force : bool
-        Whether to use the force balance where the flight allows it.
-    axes : sequence of str
-        Body axes of which the torque balance is used.
-    floor : array, shape (6,), N m and N, or None
-        Noise of a flight that is planned; None: as its residual shows it.
+    `force`: whether to use the force balance where the flight allows it.
+    `axes`: body axes of which the torque balance is used.
+    `floor`, shape (6,), N m and N: noise of a flight that is planned; None: as its residual shows it.
     """
     with_force = force and signals.has_force
 
@@ -206,15 +172,7 @@ def dense(windows: Windows) -> Windows:
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:
     """Evaluate the columns of an effect.
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Of an effect with columns.
-
-    Returns
-    -------
-    Columns
-        Of shape (time, 6, coefficient).
+    `candidate`: of an effect with columns; Result: shape (time, 6, coefficient).
     """
     assert candidate.effect.columns is not None, "only effects with columns are candidates"
     return candidate.effect.columns(signals, candidate.shape)
@@ -228,10 +186,7 @@ def nuisance() -> Candidate:
 def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     """Apply the effects among those chosen that change what all others meet: actuation, and the air.
 
-    Parameters
-    ----------
-    chosen : iterable of Candidate
-        Those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
+    `chosen`: those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
     """
     for candidate in chosen:
         effect = candidate.effect
@@ -246,20 +201,9 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Col
     A rigid body: momentum ``I omega``, direct ``omega x I omega``. A model in Euler coordinates: ``W^-T (d/dt (J qd) -
     1/2 grad (qd^T J qd))``, with W^-T taken under the derivative.
 
-    Parameters
-    ----------
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    Columns
-        Of shape (time, 3), N m s and N m, body axes.
-
-    Raises
-    ------
-    InputError
-        If the model needs an attitude that the flight lacks.
+    `model`: None for the rigid body of the vehicle.
+    Result: shape (time, 3), N m s and N m, body axes.
+    Raises InputError if the model needs an attitude that the flight lacks.
     """
     if model is None:
         momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
@@ -277,15 +221,8 @@ def translation_balance(signals: Signals) -> Columns:
     From the accelerometer, else from the acceleration, else from the velocity: ``d/dt (m v_b) + m omega x v_b +
     m g R^T e_z``.
 
-    Parameters
-    ----------
-    signals : Signals
-        With `has_force`.
-
-    Returns
-    -------
-    Columns
-        Of shape (time, 3), N s and N, body axes; without momentum unless from the velocity.
+    `signals`: with `has_force`.
+    Result: shape (time, 3), N s and N, body axes; without momentum unless from the velocity.
     """
     mass, gravity = signals.vehicle.mass_kg, signals.vehicle.gravity_m_s2
     if signals.specific_force is not None:
@@ -300,20 +237,12 @@ def translation_balance(signals: Signals) -> Columns:
 
 @dataclass(frozen=True)
 class Preparation:
-    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
-
-    Attributes
-    ----------
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-    audit : Audit
-        Faults that are repaired.
-    """
+    """Windows, model, settings and sensor repair that all flights of a diagnosis share."""
 
     windows: Windows
-    model: InertiaModel | None
+    model: InertiaModel | None  # None for the rigid body of the vehicle.
     settings: GapSettings
-    audit: Audit
+    audit: Audit  # Faults that are repaired.
 
     def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
         """Prepare flights with the faults of their sensors, but with channels that belong together."""

@@ -1,6 +1,4 @@
-"""Numbers of a hypothesis in gusts, by what was asked: a loop that answers gusts does not mix into them."""
-
-from __future__ import annotations
+"""Parameters of a hypothesis in gusts, by instruments: a loop that answers gusts does not bias them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,38 +18,31 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.residual.air import foretold_rows
+from cpfls_cli.gap.residual.air import predicted_rows
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.newness import PER_WINDOW, news
 
+_Numbers = tuple[Estimate, ...]
 
-class _Told(NamedTuple):
-    """What a source of knowledge tells of numbers.
 
-    Attributes
-    ----------
-    products : array, shape (block, number + 1, number + 1)
-        Of what is known of each number, and of what is left, with what they move.
-    numbers : array of bool, shape (number,)
-        Those that are free, that it tells, and that no source before it does.
-    """
+class _Source(NamedTuple):
+    """Products of instruments and regressors."""
 
-    products: Array
-    numbers: BoolArray
+    products: Array  # Shape (block, number + 1, number + 1): ZtX of each number, and Ztr in the last column.
+    numbers: BoolArray  # Shape (number,): those that are free and that it identifies, and no source before it does.
 
 
 def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
-    """Fit a hypothesis anew to what instruments know of its flights.
+    """Fit a hypothesis anew by instruments.
 
-    With X what each number moves along a run, r what is left, and Z what instruments know of X, the numbers change by d
-    with ``sum Z^T (r - X d) = 0``. A gust goes with X, which the loop moves to answer it, and not with Z. Numbers that
-    instruments hardly tell stay as they were, and all do where the flights are too short to tell errors. Bounds count
-    as standard deviations of a normal prior, as in the search.
+    With the regressors X, the residual r and the prediction Z of X by instruments, the numbers change by d with
+    ``sum Z^T (r - X d) = 0``. A gust correlates with X, which the loop moves to answer it, and not with Z. Weakly
+    identified numbers stay as they were, and all do where the flights are too short for errors. Bounds count as
+    standard deviations of a normal prior, as in the search.
 
-    References
-    ----------
-    Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
+    Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
+    instruments).
     """
     at, moved = found, np.zeros(len(found.values), dtype=bool)
     # Shapes are followed where they go; a few steps are enough, and one where there are none.
@@ -67,16 +58,16 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
-    return at._replace(estimates=_with_untold(found, at.estimates, moved))
+    return at._replace(estimates=_with_unidentified(found, at.estimates, moved))
 
 
-def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
-    """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
+def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]:
+    """Move numbers to where instruments and residual do not correlate; and with each block left out."""
     values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers in sources:
         kept = products[:, :-1][:, numbers]
-        # What those before it have moved is no longer left.
+        # Without what those before it explain.
         right = kept[:, :, -1] - kept[:, :, :-1] @ change
         kept = np.concatenate([kept[:, :, :-1][:, :, numbers], right[..., None]], axis=2)
         # Of all blocks, and without each.
@@ -96,28 +87,24 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
-def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
-    """Mark the body axes, shape (3,), of whose inertia instruments tell nothing: a fit shows that of the loop."""
-    told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
-    for _, numbers in _sources(found, given):
-        told |= numbers[vehicle][:3]
-    return ~told
+def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
+    """Mark the body axes, shape (3,), whose inertia instruments do not identify: a fit shows that of the loop."""
+    vehicle = found.hypothesis.places[0][1]
+    found_by = [each[vehicle][:3] for _, each in _sources(found, given)]
+    return np.asarray(~np.any([np.zeros(3, dtype=bool), *found_by], axis=0))
 
 
-def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
-    """Keep the effects that are not 0 by what instruments tell, and what an effect holds where all else of it may be 0.
+def significant_effects(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
+    """Keep the effects that are not 0 by instruments, and what an effect holds where all else of it may be 0.
 
-    Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
-    shapes instead of whether its numbers may be 0, which instruments may tell badly from each other: a drag from the
-    wind that it acts in. With each comes how likely chance makes what they show of it. One that they do not tell is
-    asked by its interval, and its chance is NaN.
+    Where an effect is 0, the residual without it does not correlate with its instruments. That is tested at its shapes
+    instead of whether its numbers may be 0, which instruments may separate badly: a drag from the wind that it acts in.
+    With each comes the p-value; it is NaN for an effect without instruments, which is judged by its interval.
 
-    References
-    ----------
-    Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
+    Reference: Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
     sources, nothing, values = _sources(found, given), nothing_by_size(found), found.values
-    stand, every = list[tuple[Candidate, float]](), np.arange(len(values))
+    significant, every = list[tuple[Candidate, float]](), np.arange(len(values))
     for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
         effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
         chance = _chance_of(sources, linear, shapes, values)
@@ -128,14 +115,14 @@ def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, flo
             beyond = np.concatenate([linear, shapes])[[number.name not in known for number in effect.numbers]]
             if _chance_of(sources, beyond, shapes[:0], values) > found.settings.significance:
                 candidate = Candidate(held, {shape.name: candidate.shape[shape.name] for shape in held.shapes})
-        stand.append((candidate, chance))
-    return stand
+        significant.append((candidate, chance))
+    return significant
 
 
-def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values: Array) -> float:
-    """Compute the probability of what all sources show of numbers that they know if these are 0, shapes as they are.
+def _chance_of(sources: Sequence[_Source], own: IntArray, shapes: IntArray, values: Array) -> float:
+    """Compute the p-value of numbers over all sources if these are 0, shapes as they are.
 
-    A source is asked of a number that another one tells as well. NaN where none knows any of them.
+    A source is asked of a number that another one identifies as well. NaN where none identifies any of them.
     """
     chances = list[float]()
     asked = np.isin(np.arange(len(values)), own)
@@ -148,86 +135,82 @@ def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values
     return len(chances) * min(chances, default=np.nan)
 
 
-def _chance(crossed: Array, own: BoolArray, others: BoolArray, values: Array) -> float:
-    """Compute the probability of what instruments show of an effect if its own numbers are 0, others free."""
+def _chance(ztx: Array, own: BoolArray, others: BoolArray, values: Array) -> float:
+    """Compute the p-value of an effect by instruments if its own numbers are 0, others free."""
     from scipy.special import fdtrc
 
-    scale = np.sqrt(np.maximum(np.abs(np.diagonal(crossed.sum(axis=0))), np.finfo(float).tiny))[:-1]
-    products = crossed[:, :-1, :-1] / np.outer(scale, scale)
-    right = crossed[:, :-1, -1] / scale + products[:, :, own] @ (values * scale)[own]
+    scale = np.sqrt(np.maximum(np.abs(np.diagonal(ztx.sum(axis=0))), np.finfo(float).tiny))[:-1]
+    products = ztx[:, :-1, :-1] / np.outer(scale, scale)
+    right = ztx[:, :-1, -1] / scale + products[:, :, own] @ (values * scale)[own]
     whole = products.sum(axis=0)
     free = whole[np.ix_(others, others)]
-    left = right - products[:, :, others] @ np.linalg.solve(free, right.sum(axis=0)[others])
-    each = left[:, own] - left[:, others] @ np.linalg.solve(free.T, whole[np.ix_(own, others)].T)
+    rest = right - products[:, :, others] @ np.linalg.solve(free, right.sum(axis=0)[others])
+    each = rest[:, own] - rest[:, others] @ np.linalg.solve(free.T, whole[np.ix_(own, others)].T)
     blocks, count = each.shape
     size = each.sum(axis=0) @ np.linalg.solve(np.atleast_2d(np.cov(each.T)), each.mean(axis=0))
     return float(fdtrc(count, blocks - count, size * (blocks - count) / (count * (blocks - 1))))
 
 
-def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
-    """List effects whose numbers instruments hardly tell, and left as they were."""
+def unidentified(before: NamedFit, after: NamedFit) -> list[Effect]:
+    """List effects that instruments identify weakly, so that their numbers stayed as they were."""
     numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
-    """Multiply what is left with what was known of it before, by block: 0 but for chance where nothing is missing."""
-    _, runs = _known_windows(found, given)
+def predictable_residual(found: NamedFit, given: Instruments) -> Array:
+    """Multiply the residual with its prediction from the past, by block: 0 but for chance where nothing is missing."""
+    _, runs = _windows_of_runs(found, given)
     products = np.concatenate([rows[..., -1] * known[..., -1] for rows, known, _ in runs])
     block = np.concatenate([block for _, _, block in runs])
     return np.array([products[block == number].sum() for number in np.unique(block)])
 
 
-def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
-    """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
+def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
+    """List what identifies numbers: repeats or setpoints; and the past, for lags and what the first does not identify.
 
-    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
-    turn at once, which instruments hardly tell. A linear answer to setpoints tells lateness by far worse.
+    Of the vehicle only the numbers of the config: the place of a sensor and the coupling of rates show where several
+    axes turn at once, which instruments hardly identify. A linear answer to setpoints identifies lags far worse.
     """
-    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Told]()
+    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Source]()
     weight = np.tile(found.floor, (len(hypothesis.residual), 1))
     free = ~fit_within_bounds(hypothesis, weight, of_vehicle=True)[1] & hypothesis.base.any(axis=(0, 1))
     vehicle, of_vehicle = hypothesis.places[0]
     free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
-    late = np.array([each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
-    left, early = np.append(free, np.ones_like(late)), np.append(np.ones_like(free), ~late)
-    windows = _known_windows(found, given)
+    lags = np.array([each.effect.is_lag for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
+    open_, early = np.append(free, np.ones_like(lags)), np.append(np.ones_like(free), ~lags)
+    windows = _windows_of_runs(found, given)
     blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
     for place, runs in enumerate(windows):
-        products = np.zeros((len(blocks), len(left) + 1, len(left) + 1))
+        products = np.zeros((len(blocks), len(open_) + 1, len(open_) + 1))
         for (row, number), (rows, known, block) in product(enumerate(blocks), runs):
             own = block == number
             # As of windows half of which overlap.
             products[row] += np.einsum("wck,wcl->kl", known[own], rows[own], optimize=True) * (2 / PER_WINDOW)
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
-            # What a bound tells better than these flights is not told by them.
-            numbers = left & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
+            # What a bound identifies better than these flights is not identified by them.
+            numbers = open_ & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
             numbers = _strong(flown, numbers)
-            sources.append(_Told(products, numbers))
-            left = left & ~numbers
+            sources.append(_Source(products, numbers))
+            open_ = open_ & ~numbers
     return sources
 
 
-def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
-    """Leave the numbers that are told each beside all others; of those that are not, the weakest goes first.
+def _strong(ztx: Array, numbers: BoolArray) -> BoolArray:
+    """Keep the numbers that are identified jointly with all others; of those that are not, the weakest goes first.
 
-    Of what is known of each number, and of what it moves, that counts which no other explains.
-
-    References
-    ----------
-    Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
+    Reference: Sanderson and Windmeijer 2016 (conditional F of the instruments of one number).
     """
-    alone = _strength(np.diagonal(crossed, axis1=1, axis2=2)[:, :-1])
+    alone = _strength(np.diagonal(ztx, axis1=1, axis2=2)[:, :-1])
     kept = np.flatnonzero(numbers & (alone > STRONG))
     while len(kept):
-        own = crossed[:, kept[:, None], kept]
+        own = ztx[:, kept[:, None], kept]
         scale = np.sqrt(np.diagonal(own.sum(axis=0)))
         own = own / np.outer(scale, scale)
         inverse = np.linalg.pinv(own.sum(axis=0))
-        inverse_alone = np.diag(inverse)
-        beside = np.einsum("ij,bjk,ki->bi", inverse / inverse_alone[:, None], own, inverse / inverse_alone)
-        unclear = kept[_strength(beside) <= STRONG]
+        diagonal = np.diag(inverse)
+        conditional = np.einsum("ij,bjk,ki->bi", inverse / diagonal[:, None], own, inverse / diagonal)
+        unclear = kept[_strength(conditional) <= STRONG]
         if not len(unclear):
             break
         kept = kept[kept != unclear[np.argmin(alone[unclear])]]
@@ -235,56 +218,44 @@ def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
 
 
 def _strength(products: Array) -> Array:
-    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not.
-
-    Of the product of these two, shape (block, number).
-    """
+    """Compute the F statistic of products of instruments and regressors, shape (block, number); 0 of negative ones."""
     error = np.sqrt(len(products)) * products.std(axis=0, ddof=1)
     return np.asarray(np.square(np.maximum(products.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
 
 
-def _with_untold(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
-    """Keep the intervals of effects and numbers of the vehicle that instruments do not tell."""
+def _with_unidentified(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
+    """Keep the intervals of effects and numbers of the vehicle that instruments do not identify."""
     (vehicle, of_vehicle), *_ = before.hypothesis.places
-    parameters = _told_numbers(vehicle.effect, moved[of_vehicle], before.estimates.parameters, after.parameters)
+
+    def identified(effect: Effect, which: BoolArray, was: Sequence[Estimate], now: Sequence[Estimate]) -> _Numbers:
+        names = {number.name for number, there in zip(effect.numbers, which, strict=False) if there}
+        kept = {number.name: number for number in was if number.name not in names}
+        return tuple(kept.get(number.name, number) for number in now)
+
+    parameters = identified(vehicle.effect, moved[of_vehicle], before.estimates.parameters, after.parameters)
     effects, places = [], places_of(before.hypothesis)
     pairs = zip(before.hypothesis.chosen, places, before.estimates.effects, after.effects, strict=True)
     for (effect, _), (linear, shapes), was, now in pairs:
         own = np.concatenate([moved[linear], moved[shapes]])
-        of_columns = now if effect.physical else _told_numbers(effect, own, was, now)
+        of_columns = now if effect.physical else identified(effect, own, was, now)
         effects.append(of_columns if own.any() else was)
     return replace(after, effects=tuple(effects), parameters=parameters)
 
 
-def _told_numbers(
-    effect: Effect, told: BoolArray, was: Sequence[Estimate], now: Sequence[Estimate]
-) -> tuple[Estimate, ...]:
-    """Take the numbers of an effect that are told, and leave the others as they were."""
-    names = {number.name for number, there in zip(effect.numbers, told, strict=False) if there}
-    stood = {number.name: number for number in was if number.name not in names}
-    return tuple(stood.get(number.name, number) for number in now)
-
-
 class _Windows(NamedTuple):
-    """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
+    """Windows of a run in floors: regressors and last the residual, and what instruments predict of both."""
 
-    Attributes
-    ----------
-    rows, known : array, shape (window, 6, number + 1)
-    block : array of int, shape (window,)
-    """
-
-    rows: Array
-    known: Array
-    block: IntArray
+    rows: Array  # Shape (window, 6, number + 1).
+    known: Array  # The same.
+    block: IntArray  # Shape (window,).
 
 
-def _known_windows(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:
-    """Lay windows over runs, and beside them what instruments know; and what was before."""
+def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:
+    """Average regressors and residual of runs over windows, with their prediction by instruments; and by the past."""
     hypothesis, linear = found.hypothesis, found.estimates.linear
     windows = dense(hypothesis.flights[0].windows)
     there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
-    columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
+    columns = [there.base, shape_columns(there, linear), there.residual_at(linear)[..., None]]
     rows = np.concatenate(columns, axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
     length = found.settings.block_s / windows.period
@@ -297,18 +268,18 @@ def _known_windows(found: NamedFit, given: Instruments) -> tuple[list[_Windows],
         # Runs of one path know of each other, but not of what was before.
         of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
-    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
-    new, foretold, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
-    return _told_of(own, known, of_path), _told_of(new, foretold, of_run)
+    known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
+    new, predicted, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
+    return _predicted(own, known, of_path), _predicted(new, predicted, of_run)
 
 
-def _told_of(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
-    """Take windows of which something is known, and their blocks; of a shorter list of windows these are the last."""
+def _predicted(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
+    """Take windows with a prediction, and their blocks; of a shorter list of windows these are the last."""
     windows = []
     for mine, theirs, block in zip(rows, known, blocks, strict=True):
         last = block[len(block) - len(mine) :]
-        told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
-        windows.append(_Windows(mine[told], theirs[told], last[told].astype(np.int64)))
+        there = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
+        windows.append(_Windows(mine[there], theirs[there], last[there].astype(np.int64)))
     return windows
 
 

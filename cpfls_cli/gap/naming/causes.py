@@ -1,6 +1,4 @@
-"""Causes of a gap: each chosen effect judged beside the others, faults of the sensors, wrong numbers of the vehicle."""
-
-from __future__ import annotations
+"""Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,26 +18,20 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.odds import likely, odds
 from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
-_MATTERS = 0.02
-"""Relative error of a moment of inertia or of the thrust from which on it is told."""
+_MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
 
 
 @dataclass(frozen=True)
 class JudgedEffect:
-    """A chosen effect and its rivals.
-
-    Attributes
-    ----------
-    odds : mapping of tuple of str to array, shape (block,)
-        Of each set with others in its place, beside the chosen one: logarithm of the predictive density of each block.
-    """
+    """A chosen effect and its rivals."""
 
     effect: NamedEffect
     alternatives: tuple[Alternative, ...]
+    # Of each set with others in its place, against the chosen one: logarithm of the predictive density of each block.
     odds: Mapping[tuple[str, ...], Array]
 
 
@@ -51,7 +43,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
     for index, share in enumerate(shares(found).tolist()):
         candidate, numbers = chosen[index], estimates.effects[index]
         others = [*chosen[:index], *chosen[index + 1 :]]
-        chance = chance_beside_its_like(hypothesis, index, effects, settings)
+        chance = chance_given_actuation(hypothesis, index, effects, settings)
         step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
         own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(
@@ -108,7 +100,7 @@ def shares(found: NamedFit) -> Array:
         """Compute the residual with some of the effects only, at the coefficients of all of them."""
         linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
         hypothesis = system(found.hypothesis.flights, [chosen[index] for index in kept])
-        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
+        return hypothesis.residual_at(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
 
     indices = range(len(chosen))
     everything = remaining(indices)
@@ -121,10 +113,7 @@ def shares(found: NamedFit) -> Array:
 def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
-    Parameters
-    ----------
-    removed : array, shape (6,)
-        Part of each channel's gap on unseen flights that refitting the numbers takes off.
+    `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
@@ -171,7 +160,7 @@ def sensor_fault(
     """Name a fault of the sensors with the share of the gap that its repair removes from the training flights."""
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = (((each.left(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
+    before, after = (((each.residual_at(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
     share = float(np.clip(1 - after / max(before, 1e-12), 0, 1))
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"

@@ -1,4 +1,4 @@
-"""Effects fitted together: numbers with intervals by the jackknife over blocks of time, and which of them can stand.
+"""Effects fitted together: parameters with intervals by the jackknife over blocks of time, and which can be named.
 
 Floors are of shape (6,), N m and N, by channel; a weight is the standard deviation of each channel, of shape (6,) or
 (window, 6).
@@ -26,29 +26,18 @@ from cpfls_cli.rounding import levelled, tied
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _KNOWN_TO = 0.005
-"""Share of a number that no flight tells: mass and arms that it is measured against are hardly known better, and
+"""Share of a number that no flight identifies: mass and arms that it is measured against are hardly known better, and
 formulas leave out terms as small."""
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """A fitted hypothesis.
+    """A fitted hypothesis."""
 
-    Attributes
-    ----------
-    linear : array, shape (column,)
-        Of the base of the hypothesis.
-    effects : tuple of tuple of Estimate
-        Of each chosen effect: physical coefficients, then shapes.
-    parameters : tuple of Estimate
-        Of the vehicle's own numbers.
-    of_effect : tuple of array, shape (coefficient,)
-        Linear coefficients of each chosen effect; empty where it has none.
-    """
-
-    linear: Array
-    effects: tuple[tuple[Estimate, ...], ...]
-    parameters: tuple[Estimate, ...]
+    linear: Array  # Shape (column,): of the base of the hypothesis.
+    effects: tuple[tuple[Estimate, ...], ...]  # Of each chosen effect: physical coefficients, then shapes.
+    parameters: tuple[Estimate, ...]  # Of the vehicle's own numbers.
+    # Each shape (coefficient,): linear coefficients of each chosen effect; empty where it has none.
     of_effect: tuple[Array, ...]
 
     @property
@@ -76,9 +65,9 @@ class NamedFit(NamedTuple):
         return block_index(self.hypothesis, self.settings)
 
     @property
-    def left(self) -> Array:
-        """Root mean square that is left of each channel, shape (6,), floors."""
-        return size_in_floors(self.hypothesis.left(self.estimates.linear), self.floor)
+    def rms_floors(self) -> Array:
+        """Root mean square of the residual of each channel, shape (6,), floors."""
+        return size_in_floors(self.hypothesis.residual_at(self.estimates.linear), self.floor)
 
     def without(self, names: Collection[str]) -> NamedFit:
         """Leave effects out and refit the others."""
@@ -89,12 +78,12 @@ class NamedFit(NamedTuple):
 def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> NamedFit:
     """Fit effects together within their bounds, with the larger of floor and residual as weights.
 
-    Their shapes are those that fit best beside one another, where they fit to the noise.
+    Their shapes are those that fit best jointly, where they fit to the noise.
     """
     start = system(flights, chosen)
     there = refitted(start, channel_weight(start, floor))
     if (_left(there, floor)[1] > CLEAR).any():
-        # Formulas that do not fit to the noise would move to what is left: they stay where the search found them.
+        # Formulas that do not fit to the noise would move to the residual: they stay where the search found them.
         there = start
     numbers = estimates(there, channel_weight(there, floor), block_index(there, settings))
     return NamedFit(there, numbers, floor, settings)
@@ -110,11 +99,11 @@ def channel_weight(hypothesis: System, floor: Array) -> Array:
 
 
 def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
-    """Estimate the noise of each window, shape (window, 6), and the root mean square that a fit leaves in it, (6,)."""
-    residual = hypothesis.left(fit(hypothesis, floor))
+    """Estimate the noise of each window, shape (window, 6), and the root mean square of the residual in it, (6,)."""
+    residual = hypothesis.residual_at(fit(hypothesis, floor))
     noise = window_noise(hypothesis, residual, floor)
     if (noise > floor).any():
-        residual = hypothesis.left(fit(hypothesis, noise))
+        residual = hypothesis.residual_at(fit(hypothesis, noise))
     return noise, size_in_floors(residual, noise)
 
 
@@ -127,13 +116,11 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     """Fit a hypothesis with refined shapes and compute confidence intervals of its numbers by the jackknife.
 
     The jackknife leaves out one block, of those of windows, after another, so it holds for residuals that are
-    correlated within blocks and for noise of unequal size; what no flight tells is added (`_KNOWN_TO`). Shapes take
-    part by their derivatives. The numbers of the vehicle are within what a vehicle can have; only where free ones are
-    surely beyond it, they are told, because the log is wrong then.
+    correlated within blocks and for noise of unequal size; what no flight identifies is added (`_KNOWN_TO`). Shapes
+    take part by their derivatives. The numbers of the vehicle are within what a vehicle can have; only where free ones
+    are surely beyond it, they are given, because the log is wrong then.
 
-    References
-    ----------
-    JCGM 100:2008, 4.3 (uncertainty of what is assumed).
+    Reference: JCGM 100:2008, 4.3 (uncertainty of what is assumed).
     """
     free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
     linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
@@ -174,7 +161,7 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
 
 
 def places_of(hypothesis: System) -> list[tuple[slice, slice]]:
-    """Say of each chosen effect where its coefficients stand in the base, and its shapes behind all of these."""
+    """Say of each chosen effect where its coefficients are in the base, and its shapes behind all of these."""
     in_base = {candidate.key: place for candidate, place in hypothesis.places}
     places, first = list[tuple[slice, slice]](), hypothesis.places[-1][1].stop
     for candidate in hypothesis.chosen:
@@ -184,13 +171,9 @@ def places_of(hypothesis: System) -> list[tuple[slice, slice]]:
 
 
 def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
-    """Tell numbers from coefficients and shapes, with those of fits that each left one block out.
+    """Give numbers from coefficients and shapes, with those of fits that each left one block out.
 
-    Parameters
-    ----------
-    values : array, shape (number,)
-        Coefficients of the base, then shapes.
-    left_out : array, shape (block, number)
+    `values`, shape (number,): coefficients of the base, then shapes; `left_out`: shape (block, number).
     """
     rows, vehicle = np.vstack([values, left_out]), hypothesis.vehicle
     (of_vehicle, own), *_ = hypothesis.places
@@ -207,7 +190,7 @@ def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimate
 
 
 def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array) -> tuple[Estimate, ...]:
-    """Tell numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight tells.
+    """Give numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight identifies.
 
     The first row is of all blocks, the others each of all but one.
     """
@@ -250,16 +233,11 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
 
 
 class Refusal(NamedTuple):
-    """An effect that is no name, and why, as the end of a sentence.
-
-    Attributes
-    ----------
-    in_the_way : bool
-        Whether others are to be looked for without it: on a bound it may stand for what another one is.
-    """
+    """An effect that is no name, and why, as the end of a sentence."""
 
     name: str
     reason: str
+    # Whether others are to be looked for without it: on a bound it may take the place of another one.
     in_the_way: bool = False
 
     @property
@@ -273,7 +251,7 @@ def earned(
 ) -> tuple[NamedFit, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
-    These are effects whose size does not differ from zero, which are not told, and effects that sit on a bound.
+    These are effects whose size does not differ from zero, which are not named, and effects that sit on a bound.
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
@@ -316,12 +294,12 @@ def on_bound(found: NamedFit) -> Refusal | None:
             continue
         free = free or free_estimates(found)
         says = "would surely be beyond what is possible"
-        told = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
-        if not told:
+        beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
+        if not beyond:
             says = "sits on the bound of what is possible"
-            told = [name for name in _main(found, index, sizes) if name in bounds]
-        if told:
-            return Refusal(effect.name, f"its {told[0]} {says}, {bounds[told[0]]}", True)
+            beyond = [name for name in _main(found, index, sizes) if name in bounds]
+        if beyond:
+            return Refusal(effect.name, f"its {beyond[0]} {says}, {bounds[beyond[0]]}", True)
     return None
 
 

@@ -1,4 +1,4 @@
-"""The gap on held-out flights, of the model as given and with effects; which names stand there; and if both agree."""
+"""The gap on held-out flights, of the model as given and with effects; which names it confirms; and if both agree."""
 
 from __future__ import annotations
 
@@ -24,43 +24,26 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
-from cpfls_cli.gap.naming.leftover import leftover
+from cpfls_cli.gap.naming.open_questions import unexplained_channels
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
-from cpfls_cli.gap.naming.results import GapSize, Unexplained
+from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Residuals of held-out flights under three models.
+    """Residuals of held-out flights under three models."""
 
-    Attributes
-    ----------
-    before : array, shape (window, 6), N m and N
-        Of the model as given, on signals as logged.
-    parameters : array, shape (window, 6)
-        Of the model with its own numbers refitted on the training flights.
-    after : array, shape (window, 6)
-        Of the model with effects.
-    floor : array, shape (6,)
-    known : array of bool, shape (window, 6)
-    noise : array, shape (window, 6)
-        Floor of each window with the scatter that belongs to the effects.
-    most_noise : array, shape (6,)
-        Mean square of each channel in squared floors up to which it is noise.
-    unlearned : mapping of str to float
-        Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
-        descent, with the share of the windows that do; nothing is judged there.
-    """
-
-    before: Array
-    parameters: Array
-    after: Array
-    floor: Array
-    known: BoolArray
-    noise: Array
-    most_noise: Array
+    before: Array  # Shape (window, 6), N m and N: of the model as given, on signals as logged.
+    parameters: Array  # Shape (window, 6): of the model with its own numbers refitted on the training flights.
+    after: Array  # Shape (window, 6): of the model with effects.
+    floor: Array  # Shape (6,).
+    known: BoolArray  # Shape (window, 6).
+    noise: Array  # Shape (window, 6): floor of each window with the scatter that belongs to the effects.
+    most_noise: Array  # Shape (6,): mean square of each channel in squared floors up to which it is noise.
+    # Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
+    # descent, with the share of the windows that do; nothing is judged there.
     unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
@@ -70,16 +53,10 @@ class HeldOut:
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.
 
-        Parameters
-        ----------
-        as_given : bool
-            Of the gap of the model as given, on signals as logged; else of what its own numbers leave.
-
-        Returns
-        -------
-        dict
-            Of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where neither
-            does.
+        `as_given`: of the gap of the model as given, on signals as logged; else of that with its own parameters
+        refitted.
+        Result: of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where
+        neither does.
         """
         before, after = (self.before if as_given else self.parameters) / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
@@ -123,28 +100,15 @@ def _above(residual: Array, known: BoolArray, most_noise: Array) -> float:
 
 
 def held_out(
-    logged: Sequence[WeakFlight],
-    repaired: Sequence[WeakFlight],
-    fitted: System,
-    linear: Array,
-    floor: Array,
+    logged: Sequence[WeakFlight], repaired: Sequence[WeakFlight], fitted: System, linear: Array, floor: Array
 ) -> HeldOut:
-    """Apply a fitted hypothesis to held-out flights, and the model with its own numbers refitted beside it.
+    """Apply a fitted hypothesis to held-out flights, and the model with its own parameters refitted.
 
-    Parameters
-    ----------
-    logged, repaired : sequence of WeakFlight
-        The flights as logged, and after repair of the sensors.
-    fitted : System
-        Of the training flights.
-    linear : array, shape (column,)
-    floor : array, shape (6,)
-        Of the training flights, above which the effects scatter there.
-
-    Raises
-    ------
-    InputError
-        If they lack a signal that the effects need.
+    `logged`, `repaired`: the flights as logged, and after repair of the sensors.
+    `fitted`: of the training flights.
+    `linear`: shape (column,).
+    `floor`, shape (6,): of the training flights, above which the effects scatter there.
+    Raises InputError if they lack a signal that the effects need.
     """
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
@@ -156,11 +120,11 @@ def held_out(
     }
     known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
-    scatter = scatter_size(scatter_variance(fitted), fitted.left(linear), floor)
+    scatter = scatter_size(scatter_variance(fitted), fitted.residual_at(linear), floor)
     return HeldOut(
         raw.residual,
-        plain.left(fit(own, channel_size(own.residual))),
-        full.left(linear),
+        plain.residual_at(fit(own, channel_size(own.residual))),
+        full.residual_at(linear),
         here,
         known,
         np.sqrt(here**2 + scatter * scatter_variance(full)),
@@ -170,7 +134,7 @@ def held_out(
 
 
 class Judgement(NamedTuple):
-    """Effects with what they leave of the flights held out."""
+    """Effects with their residual on held-out flights."""
 
     found: NamedFit
     held_out: HeldOut
@@ -178,27 +142,17 @@ class Judgement(NamedTuple):
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges fits on held-out flights.
-
-    Attributes
-    ----------
-    logged, repaired : sequence of WeakFlight
-        The held-out flights as logged, and after repair of the sensors.
-    """
+    """Judges fits on held-out flights."""
 
     training: Sequence[WeakFlight]
-    logged: Sequence[WeakFlight]
-    repaired: Sequence[WeakFlight]
+    logged: Sequence[WeakFlight]  # Held out, as logged.
+    repaired: Sequence[WeakFlight]  # The same, after repair of the sensors.
     rng: np.random.Generator
 
     def judge(self, found: NamedFit) -> Judgement:
-        """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
+        """Evaluate effects on the held-out flights, and the model with its own parameters refitted."""
         linear = found.estimates.linear
         return Judgement(found, held_out(self.logged, self.repaired, found.hypothesis, linear, found.floor))
-
-    def remainder(self, found: NamedFit) -> tuple[Unexplained, ...]:
-        """Analyse what effects leave of the flights that they were found in."""
-        return leftover(found, self.rng)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
@@ -237,7 +191,7 @@ class Judge:
         """Leave an effect out and refit the others."""
         without = judgement.found.without([name])
         there = system(self.repaired, without.hypothesis.chosen)
-        residual, unseen = there.left(without.estimates.linear), judgement.held_out
+        residual, unseen = there.residual_at(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, without.settings)
@@ -248,24 +202,12 @@ class Judge:
 
 
 class Without(NamedTuple):
-    """Held-out flights without one of the effects, the others refitted.
+    """Held-out flights without one of the effects, the others refitted."""
 
-    Attributes
-    ----------
-    raised : array, shape (6,)
-        Mean square of each channel beyond that with the effect, in squared floors.
-    error : array, shape (6,)
-        Standard error of it over blocks.
-    left : array, shape (6,)
-        Root mean square without it, in floors.
-    gusts : array of bool, shape (6,)
-        Channels whose floor holds gusts.
-    """
-
-    raised: Array
-    error: Array
-    left: Array
-    gusts: BoolArray = np.zeros(6, dtype=bool)
+    raised: Array  # Shape (6,): mean square of each channel beyond that with the effect, in squared floors.
+    error: Array  # Shape (6,): standard error of it over blocks.
+    left: Array  # Shape (6,): root mean square without it, in floors.
+    gusts: BoolArray = np.zeros(6, dtype=bool)  # Shape (6,): channels whose floor holds gusts.
 
     @property
     def seen(self) -> Array:
@@ -282,7 +224,7 @@ class Without(NamedTuple):
         return float(self.seen.max())
 
     def worsened(self, after: Array) -> Array:
-        """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
+        """Compute how much worse the effect makes channels with `after` floors, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
         worse = (after > CLEAR) & (after > (1 + OFF) * self.left) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
@@ -299,12 +241,12 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])
-        beside = max(beyond, *(one.seen[channel] for one in compared.values()))
-        if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):
-            told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
+        most = max(beyond, *(one.seen[channel] for one in compared.values()))
+        if off < OFF**2 * most and (left > CLEAR or off < ERRORS * (NOISE - 1)):
+            size = f"{left:.2g} floors remain with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
             return Refusal(
                 name,
-                f"in the {CHANNELS[channel]} {told}, and it removes less than a hundredth of what the largest effect"
+                f"in the {CHANNELS[channel]} {size}, and it removes less than a hundredth of what the largest effect"
                 " does: the error of that one's formula looks the same",
             )
     return None
@@ -318,7 +260,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)
-    seen = size_in_floors(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
+    seen = size_in_floors(start.hypothesis.residual_at(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     unseen = smallest(
@@ -333,7 +275,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
             f" held-out flights have none ({unseen[here]:.2g} floors at most): something changed between them, or the"
             " held-out flights do not move in a way that shows it",
         )
-    if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found):
+    if unseen[here] > CLEAR and not seen[there] > CLEAR and not unexplained_channels(last.found, judge.rng):
         return (
             f"the held-out flights have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and the training"
             f" flights have none ({seen[there]:.2g} floors at most): something changed between them, or only the"
@@ -352,7 +294,7 @@ def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
     # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
-    after = refit.left(own.linear)
+    after = refit.residual_at(own.linear)
     share = unseen.share_removed(unseen.parameters / unseen.noise, after / unseen.noise)
     if share < settings.named_share or size_in_floors(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()

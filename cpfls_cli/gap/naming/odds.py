@@ -1,6 +1,4 @@
-"""Sets of effects compared by what they leave of blocks that no fit saw: which are beaten, and how likely each is."""
-
-from __future__ import annotations
+"""Sets of effects compared by their residual in blocks that no fit saw: which are beaten, and how likely each is."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -24,8 +22,8 @@ def free_numbers(chosen: Sequence[Candidate]) -> int:
     return sum(len(each.effect.shapes) + len(each.effect.coefficients) for each in chosen)
 
 
-def more_left(one: Array, other: Array) -> Array:
-    """Compute by how much more one explanation leaves of each block than another; 0 where that is rounding."""
+def more_residual(one: Array, other: Array) -> Array:
+    """Compute by how much one residual of each block exceeds another; 0 where that is rounding."""
     return np.where(tied(one, other), 0.0, one - other)
 
 
@@ -49,16 +47,12 @@ def chance_of_ranks(margin: Array) -> float:
 def off_by(explained: float, left: float, above: float) -> float:
     """Estimate how much formulas are off by at most, in squared floors.
 
-    No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
-    same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
+    No formula is exact. To sensors and air it adds noise of its own in proportion to its torque and force, the
+    same in all flights. By likelihood that is the residual above the floor, and an error of the floor in one channel;
     before any flight it is known to be a tenth of torque and force at most, `OFF`.
 
-    Parameters
-    ----------
-    explained : float
-        The gap that formulas are asked to explain, in squared floors.
-    left, above : float
-        What the better one leaves, and what of that is above the floor, in squared floors.
+    `explained`: the gap that formulas are asked to explain, in squared floors.
+    `left`, `above`: residual of the better one, and what of it is above the floor, in squared floors.
     """
     return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
 
@@ -66,23 +60,19 @@ def off_by(explained: float, left: float, above: float) -> float:
 def log_odds(more: Array, off: float) -> Array:
     """Compute the logarithm of the predictive density of blocks under another set, less that under the first one.
 
-    Parameters
-    ----------
-    more : array, shape (block,)
-        By how much more the other one leaves, in squared floors.
-    off : float
-        What formulas are off by, in squared floors.
+    `more`, shape (block,): by how much the residual of the other one is larger, in squared floors.
+    `off`: what formulas are off by, in squared floors.
     """
-    # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
+    # A floor that is wrong scales the residual; only what is above it is an error of formulas, one for all blocks.
     density = -0.5 * more / (NOISE + off)
     # In a rare block something else happens, which neither set knows: none says more than that.
     return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
-    """Compute the `log_odds` of another set, shape (block,), where no set at all leaves `above_floor`."""
+    """Compute the `log_odds` of another set, shape (block,), where the residual of no set at all is `above_floor`."""
     off = off_by(above_floor, 0.0, above_floor - own.gain)
-    return log_odds(more_left(other.block_error, own.block_error), off)
+    return log_odds(more_residual(other.block_error, own.block_error), off)
 
 
 @cache
@@ -93,27 +83,19 @@ def _weights(blocks: int) -> Array:
 
 
 def likely(odds: Sequence[Array]) -> Array:
-    """Compute how likely a set of effects is beside others, from how well each foretells blocks that no fit saw.
+    """Compute how likely a set of effects is against others, from how well each predicts blocks that no fit saw.
 
     Sets differ in some blocks and not in others, and no formula is exact, so blocks are weighed at random.
 
-    Parameters
-    ----------
-    odds : sequence of array, shape (block,)
-        Logarithm of the predictive density of each block under another set, less that under the first one.
-
-    Returns
-    -------
-    array, shape (1 + other,)
-        Of the first one and of the others; they add up to 1.
-
-    References
-    ----------
-    Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
+    `odds`, each shape (block,): logarithm of the predictive density of each block under another set, less that under
+    the first one.
+    Result: shape (1 + other,); of the first one and of the others; they add up to 1.
+    Reference: Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions
+    (pseudo-BMA+).
     """
     blocks = len(odds[0]) if odds else 0
     if blocks < 2:
-        # One block tells nothing of how far blocks differ.
+        # One block does not show how far blocks differ.
         return np.full(len(odds) + 1, 1 / (len(odds) + 1))
     # One set a row: sums of many short rows are a tenth as fast.
     total = np.stack([np.zeros(blocks), *odds]) @ _weights(blocks).T
@@ -122,7 +104,7 @@ def likely(odds: Sequence[Array]) -> Array:
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
-    """List the candidates that the chosen one does not beat: those that are not rare beside it."""
+    """List the candidates that the chosen one does not beat: those that are not rare against it."""
     known = names_of(chosen.chosen)
     others = [each for each in ranking if np.isfinite(each.gain) and names_of(each.chosen) != known]
     own, *weights = likely([odds(chosen, other, above_floor) for other in others])
@@ -132,12 +114,9 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
 def simplest(ranking: Sequence[Scored], above_floor: float, number: float) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
-    Parameters
-    ----------
-    ranking : sequence of Scored
-        Best first.
-    number : float
-        What a free number has to explain, in squared floors: the logarithm of the number of residuals (Schwarz 1978).
+    `ranking`: best first.
+    `number`: what a free number has to explain, in squared floors: the logarithm of the number of residuals (Schwarz
+    1978).
     """
     best = ranking[0]
     off = off_by(above_floor, float(best.block_error.sum()), above_floor - best.gain)
@@ -149,6 +128,6 @@ def simplest(ranking: Sequence[Scored], above_floor: float, number: float) -> Sc
     fewest = min(free_numbers(each.chosen) for each in alike)
     few = [each for each in alike if free_numbers(each.chosen) == fewest]
     most = max(each.gain for each in few)
-    # What no number could tell apart is told by what is usual: rotors always lag.
+    # What no number separates is decided by what is usual: rotors always lag.
     usual = [each for each in few if most - each.gain < number]
     return min(usual, key=lambda scored: sorted(each.effect.order for each in scored.chosen))

@@ -1,9 +1,7 @@
-"""Effects ranked beside a hypothesis, by what they take off blocks that no fit saw, within physical bounds.
+"""Effects ranked given a hypothesis, by what they take off blocks that no fit saw, within physical bounds.
 
 Floors are of shape (6,), N m and N, by channel.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,34 +13,23 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
-from cpfls_cli.gap.balance.refine import compensation, fit, shape_columns
+from cpfls_cli.gap.balance.refine import fit, shape_columns, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.resampling import Beside, blocks_of, folds, mirror_shifted
+from cpfls_cli.weak_form.resampling import ConditionalNormalEquations, blocks_of, folds, mirror_shifted
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate, the last of its set, with its cross-validated gain.
+    """A candidate, the last of its set, with its cross-validated gain."""
 
-    Attributes
-    ----------
-    chosen : tuple of Candidate
-        What it stands beside, and itself.
-    gain : float
-        Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
-    block_error : array, shape (block,)
-        What is left on each block.
-    coefficients : array, shape (coefficient,)
-        Linear, of a fit on all blocks; 0 where a bound took one out.
-    """
-
-    chosen: tuple[Candidate, ...]
+    chosen: tuple[Candidate, ...]  # The hypothesis, and itself.
+    # Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     gain: float
-    block_error: Array
-    coefficients: Array
+    block_error: Array  # Shape (block,): sum of squares of the residual.
+    coefficients: Array  # Shape (coefficient,): linear, of a fit on all blocks; 0 where a bound took one out.
 
     @property
     def candidate(self) -> Candidate:
@@ -52,29 +39,17 @@ class Scored:
 
 @dataclass(frozen=True)
 class RankedStep:
-    """All candidates ranked beside a hypothesis.
-
-    Attributes
-    ----------
-    ranking : tuple of Scored
-        Best first, each effect once, at its best shape.
-    chance : array, shape (shift,)
-        What the best candidate explains of shifted residuals.
-    above_floor : float
-        Sum of squares that the hypothesis leaves above the floor, in squared floors.
-    block : array of int, shape (window,)
-        Of the cross-validation.
-    """
+    """All candidates ranked given a hypothesis."""
 
     hypothesis: System
     floor: Array
-    ranking: tuple[Scored, ...]
-    chance: Array
-    above_floor: float
-    block: IntArray
+    ranking: tuple[Scored, ...]  # Best first, each effect once, at its best shape.
+    chance: Array  # Shape (shift,): what the best candidate explains of shifted residuals.
+    above_floor: float  # Residual sum of squares above the floor, in squared floors.
+    block: IntArray  # Shape (window,): of the cross-validation.
 
-    def worth_a_name(self, explained: float = 0.0) -> float:
-        """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
+    def least_gain(self, explained: float = 0.0) -> float:
+        """Compute what an effect has to explain of a gap, of which a part is explained, in squared floors."""
         gap = max(self.above_floor - explained, 0.0)
         return max(COUNTS * gap, VISIBLE**2 * len(self.hypothesis.residual))
 
@@ -103,16 +78,11 @@ def rank_effects(
     also: Sequence[Candidate] = (),
     floor: Array | None = None,
 ) -> RankedStep:
-    """Score all effects beside those chosen.
+    """Score all effects given those chosen.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator or None
-        Of the shifts; None for none.
-    also : sequence of Candidate
-        Tried beside the grids, with shapes of their own.
-    floor : array, shape (6,), or None
-        None: as the residual of the hypothesis shows it.
+    `rng`: of the shifts; None for none.
+    `also`: tried with the grids, with shapes of their own.
+    `floor`, shape (6,): None: as the residual of the hypothesis shows it.
     """
     hypothesis = system(flights, chosen)
     floor = best_floor(hypothesis) if floor is None else floor
@@ -121,13 +91,13 @@ def rank_effects(
     arranged = scoring_matrix(hypothesis, [each for each in listed if hypothesis.can(each)], floor)
     right = hypothesis.residual[..., None]
     if rng is not None:
-        unexplained = hypothesis.left(fit(hypothesis, floor))
+        unexplained = hypothesis.residual_at(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
     block = block_index(hypothesis, settings)
-    beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
-    scored, chance = score(arranged, beside, hypothesis)
-    above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
+    conditional = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).conditional_on(arranged.base)
+    scored, chance = score(arranged, conditional, hypothesis)
+    above_floor = float(max(conditional.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, each)
@@ -166,29 +136,19 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
 
 
 class ScoringMatrix(NamedTuple):
-    """Base columns and candidates side by side.
+    """Base columns and candidates side by side."""
 
-    Attributes
-    ----------
-    matrix : array, shape (window, 6, column), floors
-    base : array of int
-        Columns of the base, and behind them derivatives by the shapes of its effects.
-    candidates : list of (Candidate, array of int, array)
-        Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
-    prior : array, shape (column,)
-        What bounds say of the coefficients before any data.
-    """
-
-    matrix: Array
-    base: IntArray
+    matrix: Array  # Shape (window, 6, column), floors.
+    base: IntArray  # Columns of the base, and behind them derivatives by the shapes of its effects.
+    # Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
     candidates: list[tuple[Candidate, IntArray, Array]]
-    prior: Array
+    prior: Array  # Shape (column,): what bounds say of the coefficients before any data.
 
 
 def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:
     """Arrange base and candidates, in floors.
 
-    The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
+    The shapes of the chosen effects are in the base by their derivatives, so that a candidate is judged by what it
     adds after they have moved.
     """
     parts = [hypothesis.base, shape_columns(hypothesis, fit(hypothesis, floor))]
@@ -198,45 +158,52 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     for candidate in candidates:
         columns = hypothesis.columns(candidate)
         actuator = candidate.effect.kind == "actuator"
-        weight = compensation(own_wrench, own_wrench + columns[..., 0]) if actuator else np.ones(6)
+        weight = torque_loss_ratio(own_wrench, own_wrench + columns[..., 0]) if actuator else np.ones(6)
         placed.append((candidate, np.arange(first, first := first + columns.shape[2]), weight))
         parts.append(columns)
         priors.append(_information(candidate.effect, columns.shape[2], hypothesis.vehicle))
     return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, placed, np.concatenate(priors))
 
 
-def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+def score(
+    arranged: ScoringMatrix, conditional: ConditionalNormalEquations, hypothesis: System
+) -> tuple[list[Scored], Array]:
     """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
 
-    Chance is what stands behind the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
+    Chance is what follows the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
     given more than its due.
     """
     scored = []
-    chance = np.full(beside.before.shape[1] - 1, -np.inf)
+    chance = np.full(conditional.before.shape[1] - 1, -np.inf)
     for candidate, columns, weight in arranged.candidates:
-        error = _error(candidate, columns, weight, beside)
-        chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], beside))
+        error = _error(candidate, columns, weight, conditional)
+        chance = np.maximum(chance, (conditional.before - error)[:, 1:].sum(axis=0))
+        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], conditional))
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
-def _error(candidate: Candidate, columns: IntArray, weight: Array, beside: Beside) -> Array:
-    """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
+def _error(candidate: Candidate, columns: IntArray, weight: Array, conditional: ConditionalNormalEquations) -> Array:
+    """Compute the residual of each block with a candidate; a block that alone shows it does not count against it."""
     if candidate.effect.unit_coefficient:
-        return beside.subtracted(int(columns[0]), weight)
-    error = beside.unseen(columns)
-    return np.where(beside.normal.alone(columns)[:, None], np.minimum(beside.before, error), error)
+        return conditional.subtracted(int(columns[0]), weight)
+    error = conditional.unseen(columns)
+    return np.where(conditional.normal.alone(columns)[:, None], np.minimum(conditional.before, error), error)
 
 
 def _scored(
-    hypothesis: System, candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside
+    hypothesis: System,
+    candidate: Candidate,
+    columns: IntArray,
+    weight: Array,
+    error: Array,
+    conditional: ConditionalNormalEquations,
 ) -> Scored:
-    """Score a candidate that leaves `error` of the blocks with all its columns."""
-    chosen, before = (*hypothesis.chosen, candidate), beside.before[:, 0]
+    """Score a candidate whose residual of the blocks is `error` with all its columns."""
+    chosen, before = (*hypothesis.chosen, candidate), conditional.before[:, 0]
     fitted, kept = np.ones(len(columns)), np.ones(len(columns), dtype=bool)
     while not candidate.effect.unit_coefficient:
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
-        fitted[kept], unsure[kept] = beside.fit(columns[kept])
+        fitted[kept], unsure[kept] = conditional.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, hypothesis.vehicle)
         if not admissible or not (kept & keep).any():
             return Scored(chosen, -np.inf, before, fitted)
@@ -244,24 +211,17 @@ def _scored(
             break
         kept &= keep
     if not kept.all():
-        error = _error(candidate, columns[kept], weight, beside)[:, 0]
+        error = _error(candidate, columns[kept], weight, conditional)[:, 0]
     return Scored(chosen, float((before - error).sum()), error, fitted)
 
 
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
     """Check coefficients against the bounds of their effect: they are beyond one only by more than their uncertainty.
 
-    Parameters
-    ----------
-    linear, error : array, shape (coefficient,)
-        Linear coefficients of a fit, and their standard errors.
-
-    Returns
-    -------
-    keep : array of bool, shape (coefficient,)
-        False where a coefficient lies beyond a bound at 0, so that 0 is the best that is possible.
-    admissible : bool
-        False where one lies beyond another bound.
+    `linear`, `error`, shape (coefficient,): linear coefficients of a fit, and their standard errors.
+    Result `keep`, shape (coefficient,): false where a coefficient lies beyond a bound at 0, so that 0 is the best that
+    is possible.
+    Result `admissible`: false where one lies beyond another bound.
     """
     low, high = np.array([each.bounds(vehicle) for each in effect.coefficients]).T
     if effect.physical is not None:

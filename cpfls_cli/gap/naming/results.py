@@ -1,7 +1,5 @@
 """Results of a diagnosis as typed objects, and the verdict that follows from them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -98,7 +96,7 @@ class TorqueAlone:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that the flights cannot tell from a named one."""
+    """An effect that the flights cannot separate from a named one."""
 
     name: str = about("identifier of the effect")
     instead_of: str = about("the named one")
@@ -106,9 +104,7 @@ class Alternative:
         "what it explains over what the named one explains; NaN where it could not be tried", gaps=True
     )
     separated_by: str = about("the flight, or the signal, that separates them")
-    beside: str = about(
-        "another effect that is not named and without which it would not do; empty for none", default=""
-    )
+    jointly_with: str = about("another effect that is not named and that it needs; empty for none", default="")
 
 
 @dataclass(frozen=True)
@@ -127,7 +123,7 @@ class Unexplained:
     floors: float = about("root mean square of its residual, in floors")
     signal: str | None = about("signal that it depends on most")
     share: float = about("share of the residual that signal or narrow band explains")
-    frequency_hz: float | None = about("of a narrow band that stands out", unit="Hz")
+    frequency_hz: float | None = about("of a significant narrow band", unit="Hz")
     energy: str = about("feeds, drains or neither")
 
 
@@ -140,16 +136,10 @@ class NotExcited:
 
 
 class GapSize(NamedTuple):
-    """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown.
+    """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown."""
 
-    Attributes
-    ----------
-    value : array, shape (6,), N m and N
-    floors : array, shape (6,)
-    """
-
-    value: Array
-    floors: Array
+    value: Array  # Shape (6,), N m and N.
+    floors: Array  # Shape (6,).
 
     @property
     def as_summary(self) -> dict[str, Any]:
@@ -276,18 +266,13 @@ def verdict_of(
     """Derive the verdict from named effects, rivals and unexplained residuals.
 
     What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round; so
-    has an effect without which chance explains as much beside the others.
+    has an effect that is not significant jointly with the others.
 
-    Parameters
-    ----------
-    unexplained : sequence of Unexplained
-        Where effects were found: of those, the ones that matter.
-    shares : sequence of float
-        Of the gap of torque or force above the floor that the effects take off flights not seen, where there is one.
-    stays : bool
-        Whether an axis keeps a clear gap.
-    excited : bool
-        Whether anything moved enough to show a gap.
+    `unexplained`: where effects were found: of those, the ones that matter.
+    `shares`: of the gap of torque or force above the floor that the effects take off flights not seen, where there is
+    one.
+    `stays`: whether an axis keeps a clear gap.
+    `excited`: whether anything moved enough to show a gap.
     """
     if not effects:
         if unexplained:
@@ -304,41 +289,33 @@ def verdict_of(
 
 
 def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> bool:
-    """Tell whether a relevant gap of the held-out flights about or along an axis is not reduced.
+    """Check whether a relevant gap of the held-out flights about or along an axis is not reduced.
 
     Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
 
-    Parameters
-    ----------
-    before, after : array, shape (6,), floors
-        With the vehicle's own numbers refitted, and with so many named effects.
-    named_share : float
-        Of the gap above the floor that has to go.
+    `before`, `after`, shape (6,), floors: with the vehicle's own numbers refitted, and with so many named effects.
+    `named_share`: of the gap above the floor that has to go.
     """
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
     large = (after > ERRORS * CLEAR) & (after > OFF * before)
-    return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
+    return filled or bool((clear & (_is_unexplained(after, before, named_share) | large)).any())
 
 
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
-    """Tell whether an unexplained residual is a second cause, by what it follows, or more than a name may leave.
+    """Check whether an unexplained residual is a second cause, by its dependence, or more than a name may leave.
 
-    Parameters
-    ----------
-    before : array, shape (6,), floors
-        The gap of each channel without effects.
-    named_share : float
-        Of the gap above the floor that has to go.
+    `before`, shape (6,), floors: the gap of each channel without effects.
+    `named_share`: of the gap above the floor that has to go.
     """
     follows = unexplained.signal is not None or unexplained.frequency_hz is not None
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     largest = float(np.nanmax(before[kind], initial=1.0))
     second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest**2
-    return second or bool(_is_left(np.array(unexplained.floors), np.array(largest), named_share))
+    return second or bool(_is_unexplained(np.array(unexplained.floors), np.array(largest), named_share))
 
 
-def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
-    """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
+def _is_unexplained(after: Array, before: Array, named_share: float) -> BoolArray:
+    """Check whether each channel keeps a clear gap, and more of it than a name may leave."""
     return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))

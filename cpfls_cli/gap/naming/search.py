@@ -1,6 +1,4 @@
-"""A search over sets of effects: a beam, its sets compared by what they leave of blocks that no fit saw."""
-
-from __future__ import annotations
+"""A search over sets of effects: a beam, its sets compared by their residual in blocks that no fit saw."""
 
 from collections.abc import Callable, Sequence
 from itertools import combinations
@@ -10,17 +8,16 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import compensation, fit, refined
+from cpfls_cli.gap.balance.refine import fit, refined, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_left, names_of, simplest, unbeaten
+from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_residual, names_of, simplest, unbeaten
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, best_floor, block_index, rank_effects, scoring_matrix
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.weak_form.resampling import folds
 
-_BEAM = 3
-"""Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
+_BEAM = 3  # Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do.
 
 
 def forward_selection(
@@ -52,8 +49,8 @@ def forward_selection(
         number = float(np.log(step.hypothesis.known.sum()))
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
-        # A set that was there before would come round again for ever.
-        if of_motion(best.gain, step, refitted) < step.worth_a_name() or names_of(refitted.chosen) in tried:
+        # A set that was there before would recur for ever.
+        if of_motion(best.gain, step, refitted) < step.least_gain() or names_of(refitted.chosen) in tried:
             return chosen, steps
         tried.add(names_of(refitted.chosen))
         step.hypothesis.cache.clear()
@@ -61,9 +58,9 @@ def forward_selection(
 
 
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:
-    """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
+    """Check whether the best candidate explains more than chance and a relevant part of the residual."""
     best = max((scored.gain for scored in step.ranking), default=-np.inf)
-    return best >= step.worth_a_name() and step.p_value(best) <= settings.significance
+    return best >= step.least_gain() and step.p_value(best) <= settings.significance
 
 
 def _grown(step: RankedStep) -> list[Scored]:
@@ -73,8 +70,8 @@ def _grown(step: RankedStep) -> list[Scored]:
     """
     best = step.ranking[0]
     near = [scored for scored in step.ranking if scored.gain > 0]
-    alike = [scored for scored in near if _late([scored.candidate])]
-    if best not in alike or not (_late(best.chosen[:-1]) or len(alike) > 1):
+    alike = [scored for scored in near if _lags([scored.candidate])]
+    if best not in alike or not (_lags(best.chosen[:-1]) or len(alike) > 1):
         return near
     moved = [_moved(scored.chosen, step) for scored in alike]
     return ascending(moved, lambda scored: -scored.gain)
@@ -83,30 +80,30 @@ def _grown(step: RankedStep) -> list[Scored]:
 def grown_elsewhere(
     sets: Sequence[Sequence[Candidate]], step: RankedStep, effects: Sequence[Effect], settings: GapSettings
 ) -> list[Scored]:
-    """List sets that grew from others than the best one and leave less than that with no more numbers.
+    """List sets that grew from others than the best one and leave less residual with no more numbers.
 
     Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
     """
     if not sets:
         return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
-    two = _late(chosen[-1:]) and not _late(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
-    if not (two or step.above_floor > step.worth_a_name()):
+    two = _lags(chosen[-1:]) and not _lags(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
+    if not (two or step.above_floor > step.least_gain()):
         return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
-        late = _late(other)
-        like = [each for each in effects if each.actuation is not None] if late else effects
+        lags = _lags(other)
+        like = [each for each in effects if each.actuation is not None] if lags else effects
         there = rank_effects(flights, other, like, settings, None, floor=step.floor)
-        for scored in there.ranking[: _BEAM if late else 1]:
+        for scored in there.ranking[: _BEAM if lags else 1]:
             grown = scored.chosen
             if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen) + two:
-                found.append(_moved(grown, step) if late else _rescored(system(flights, grown), step))
+                found.append(_moved(grown, step) if lags else _rescored(system(flights, grown), step))
     return [scored for scored in found if _is_better(scored, own, step)]
 
 
 def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
-    """Tell whether a set leaves less than another one; with more numbers it has to beat that one."""
+    """Check whether a set leaves less than another one; with more numbers it has to beat that one."""
     if free_numbers(scored.chosen) > free_numbers(own.chosen):
         return not unbeaten(scored, [own], step.above_floor)
     return bool(less(0.0, scored.gain - own.gain, step.above_floor))
@@ -126,46 +123,47 @@ def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
 
 
 def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
-    """Score an effect, and behind it all that could stand in its place, beside the look at the others and it.
+    """Score an effect, and behind it all that could take its place, given the look at the others and it.
 
-    What lies between command and rotors is scored with shapes moved, and two of these can stand for one with two
-    shapes; more numbers than it has have to be worth it.
+    What lies between command and rotors is scored with shapes moved, and two of these can replace one with two
+    shapes; more numbers than it has need a gain.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != candidate.effect.name)
-    if not _late([candidate]):
+    if not _lags([candidate]):
         return ranked
     others = step.hypothesis.chosen
     own = _rescored(system(step.hypothesis.flights, [*others, candidate]), step)
-    alike = [each.candidate for each in ranked[1:] if _late([each.candidate]) and np.isfinite(each.gain)]
+    alike = [each.candidate for each in ranked[1:] if _lags([each.candidate]) and np.isfinite(each.gain)]
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
-    if len(candidate.effect.shapes) > 1 and not _late(others):
+    if len(candidate.effect.shapes) > 1 and not _lags(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
-    numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.worth_a_name(own.gain)
-    moved = [_moved(each, step) for each in tried if worth or free_numbers(each) <= numbers]
+    numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
+    moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
     fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
-    return [own, *fair, *(scored for scored in ranked[1:] if not _late([scored.candidate]))]
+    return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
 
-def _late(chosen: Sequence[Candidate]) -> bool:
-    """Tell whether any effect lies between command and rotors."""
+def _lags(chosen: Sequence[Candidate]) -> bool:
+    """Check whether any effect lies between command and rotors."""
     return any(each.effect.actuation is not None for each in chosen)
 
 
-def chance_beside_its_like(
+def chance_given_actuation(
     together: System, index: int, effects: Sequence[Effect], settings: GapSettings
 ) -> float | None:
     """Compute how likely it is that an effect between command and rotors adds nothing to its like; None without any.
 
-    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
-    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
-    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
+    Shifted residuals cannot show it: each of these effects moves with the command, and so does the residual of the
+    others. Compared are therefore the residuals of all effects, and of the others without it, in blocks that their fits
+    did not see, both with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could
+    have been there.
     """
     others = [*together.chosen[:index], *together.chosen[index + 1 :]]
-    if not (_late([together.chosen[index]]) and _late(others)):
+    if not (_lags([together.chosen[index]]) and _lags(others)):
         return None
     floor, block = best_floor(together), block_index(together, settings)
     without = refined(together.flights, others, floor)
-    margin = more_left(_unseen(without, floor, block), _unseen(together, floor, block))
+    margin = more_residual(_unseen(without, floor, block), _unseen(together, floor, block))
     tried = sum(effect.actuation is not None for effect in effects)
     return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
 
@@ -176,18 +174,18 @@ def _moved(chosen: Sequence[Candidate], step: RankedStep) -> Scored:
 
 
 def _rescored(hypothesis: System, step: RankedStep) -> Scored:
-    """Score a set, with its shapes where they are, by what it leaves of each block that no fit saw."""
-    # Beside the best set, whose rotor torque is what it is in the look.
-    floor = step.floor * compensation(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
+    """Score a set, with its shapes where they are, by its residual in each block that no fit saw."""
+    # With the best set, whose rotor torque is what it is in the look.
+    floor = step.floor * torque_loss_ratio(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
     # Shapes that are refined stay.
-    error = _unseen(hypothesis, floor, step.block, moving=not _late(hypothesis.chosen))
+    error = _unseen(hypothesis, floor, step.block, moving=not _lags(hypothesis.chosen))
     gain = step.above_floor + hypothesis.known.sum() - error.sum()
     return Scored(hypothesis.chosen, float(gain), error, np.zeros(0))
 
 
 def _unseen(hypothesis: System, floor: Array, block: IntArray, *, moving: bool = True) -> Array:
-    """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
-    weight = floor / compensation(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
+    """Compute the residual of each block that a fit of coefficients, and of moving shapes, did not see."""
+    weight = floor / torque_loss_ratio(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
     arranged = scoring_matrix(hypothesis, (), weight)
     normal = folds(arranged.matrix, hypothesis.residual / weight, block, arranged.prior)
     columns = arranged.base if moving else arranged.base[: hypothesis.base.shape[2]]
@@ -204,13 +202,13 @@ def alternatives(
     effect, known = chosen.candidate.effect, names_of(chosen.chosen)
     found = []
     for scored in unbeaten(chosen, ranking, above_floor):
-        *beside, other = (each.effect for each in scored.chosen if each.effect.name not in known)
+        *jointly, other = (each.effect for each in scored.chosen if each.effect.name not in known)
         if effect.name not in other.holds and scored.gain > settings.partial_share * chosen.gain:
-            found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in beside)))
+            found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in jointly)))
     return found
 
 
-def alternative(effect: Effect, other: Effect, relative_gain: float, beside: str = "") -> Alternative:
-    """Say what tells an effect from another one."""
-    told = effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation
-    return Alternative(other.name, effect.name, relative_gain, told, beside)
+def alternative(effect: Effect, other: Effect, relative_gain: float, jointly_with: str = "") -> Alternative:
+    """Say what separates an effect from another one."""
+    separated_by = effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation
+    return Alternative(other.name, effect.name, relative_gain, separated_by, jointly_with)

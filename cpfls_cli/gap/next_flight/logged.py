@@ -1,7 +1,5 @@
 """What would be logged of a flight, planned or flown in closed loop, and the floors that its noise makes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -26,9 +24,7 @@ from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 
-_BATTERY_USE = 0.2
-"""Share of its voltage that the battery loses over the flight."""
-
+_BATTERY_USE = 0.2  # Share of its voltage that the battery loses over the flight.
 _OPTIONAL = ("attitude", "position", "velocity", "acceleration", "specific_force", "voltage")
 _CARRIES = {
     "attitude": ("attitude",),
@@ -52,28 +48,14 @@ def logged_signals(signals: Signals) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Logging:
-    """What will be logged, with which noise, and how it is looked at.
+    """What will be logged, with which noise, and how it is looked at."""
 
-    Attributes
-    ----------
-    signals : frozenset of str
-        Of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
-    commanded : bool
-        Whether commands are logged in place of rotor speeds.
-    floor : array, shape (6,), N m and N
-        What noise leaves of a window.
-    off : float
-        What formulas are off by, see `formulas_off`.
-    base : InertiaModel or None
-        Of the model that misses something; None for the rigid body of the vehicle.
-    """
-
-    signals: frozenset[str]
-    commanded: bool
-    floor: Array
+    signals: frozenset[str]  # Of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
+    commanded: bool  # Whether commands are logged in place of rotor speeds.
+    floor: Array  # Shape (6,), N m and N: standard deviation of window averages by noise.
     settings: GapSettings
-    base: InertiaModel | None = None
-    off: float = 0.0
+    base: InertiaModel | None = None  # Of the model that misses something; None for the rigid body of the vehicle.
+    off: float = 0.0  # What formulas are off by, see `formulas_off`.
 
     def gathered(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what flights would say on a question."""
@@ -124,20 +106,9 @@ def _signals(
 def expected_floor(
     room: Room, logging: Logging, noise: SimulationSettings, period: float, rng: np.random.Generator
 ) -> Array:
-    """Estimate the floors that noise of known size will have, along a random path.
+    """Estimate the floors that noise of known size will have, along a random path, shape (6,), N m and N.
 
-    Parameters
-    ----------
-    logging : Logging
-        Its floor is not used.
-    noise : SimulationSettings
-        Noise of each signal.
-    period : float
-        Of the log, s.
-
-    Returns
-    -------
-    array, shape (6,), N m and N
+    `logging`: its floor is not used; `noise`: noise of each signal; `period`: of the log, s.
     """
     exact = planned_signals(room.planned(room.drawn(rng), period), room, logging)
     names = ("attitude", "body_rate", "position", "velocity", "acceleration", "rotor_speed")
@@ -157,19 +128,10 @@ def flown_signals(
 ) -> Signals:
     """Fly a plan in closed loop and log it without noise.
 
-    Parameters
-    ----------
-    effects : sequence of SizedEffect
-        That the flown vehicle has and the autopilot does not know.
-    settings : ClosedLoopSettings
-        Their effects are not flown.
-
-    Raises
-    ------
-    SettingError
-        If an effect has values that no vehicle has.
-    ComputationError
-        If the vehicle leaves the path or overturns.
+    `effects`: that the flown vehicle has and the autopilot does not know.
+    `settings`: their effects are not flown.
+    Raises SettingError if an effect has values that no vehicle has.
+    Raises ComputationError if the vehicle leaves the path or overturns.
     """
     hidden: dict[str, tuple[float, ...] | dict[str, float]] = {
         each.candidate.effect.name: dict(physical_values(each)) for each in effects

@@ -1,7 +1,5 @@
 """The questions that a diagnosis, or a user, asks of the next flight."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import permutations
 
@@ -14,7 +12,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit, least_squares, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.leftover import usual_size
+from cpfls_cli.gap.naming.open_questions import usual_size
 from cpfls_cli.gap.naming.ranking import candidates_of, known_before
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
@@ -23,18 +21,10 @@ from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
-def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
+def require_visible(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
     """Refuse effects that no torque and no force shows.
 
-    Parameters
-    ----------
-    source : str
-        File or key that named them, for the message.
-
-    Raises
-    ------
-    InputError
-        It names the effect and what shows it.
+    `source`: file or key that named them, for the message. Raises InputError: it names the effect and what shows it.
     """
     for effect in effects:
         if effect.columns is None:
@@ -51,13 +41,13 @@ def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSet
     if actuators and measured:
         raise InputError(
             f"{source}: {actuators[0]} shows if commands are logged instead of rotor speeds, {measured[0]} if "
-            "rotor speeds are measured; no single flight tells them apart. Log measured rotor speeds: they rule out "
+            "rotor speeds are measured; no single flight separates them. Log measured rotor speeds: they rule out "
             f"{actuators[0]}"
         )
 
 
 def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tuple[Question, ...]:
-    """Ask for every two effects, either way, whether they would be told apart at a usual size.
+    """Ask for every two effects, either way, whether they would be separated at a usual size.
 
     One effect alone asks whether it shows at all.
     """
@@ -68,7 +58,7 @@ def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tu
 
 
 def _is_open(question: Question) -> bool:
-    """Tell whether there is anything to tell: an effect is also what holds it as a special case."""
+    """Check whether there is a question: an effect is also what holds it as a special case."""
     effect, rival = question.true.candidate.effect, question.rival
     return effect.kind != "parameter" and (rival is None or effect.name not in rival.holds)
 
@@ -81,7 +71,7 @@ def usual(effect: Effect, vehicle: VehicleSettings) -> SizedEffect:
     return SizedEffect(candidate, usual_size(effect, vehicle, width))
 
 
-def questions_left(
+def open_questions(
     named: Sequence[NamedEffect],
     rivals: Sequence[Alternative],
     unseen: Sequence[Effect],
@@ -91,42 +81,36 @@ def questions_left(
 ) -> tuple[Question, ...]:
     """Ask what a diagnosis left open: which of two rivals it is, and what its flights could not show.
 
-    Parameters
-    ----------
-    unseen : sequence of Effect
-        To show at a usual size.
-    flights : sequence of WeakFlight
-        Of the diagnosis, repaired.
-    floor : array, shape (6,), N m and N
+    `unseen`: to show at a usual size; `flights`: of the diagnosis, repaired; `floor`: shape (6,), N m and N.
     """
     sized = {
         each.name: SizedEffect(each.candidate, each.linear if len(each.linear) else np.ones(1))
         for each in named
         if each.candidate is not None
     }
-    questions, beside = [], []
+    questions, others = [], []
     for rival in rivals:
         one = sized[rival.instead_of]
         besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
         other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
-        beside += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
-    questions += [each for each in beside if not _is_told(each, flights, floor, settings)]
+        others += [Question(true, each, besides) for true, known in pair for each in _alike(true, known, flights)]
+    questions += [each for each in others if not _is_answered(each, flights, floor, settings)]
     once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
     asked = tuple(question for question in once.values() if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
 
 
-def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
+def _alike(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
     """List what else looks like an effect by the catalogue, and must not take the place of the rival."""
     others = (CATALOGUE[name] for name in true.candidate.effect.rivals if name != rival.name)
     known = (each for each in others if each.columns is not None and each.kind == true.candidate.effect.kind)
     return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
 
 
-def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
-    """Tell whether the flights that are there answer a question."""
+def _is_answered(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
+    """Check whether the flights that are there answer a question."""
     if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
         return False
     (answer,) = answered([gathered(question, flights, floor, settings)], shared_noise(flights[0].windows))
@@ -134,18 +118,14 @@ def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array, se
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
-    """Fit effects together on flights; what the flights leave open stays small beside its bounds.
+    """Fit effects together on flights; what the flights leave open stays small against its bounds.
 
-    Parameters
-    ----------
-    chosen : sequence of Candidate
-        Their shapes are kept.
-    floor : array, shape (6,), N m and N
+    `chosen`: their shapes are kept; `floor`: shape (6,), N m and N.
     """
     balance = system(flights, chosen)
     matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
     prior = known_before(balance)[: balance.base.shape[2]]
-    # Rows of the prior beside those of the flights.
+    # Rows of the prior below those of the flights.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
     linear = least_squares(matrix, np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))]))
     by_name = {each.effect.name: linear[place] for each, place in balance.places}
@@ -157,18 +137,14 @@ def fitted_rival(
 ) -> SizedEffect:
     """Fit a rival in place of a named effect, at its best shape; at a usual size where the flights lack its signals.
 
-    Parameters
-    ----------
-    besides : sequence of Candidate
-        The other named effects.
-    floor : array, shape (6,), N m and N
+    `besides`: the other named effects; `floor`: shape (6,), N m and N.
     """
     if all(rival.missing(flight.signals) for flight in flights):
         return usual(rival, flights[0].signals.vehicle)
 
     def error(candidate: Candidate) -> float:
         balance = system(flights, [*besides, candidate])
-        return float(((balance.left(fit(balance, floor)) / floor) ** 2).sum())
+        return float(((balance.residual_at(fit(balance, floor)) / floor) ** 2).sum())
 
     best = smallest(candidates_of([rival]), error)
     return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]

@@ -18,39 +18,23 @@ from cpfls_cli.trajectory.planning import Trajectory, sample_times
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_SLOPES = (0.5, 3.5)
-"""Powers of the frequency by which amplitudes fall: from shaking to drifting."""
+_SLOPES = (0.5, 3.5)  # Powers of the frequency by which amplitudes fall: from shaking to drifting.
 
 
 @dataclass(frozen=True)
 class HarmonicPath:
-    """Position and yaw over a duration, ``centre + sum_k cosine_k cos(w_k t) + sine_k sin(w_k t)``.
+    """Position and yaw over a duration, ``centre + sum_k cosine_k cos(w_k t) + sine_k sin(w_k t)``."""
 
-    Attributes
-    ----------
-    centre : array, shape (4,), m and rad
-    order : array of int, shape (4, harmonic)
-        Periods in the duration.
-    cosine, sine : array, shape (4, harmonic), m and rad
-    duration : float, s
-    """
-
-    centre: Array
-    order: IntArray
-    cosine: Array
-    sine: Array
-    duration: float
+    centre: Array  # Shape (4,), m and rad.
+    order: IntArray  # Shape (4, harmonic): periods in the duration.
+    cosine: Array  # Shape (4, harmonic), m and rad.
+    sine: Array  # The same.
+    duration: float  # S.
 
     def sample(self, time: Array) -> Array:
-        """Evaluate position and yaw with six derivatives.
+        """Evaluate position and yaw with six derivatives, shape (7, time, 4), m, rad and s.
 
-        Parameters
-        ----------
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (7, time, 4), m, rad and s
+        `time`: shape (time,), s.
         """
         frequency = 2 * np.pi / self.duration * self.order
         phase = np.multiply.outer(time, frequency).transpose(1, 0, 2)
@@ -68,12 +52,7 @@ class HarmonicPath:
         return np.ascontiguousarray(values)
 
     def scaled(self, factor: float | Array) -> HarmonicPath:
-        """Scale the path about the origin.
-
-        Parameters
-        ----------
-        factor : float or array, shape (4,)
-        """
+        """Scale the path about the origin."""
         by_axis = np.broadcast_to(factor, (4,))[:, None]
         return replace(self, centre=self.centre * factor, cosine=self.cosine * by_axis, sine=self.sine * by_axis)
 
@@ -93,12 +72,7 @@ class HarmonicPath:
 def random_path(duration: float, frequency_max: float, harmonics: int, rng: np.random.Generator) -> HarmonicPath:
     """Draw a path of about unit size on each axis, about the origin.
 
-    Parameters
-    ----------
-    duration : float, s
-    frequency_max : float, Hz
-    harmonics : int
-        Of each axis, fewer where the duration has no room for them.
+    `duration`: s; `frequency_max`: Hz; `harmonics`: of each axis, fewer where the duration has no room for them.
     """
     highest = max(int(frequency_max * duration + 1e-9), 1)
     count = min(harmonics, highest)
@@ -113,15 +87,9 @@ def random_path(duration: float, frequency_max: float, harmonics: int, rng: np.r
 def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) -> Trajectory:
     """Sample a path with the attitude that flies it.
 
-    Parameters
-    ----------
-    sample_time : float, s
-    gravity : float, m/s^2
-
-    Raises
-    ------
-    ComputationError
-        If the path asks for free fall, where the attitude is not defined.
+    `sample_time`: s.
+    `gravity`: m/s^2.
+    Raises ComputationError if the path asks for free fall, where the attitude is not defined.
     """
     time = sample_times(path.duration, sample_time)
     motion = path.sample(time)
@@ -133,33 +101,19 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
     )
 
 
-TILT_MAX = np.radians(35.0)
-"""Largest tilt where the settings leave it open."""
-
-_HARMONICS = 10
-"""Waves of an axis, as many as a person could still fly."""
+TILT_MAX = np.radians(35.0)  # Largest tilt where the settings leave it open.
+_HARMONICS = 10  # Waves of an axis, as many as a person could still fly.
 
 
 @dataclass(frozen=True)
 class Room:
-    """Space, limits and rotors that a path may use.
+    """Space, limits and rotors that a path may use."""
 
-    Attributes
-    ----------
-    half : array, shape (3,), m
-        Half of the box, less the vehicle's own size.
-    middle : array, shape (3,), m, world frame
-    settings : TrajectorySettings
-        Limits, tilt and duration.
-    period : float
-        Between the samples that are looked at, s.
-    """
-
-    half: Array
-    middle: Array
-    settings: TrajectorySettings
+    half: Array  # Shape (3,), m: half of the box, less the vehicle's own size.
+    middle: Array  # Shape (3,), m, world frame.
+    settings: TrajectorySettings  # Limits, tilt and duration.
     vehicle: VehicleSettings
-    period: float
+    period: float  # Between the samples that are looked at, s.
 
     def planned(self, path: HarmonicPath, period: float | None = None) -> Trajectory:
         """Sample a path, about the middle of the room."""
@@ -192,38 +146,37 @@ class Room:
 
         def beyond(share: float) -> float:
             # Free fall is infinitely far beyond.
-            return min(self.load(path.scaled(share)), 1.0 / ROUNDING) - 1.0
+            return min(self.share_of_limits(path.scaled(share)), 1.0 / ROUNDING) - 1.0
 
         return 1.0 if at_most(beyond(1.0), 0.0, 1.0) else float(brentq(beyond, 0.0, 1.0))
 
-    def load(self, path: HarmonicPath) -> float:
+    def share_of_limits(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
         try:
             planned = self.planned(path)
         except ComputationError:
             return np.inf
         signals = vars(planned)
-        loads = [_taken(signals[key.split("_", 1)[0]], limit) for key, limit in self.settings.limits.given.items()]
+        shares = []
+        for key, limit in self.settings.limits.given.items():
+            values = signals[key.split("_", 1)[0]]
+            # Three limits hold by component, one holds along the path.
+            taken = (
+                np.abs(values / np.array(limit)) if isinstance(limit, tuple) else np.linalg.norm(values, axis=1) / limit
+            )
+            shares.append(float(taken.max()))
         tilt = np.arccos(np.clip(np.prod(np.cos(planned.attitude[:, :2]), axis=1), -1, 1)).max()
-        loads.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
+        shares.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
         rotors = rotor_load(signals, self.vehicle)
-        return max(*loads, rotors.fast, rotors.slow)
+        return max(*shares, rotors.fast, rotors.slow)
 
 
 def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: float, period: float) -> Room:
     """Find the room that a vehicle has.
 
-    Parameters
-    ----------
-    ground : float
-        Height of the ground, m.
-    period : float
-        Between the samples that are looked at, s.
-
-    Raises
-    ------
-    SettingError
-        If the vehicle does not fit into the box, or the box reaches into the ground.
+    `ground`: height of the ground, m.
+    `period`: between the samples that are looked at, s.
+    Raises SettingError if the vehicle does not fit into the box, or the box reaches into the ground.
     """
     asked = settings.next_flight
     size = 2 * max(float(np.hypot(*rotor.position_m[:2])) + (rotor.radius_m or 0.0) for rotor in vehicle.rotors)
@@ -248,10 +201,3 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
             "thrust factors and the largest rotor speed"
         )
     return Room(half, np.array([0.0, 0.0, ground + asked.height_m]), settings, vehicle, period)
-
-
-def _taken(values: Array, limit: float | tuple[float, float, float]) -> float:
-    """Compute the share of a limit that is taken: three hold by component, one holds along the path."""
-    if isinstance(limit, tuple):
-        return float(np.abs(values / np.array(limit)).max())
-    return float(np.linalg.norm(values, axis=1).max() / limit)

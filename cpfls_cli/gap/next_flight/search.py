@@ -1,7 +1,5 @@
 """Search for the path along which rivals differ most, within the room that a vehicle has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -21,30 +19,22 @@ from cpfls_cli.weak_form.windows import windows
 
 @dataclass(frozen=True)
 class Goal:
-    """What the next flight has to tell, beside what is known from others.
-
-    Attributes
-    ----------
-    known : tuple of Evidence
-        What the flights already flown say on each question; no blocks without such flights.
-    noise : float
-        See `shared_noise`.
-    """
+    """What the next flight has to show, given what is known from others."""
 
     questions: tuple[Question, ...]
-    known: tuple[Evidence, ...]
+    known: tuple[Evidence, ...]  # What the flights already flown say on each question; no blocks without such flights.
     room: Room
     logging: Logging
-    noise: float
+    noise: float  # See `shared_noise`.
 
     def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
         """Judge what the known flights say together with one along given signals; None: with themselves once more."""
         if signals is None:
-            evidence = [known.beside(known) for known in self.known]
+            evidence = [known.after(known) for known in self.known]
         else:
             there = [self.logging.weak(signals)]
             fresh = [self.logging.gathered(each, there) for each in self.questions]
-            evidence = [one.beside(known) for one, known in zip(fresh, self.known, strict=True)]
+            evidence = [one.after(known) for one, known in zip(fresh, self.known, strict=True)]
         of_effect: dict[str, list[int]] = {}
         for index, question in enumerate(self.questions):
             of_effect.setdefault(question.true.candidate.effect.name, []).append(index)
@@ -65,12 +55,9 @@ class Goal:
 
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
-    """Set up what the next flight has to tell.
+    """Set up what the next flight has to show.
 
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-        That are there already.
+    `flights`: that are there already.
     """
 
     def known(question: Question) -> Evidence:
@@ -87,39 +74,24 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
 
 @dataclass(frozen=True)
 class NextFlight:
-    """The best path that was found.
-
-    Attributes
-    ----------
-    random : tuple of HarmonicPath
-        Drawn at random within the same room, from the worst to the best; the best was improved.
-    history : array, shape (iteration,)
-        Scores in the course of the search.
-    """
+    """The best path that was found."""
 
     path: HarmonicPath
+    # Drawn at random within the same room, from the worst to the best; the best was improved.
     random: tuple[HarmonicPath, ...]
-    history: Array
+    history: Array  # Shape (iteration,): scores in the course of the search.
 
 
 def next_flight(
-    asked: Goal,
-    rng: np.random.Generator,
-    progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None,
+    asked: Goal, rng: np.random.Generator, progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None
 ) -> NextFlight:
-    """Search for the path that tells most.
+    """Search for the most informative path.
 
     The best of some random paths is changed at random as long as that helps, by steps that shrink to nothing.
 
-    Parameters
-    ----------
-    progress : callable
-        Takes paths done, paths in all, and a note.
-
-    References
-    ----------
-    Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62
-    (T-optimality).
+    `progress`: takes paths done, paths in all, and a note.
+    Reference: Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models,
+    Biometrika 62 (T-optimality).
     """
     settings, room = asked.room.settings.next_flight, asked.room
     total = settings.starts + settings.iterations

@@ -1,4 +1,4 @@
-"""How well flights tell rivals apart: how likely each is after them, by what it leaves of the one that is true."""
+"""How well flights separate rivals: how likely each is after them, by the residual that it leaves of the true one."""
 
 from __future__ import annotations
 
@@ -26,61 +26,34 @@ DRAWS, FEW_DRAWS = 200, 8
 
 @dataclass(frozen=True)
 class SizedEffect:
-    """An effect with a value for each of its numbers.
-
-    Attributes
-    ----------
-    linear : array, shape (coefficient,)
-        1 where everything is in the shape.
-    """
+    """An effect with a value for each of its numbers."""
 
     candidate: Candidate
-    linear: Array
+    linear: Array  # Shape (coefficient,): 1 where everything is in the shape.
 
 
 @dataclass(frozen=True)
 class Question:
-    """Whether an effect would be told from a rival, if it is the true one.
-
-    Attributes
-    ----------
-    rival : Effect or None
-        None: whether the effect shows at all, beyond the vehicle's own numbers.
-    besides : tuple of SizedEffect
-        Effects that are there whichever is true; their coefficients are free.
-    """
+    """Whether an effect would be separated from a rival, if it is the true one."""
 
     true: SizedEffect
-    rival: Effect | None
-    besides: tuple[SizedEffect, ...] = ()
+    rival: Effect | None  # None: whether the effect shows at all, beyond the vehicle's own numbers.
+    besides: tuple[SizedEffect, ...] = ()  # Effects that are there whichever is true; their coefficients are free.
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What flights would say on a question, by the products of all columns that it takes over each block.
+    """What flights would say on a question, by the products of all columns that it takes over each block."""
 
-    Attributes
-    ----------
-    gram : array, shape (block, column, column)
-        In squared floors: the true effect, then base columns, then the rival at each point of its grid.
-    base : array of int
-        Places of the columns that are free whichever is true.
-    rivals : tuple of array of int
-        Places of the rival's, one for each point of its grid; one empty array where there is no rival.
-    unit : bool
-        Whether the rival has the coefficient 1.
-    off : float
-        What formulas are off by, see `formulas_off`.
-    known : int
-        Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
-    """
-
+    # Shape (block, column, column): in squared floors: the true effect, then base columns, then the rival at each point
+    # of its grid.
     gram: Array
-    base: IntArray
+    base: IntArray  # Places of the columns that are free whichever is true.
+    # Each : places of the rival's, one for each point of its grid; one empty array where there is no rival.
     rivals: tuple[IntArray, ...]
-    unit: bool
-    off: float
-    known: int = 0
+    unit: bool  # Whether the rival has the coefficient 1.
+    off: float  # What formulas are off by, see `formulas_off`.
+    known: int = 0  # Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
 
     @classmethod
     def none(cls, blocks: int) -> Evidence:
@@ -88,7 +61,7 @@ class Evidence:
         nowhere = np.zeros(0, dtype=int)
         return cls(np.zeros((blocks, 1, 1)), nowhere, (nowhere,), unit=False, off=0.0)
 
-    def beside(self, known: Evidence) -> Evidence:
+    def after(self, known: Evidence) -> Evidence:
         """Put blocks of other flights before these."""
         shape = (len(known.gram), *self.gram.shape[1:])
         gram = np.concatenate([np.broadcast_to(known.gram, shape), self.gram])
@@ -96,7 +69,7 @@ class Evidence:
 
     @cached_property
     def left(self) -> Array:
-        """What the rival leaves of the true effect at its best, shape (block,), squared floors."""
+        """Least residual of the true effect under the rival, shape (block,), squared floors."""
         return min((self._left(rival) for rival in self.rivals), key=lambda left: float(left.sum()))
 
     @cached_property
@@ -123,14 +96,9 @@ class Evidence:
     def odds(self, noise: float, draw: Array, size: float = 1.0) -> Array:
         """Compute the logarithm of the rival's predictive density less that of the true effect, shape (block,).
 
-        Parameters
-        ----------
-        noise : float
-            See `shared_noise`.
-        draw : array, shape (block,)
-            Of the noise in what the two differ by, in standard deviations.
-        size : float
-            Of the true effect, as a share of its own.
+        `noise`: see `shared_noise`.
+        `draw`, shape (block,): of the noise in what the two differ by, in standard deviations.
+        `size`: of the true effect, as a share of its own.
         """
         error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
         more = size**2 * self.left + error * draw
@@ -138,19 +106,12 @@ class Evidence:
 
 
 def formulas_off(hypothesis: System, floor: Array) -> float:
-    """Estimate what formulas are off by, by what effects leave above the floor of the flights that they were named in.
+    """Estimate what formulas are off by, from the residual above the floor of the flights that effects were named in.
 
-    Parameters
-    ----------
-    floor : array, shape (6,), N m and N
-
-    Returns
-    -------
-    float
-        Mean square, as a share of that of what the effects explain.
+    `floor`: shape (6,), N m and N; Result: mean square, as a share of that of what the effects explain.
     """
     plain = system(hypothesis.flights)
-    before, left = (float(((each.left(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
+    before, left = (float(((each.residual_at(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
     return float(np.clip((left - hypothesis.known.sum()) / max(before - left, ROUNDING), 0.0, OFF**2))
 
 
@@ -159,13 +120,7 @@ def gathered(
 ) -> Evidence:
     """Gather what flights along known motions would say on a question.
 
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-        Their residuals are not used.
-    floor : array, shape (6,), N m and N
-    off : float
-        See `formulas_off`.
+    `flights`: their residuals are not used; `floor`: shape (6,), N m and N; `off`: see `formulas_off`.
     """
     balance = system(flights)
     free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
@@ -188,20 +143,14 @@ def gathered(
 
 @dataclass(frozen=True)
 class Answer:
-    """What flights would say on a question.
-
-    Attributes
-    ----------
-    own, likely : float
-        How likely the true effect and the rival are expected to be after them, among all rivals of the true one.
-    sure : float
-        Probability that the rival is then so rare beside the true effect that it is no rival.
-    """
+    """What flights would say on a question."""
 
     evidence: Evidence
+    # `own`, `likely`: How likely the true effect and the rival are expected to be after them, among all rivals of the
+    # true one.
     own: float
     likely: float
-    sure: float
+    sure: float  # Probability that the rival is then so unlikely against the true effect that it is no rival.
     noise: float
 
     @property
@@ -222,14 +171,9 @@ class Answer:
 
 
 def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
-    """Foretell the table of how likely each set of effects is where one effect is true, over draws of the noise.
+    """Predict the table of how likely each set of effects is where one effect is true, over draws of the noise.
 
-    Parameters
-    ----------
-    evidence : sequence of Evidence
-        On each of its rivals, of the same flights.
-    noise : float
-        See `shared_noise`.
+    `evidence`: on each of its rivals, of the same flights; `noise`: see `shared_noise`.
     """
     tables = _tables(evidence, noise, draws)
     own, *others = tables.mean(axis=0).tolist()

@@ -1,6 +1,4 @@
-"""Whether what is left of a gap is the air: gusts that nothing asked and nothing before foretells; size and memory."""
-
-from __future__ import annotations
+"""Whether a residual is the air: gusts that neither setpoints nor the past predict; size and memory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.balance.balance_system import System, floors, left_over, system
+from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
@@ -33,35 +31,25 @@ from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, blows, newly_le
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_FORETOLD}
-"""Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
-Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it."""
+_PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_FORETOLD}
+"""Largest share of the residual, at 95 %, that instruments predict of the air. Other runs show all that is
+repeatable, a linear answer to setpoints about two thirds of it."""
 
 _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
     "repeats": ("repeats", "past"),
     "setpoints": ("setpoints", "past"),
     "none": ("past",),
 }
-"""What tells gusts where that is known of flights: the next what those before it neither tell nor refute."""
+"""What identifies gusts, by the instruments of flights; each for channels that those before it leave open."""
 
 
 @dataclass(frozen=True)
 class Air:
-    """Gusts in flights.
+    """Gusts in flights."""
 
-    Attributes
-    ----------
-    found : FoundGusts
-        Of all channels; a bound where nothing tells gusts from what the model lacks.
-    told : array of bool, shape (6,)
-        Channels of which instruments tell that all that is left is gusts and noise.
-    split : array of bool, shape (6,)
-        Channels of which instruments tell how much is; what comes again beside them is a gap above them.
-    """
-
-    found: FoundGusts
-    told: BoolArray
-    split: BoolArray
+    found: FoundGusts  # Of all channels; a bound where nothing separates gusts from what the model lacks.
+    gusts_only: BoolArray  # Shape (6,): channels whose residual is gusts and noise, by instruments.
+    split: BoolArray  # Shape (6,): channels whose gusts instruments size; what is repeatable is a gap above them.
 
     def floor(self, learned: Sequence[WeakFlight], flights: Sequence[WeakFlight]) -> Array:
         """Compute what gusts and noise do to averages over windows: standard deviation, 0 where none are split off.
@@ -70,19 +58,14 @@ class Air:
         mean square of a Gauss-Markov process of memory m over a time T scatters by ``sqrt(2 m / T)`` of itself: there
         the floor is two such deviations larger, of both, which they exceed in about one flight of twenty.
 
-        Parameters
-        ----------
-        learned, flights : sequence of WeakFlight
-            Those that gusts were found in, and those that the floor is of.
-
-        Returns
-        -------
-        array, shape (6,), N m and N
+        `learned`, `flights`: those that gusts were found in, and those that the floor is of.
+        Result: shape (6,), N m and N.
         """
         windows = learned[0].windows
         weight, noise = windows.weight, self.noise(windows)
         apart = windows.period * np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
-        seldom = 0.0 if flights is learned else 1 / _seconds(learned) + 1 / _seconds(flights)
+        seconds = (float(sum(len(f.signals.time) * f.signals.period for f in own)) for own in (learned, flights))
+        seldom = 0.0 if flights is learned else sum(1 / each for each in seconds)
         total = np.zeros(6)
         for channel in np.flatnonzero(self.split):
             memory = self.found.memory[channel]
@@ -91,7 +74,7 @@ class Air:
         return np.sqrt(total)
 
     def noise(self, windows: Windows) -> Array:
-        """Compute what the noise beside them alone does, shape (6,); infinite where none are split off."""
+        """Compute what noise does without gusts, shape (6,); infinite where none are split off."""
         alone = self.found.noise @ [(windows.weight**2).sum(), (windows.slope**2).sum()]
         return np.where(self.split, np.sqrt(alone), np.inf)
 
@@ -107,12 +90,12 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
         given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
     different = set(without_copies(recordings))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
-    beside = tuple(
+    known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}
         for number, each in enumerate(given.repeats.beside)
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
-    return replace(given, repeats=Repeats(beside, likeness))
+    return replace(given, repeats=Repeats(known, likeness))
 
 
 def air(
@@ -123,80 +106,64 @@ def air(
     settings: GapSettings,
     rng: np.random.Generator,
 ) -> Air | None:
-    """Find gusts in what a hypothesis leaves of flights.
+    """Find gusts in the residual of flights under a hypothesis.
 
-    What the vehicle does goes with what was asked of it, and comes again where that does; a gust does neither. Without
-    either, what is new of a gust goes with nothing that was before, nor does its size; what is new of an effect goes
-    with the motion that it comes from.
+    The motion of the vehicle follows its setpoints, and is repeatable where these are; a gust is neither. Without
+    either, the innovations of a gust correlate with nothing before them, nor does their size; those of an effect
+    correlate with the motion that causes it.
 
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    block : array of int, shape (window,)
-    given : Instruments
-        Of the same flights.
-
-    Returns
-    -------
-    Air or None
-        None for flights that are too short or of several rates, and for too few of them that instruments know.
+    `linear`, shape (column,): coefficients of its base.
+    `block`: shape (window,).
+    `given`: of the same flights.
+    None for flights that are too short or of several rates, and for too few of them that instruments know.
     """
-    residual, known = hypothesis.left(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
+    residual, known = hypothesis.residual_at(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
     moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
-    left = _Left(hypothesis, linear, residual, block, np.where(known, moved, 0.0), given, settings)
-    bound = gusts_in(left.sides, given, "none")
+    flown = _Residual(hypothesis, linear, residual, block, np.where(known, moved, 0.0), given, settings)
+    bound = gusts_in(flown.sides, given, "none")
     if bound is None:
         return None
-    found, (told, sized, refuted) = None, np.zeros((3, 6), dtype=bool)
+    found, (only, sized, refuted) = None, np.zeros((3, 6), dtype=bool)
     ends = {name: getattr(bound, name).copy() for name in (*RANGES, "noise")}
-    for told_by in _WITNESSES[given.kind]:
-        own = gusts_in(left.sides, given, told_by)
+    for witness in _WITNESSES[given.kind]:
+        own = gusts_in(flown.sides, given, witness)
         if own is None:
             continue
-        own, like = left.told_by(own, told, rng)
-        like &= known & ~told & ~refuted
-        refuted |= own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
-        # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
-        size = ~sized & (like | (np.isfinite(own.size) & (told_by == "repeats")))
+        own, like = flown.judged(own, only, rng)
+        like &= known & ~only & ~refuted
+        refuted |= own.foretold - ERRORS * own.foretold_error > _PREDICTED[witness]
+        # What is not repeatable is no effect's; what setpoints do not predict may be one's.
+        size = ~sized & (like | (np.isfinite(own.size) & (witness == "repeats")))
         for name, values in ends.items():
             values[size] = getattr(own, name)[size]
-        if found is None or like.sum() > told.sum():
+        if found is None or like.sum() > only.sum():
             found = own
-        told, sized = told | like, sized | size
-        if told[known].all():
+        only, sized = only | like, sized | size
+        if only[known].all():
             break
     if found is None:
         return None
     ends |= {name: np.where(known, ends[name], np.nan) for name in RANGES}
-    return Air(replace(found, **ends), told, known & sized)
+    return Air(replace(found, **ends), only, known & sized)
 
 
 @dataclass(frozen=True)
-class _Left:
-    """What a hypothesis leaves of flights, and what is known of them.
-
-    Attributes
-    ----------
-    residual : array, shape (window, 6)
-    block : array of int, shape (window,)
-    moved : array, shape (6,)
-        Mean square, in squared floors of the sensors; 0 of a channel that is not known.
-    """
+class _Residual:
+    """The residual of flights under a hypothesis, and what is known of them."""
 
     hypothesis: System
     linear: Array
-    residual: Array
-    block: IntArray
-    moved: Array
+    residual: Array  # Shape (window, 6).
+    block: IntArray  # Shape (window,).
+    moved: Array  # Shape (6,): mean square, in squared floors of the sensors; 0 of a channel that is not known.
     given: Instruments
     settings: GapSettings
 
     @cached_property
     def sides(self) -> list[Array]:
-        """What both sides of the balance differ by, of each run, shape (time, 2, 6)."""
-        left = [left_over(self.hypothesis, number, self.linear) for number in range(len(self.hypothesis.flights))]
+        """Difference of both sides of the balance, of each run, shape (time, 2, 6)."""
+        left = [residual_along(self.hypothesis, number, self.linear) for number in range(len(self.hypothesis.flights))]
         sides = []
         for run in self.given.runs:
             momentum, direct = left[run.flight].momentum, left[run.flight].direct
@@ -204,50 +171,47 @@ class _Left:
             sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
         return sides
 
-    def told_by(self, found: FoundGusts, others: BoolArray, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
-        """Mark channels of which a witness tells that gusts are all, beside those that others told; add its shares."""
-        told_by, steady = found.told_by, np.ones(6, dtype=bool)
-        if told_by == "past":
+    def judged(self, found: FoundGusts, others: BoolArray, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+        """Mark channels that are gusts alone by a witness, jointly with those of `others`; add its shares."""
+        witness, steady = found.told_by, np.ones(6, dtype=bool)
+        if witness == "past":
             newly = self._newly(found.noise)
-            foretold, without = newly.shares
-            found = replace(found, foretold=foretold, foretold_without=without)
+            share, without = newly.shares
+            found = replace(found, foretold=share, foretold_without=without)
             steady = ~newly.grows(RARE)
-        told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
-        if told_by == "repeats" or not told.any():
-            return found, told
-        like = steady if told_by == "past" else self._like_air(rng)
+        only = np.isfinite(found.size) & _gusty(found, self.moved, _PREDICTED[witness])
+        if witness == "repeats" or not only.any():
+            return found, only
         # Nothing else than that all of it is air shows it where nothing was asked.
-        told = told & like
-        blown = told | others if told_by == "past" else np.isfinite(found.size)
-        return found, told & blows(blown, np.asarray(self.residual.any(axis=0)))
+        only = only & (steady if witness == "past" else self._like_air(rng))
+        blown = only | others if witness == "past" else np.isfinite(found.size)
+        return found, only & blows(blown, np.asarray(self.residual.any(axis=0)))
 
     def _newly(self, noise: Array) -> NewlyLeft:
-        """Take what comes newly, and what motion and rotors told of it before."""
+        """Take innovations of the residual, and what motion and rotors predict of them."""
         windows = dense(self.hypothesis.flights[0].windows)
         flights = [replace(flight, windows=windows, seen={}) for flight in self.hypothesis.flights]
         there = system(flights, self.hypothesis.chosen)
         states = [state_signals(*pair) for pair in zip(there.flights, there.signals, strict=True)]
-        names = [name for name in states[0] if all(name in state for state in states)]
-        told = [np.stack([state[name] for name in names], axis=1) for state in states]
-        residual = there.left(self.linear)
-        left = [residual[there.flight_index == number] for number in range(len(states))]
+        names, before = _common(states)
+        residual = there.residual_at(self.linear)
+        own = [residual[there.flight_index == number] for number in range(len(states))]
         moving = np.isin(names, list(without_actuation(states[0])))
-        return newly_left(windows, left, told, moving, noise, self.settings.block_s)
+        return newly_left(windows, own, before, moving, noise, self.settings.block_s)
 
     def _like_air(self, rng: np.random.Generator) -> BoolArray:
-        """Mark channels of which the air is believed where setpoints do not foretell them.
+        """Mark channels of which the air is believed where setpoints do not predict them.
 
-        Setpoints foretell no effect that is not linear in what they ask for. So a channel may follow no curve of a
-        signal, as far as they foretell that; and the air turns and pushes as much in gentle flight as in fierce.
+        Setpoints predict no effect that is not linear in them. So a channel may depend on no curve of a signal, as far
+        as setpoints predict that; and the air turns and pushes as much in gentle flight as in fierce.
         """
         flights, given, settings = self.hypothesis.flights, self.given, self.settings
         if [run.flight for run in given.runs] != list(range(len(flights))):
             return np.zeros(6, dtype=bool)
         signals = zip(flights, self.hypothesis.signals, strict=True)
         states = [without_actuation(state_signals(*pair)) for pair in signals]
-        names = [name for name in states[0] if all(name in state for state in states)]
-        flown = [np.stack([state[name] for name in names], axis=1) for state in states]
-        asked = np.concatenate(foretold_rows(given, flights[0].windows, flown))
+        names, flown = _common(states)
+        asked = np.concatenate(predicted_rows(given, flights[0].windows, flown))
         time = np.concatenate([each["time"] for each in states])
         state = dict(zip(names, asked.T, strict=True)) | {"time": time}
         index = self.hypothesis.flight_index
@@ -257,22 +221,25 @@ class _Left:
         return ~np.isin(CHANNELS, follows) & ~grows
 
 
+def _common(states: Sequence[dict[str, Array]]) -> tuple[list[str], list[Array]]:
+    """Name the signals that all flights have, and stack those of each, shape (window, signal)."""
+    names = [name for name in states[0] if all(name in state for state in states)]
+    return names, [np.stack([state[name] for name in names], axis=1) for state in states]
+
+
 def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
-    """Mark channels of which instruments foretell surely less than a share, by themselves or with the others of a kind.
+    """Mark channels of which instruments surely predict less than a share, alone or with the others of a kind.
 
     Air turns a vehicle about every axis, and pushes it along every one: what is sure of all torques or all forces is
     believed of each of them of which it is more likely than not.
 
-    Parameters
-    ----------
-    moved : array, shape (6,)
-        Mean square of what is left, in squared floors of the sensors.
+    `moved`, shape (6,): mean square of the residual, in squared floors of the sensors.
     """
     own = found.foretold + ERRORS * found.foretold_error < most
     for kind in (slice(3), slice(3, 6)):
-        # By what they tell; of a channel that moves no more than its sensors, nothing.
-        told = np.isfinite(found.foretold[kind]) & (moved[kind] > 1)
-        weight = np.where(told, 1 / np.maximum(found.foretold_error[kind], np.finfo(float).tiny) ** 2, 0.0)
+        # Of a channel that moves no more than its sensors nothing is known.
+        known = np.isfinite(found.foretold[kind]) & (moved[kind] > 1)
+        weight = np.where(known, 1 / np.maximum(found.foretold_error[kind], np.finfo(float).tiny) ** 2, 0.0)
         weight /= max(weight.sum(), np.finfo(float).tiny)
         share, without = (np.nan_to_num(each[..., kind]) @ weight for each in (found.foretold, found.foretold_without))
         if weight.any() and share + ERRORS * jackknife_error(without) < most:
@@ -280,22 +247,15 @@ def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
     return own
 
 
-def _seconds(flights: Sequence[WeakFlight]) -> float:
-    return float(sum(len(flight.signals.time) * flight.signals.period for flight in flights))
-
-
 def in_air(flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:
     """Give flights a floor of gusts and noise, shape (6,)."""
     return [replace(flight, air=floor * flight.known) for flight in flights]
 
 
-def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
-    """Predict rows of windows over runs, shape (window, ...), from what was asked for; NaN for runs without setpoints.
+def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
+    """Predict rows of windows over runs, shape (window, ...), from setpoints; NaN for runs without.
 
-    Parameters
-    ----------
-    rows : sequence of array, shape (window, ...)
-        Of each run.
+    `rows`, each shape (window, ...): of each run.
     """
     lags = late_by(windows.period, max(1, windows.hop // 2))
     asked = {
@@ -304,23 +264,16 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
         for number, setpoint in enumerate(given.setpoints)
         if setpoint is not None and len(rows[number])
     }
-    told = foretold_by_run(asked, rows)
-    return [told.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
+    found = foretold_by_run(asked, rows)
+    return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
 
 
 def _growing(
-    residual: Array,
-    asked: Array,
-    flight_index: IntArray,
-    block: IntArray,
-    shifts: int,
-    rng: np.random.Generator,
+    residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
 ) -> BoolArray:
-    """Mark channels of which what is left surely grows with how much a signal moves, by ranks over blocks of time.
+    """Mark channels whose residual surely grows with how much a signal moves, by ranks over blocks of time.
 
-    References
-    ----------
-    Winkler et al. 2014, permutation inference with the largest statistic.
+    Reference: Winkler et al. 2014, permutation inference with the largest statistic.
     """
     rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
     sizes, moves = (ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)

@@ -1,7 +1,5 @@
 """Which signal of the flight a residual follows, judged on unseen blocks and against shifted residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
@@ -17,14 +15,9 @@ from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
-_DEGREE = 4
-"""Of curves, and of waves around a circle: what formulas leave out is hardly more crooked."""
-
-OUTER_PERCENT = 0.5
-"""Of a signal at either end, where a few windows would decide."""
-
-ANGLES = ("roll", "yaw")
-"""Signals that come back after a full turn."""
+_DEGREE = 4  # Of curves, and of waves around a circle: what formulas leave out is hardly more crooked.
+OUTER_PERCENT = 0.5  # Of a signal at either end, where a few windows would decide.
+ANGLES = ("roll", "yaw")  # Signals that come back after a full turn.
 
 
 class Dependence(NamedTuple):
@@ -63,26 +56,14 @@ def rank_dependence(
     flight is shifted in time against the signals (`mirror_shifted`), and the best share of all channels and signals is
     what chance has to offer (family-wise).
 
-    Parameters
-    ----------
-    residual : array, shape (window, 6), N m and N, or floors
-        A channel that a flight lacks is 0 all through it.
-    flight_index : array of int, shape (window,)
-    block : array of int, shape (window,)
-        From 0, without gaps; left out one by one.
-    state : mapping of str to array, shape (window,)
-        Not a number where a flight lacks the signal; it is judged on the other flights.
-    shifts : int
-        Number of draws of chance.
-
-    Returns
-    -------
-    tuple of Dependence
-        Largest share first; channels without residual and signals that stand still are left out.
-
-    References
-    ----------
-    Winkler et al. 2014, permutation inference with the largest statistic; Politis and Romano 1992, circular blocks.
+    `residual`, shape (window, 6), N m and N, or floors: a channel that a flight lacks is 0 all through it.
+    `flight_index`: shape (window,).
+    `block`, shape (window,): from 0, without gaps; left out one by one.
+    `state`, each shape (window,): not a number where a flight lacks the signal; it is judged on the other flights.
+    `shifts`: number of draws of chance.
+    Result: largest share first; channels without residual and signals that stand still are left out.
+    Reference: Winkler et al. 2014, permutation inference with the largest statistic; Politis and Romano 1992, circular
+    blocks.
     """
     shifted = mirror_shifted(residual, flight_index, shifts, rng)
     draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
@@ -133,15 +114,8 @@ def _curve(name: str, signal: Array) -> Array:
 def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
     """Average the signals of motion and actuation over the windows of a flight.
 
-    Parameters
-    ----------
-    signals : Signals
-        Of the flight, as measured or with actuator effects applied.
-
-    Returns
-    -------
-    dict of str to array, shape (window,)
-        SI units; velocities through the air in the body frame, angles within half a turn.
+    `signals`: of the flight, as measured or with actuator effects applied.
+    Result: SI units; velocities through the air in the body frame, angles within half a turn.
     """
     averaged = {"time": flight.windows.centres(signals.time) - signals.time[0]}
     for name, values in _instantaneous(signals):
@@ -152,14 +126,7 @@ def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
 def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
     """Concatenate the states of several flights, NaN where a flight lacks a signal.
 
-    Parameters
-    ----------
-    states : sequence of mapping of str to array, shape (window,)
-        Of each flight.
-
-    Returns
-    -------
-    dict of str to array, shape (window,)
+    `states`, each shape (window,): of each flight.
     """
     names = dict.fromkeys(name for state in states for name in state)
     return {
@@ -174,13 +141,7 @@ def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
     The controller answers every disturbance with the rotors, and their noise is noise of the residual, so that a
     residual nearly always follows their torque, whichever its cause. Causes are looked for among the other signals.
 
-    Parameters
-    ----------
-    state : mapping of str to array, shape (window,)
-
-    Returns
-    -------
-    dict of str to array, shape (window,)
+    `state`: each shape (window,).
     """
     return {name: values for name, values in state.items() if not name.startswith(("rotor", "thrust"))}
 

@@ -1,4 +1,4 @@
-"""A narrow band that stands out of the smooth spectrum of a residual, and whether it feeds the motion."""
+"""A narrow band above the smooth spectrum of a residual, and whether it feeds the motion."""
 
 from __future__ import annotations
 
@@ -21,43 +21,23 @@ Energy = Literal["feeds", "drains", "neither"]
 _LOBE_CYCLES = 2
 """Half width of the main lobe of a Hann taper, in reciprocals of the flight: slower is no band but a drift."""
 
-_FINER = 4
-"""Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power."""
-
-LOWEST = _FINER * _LOBE_CYCLES
-"""First bin above those that the mean leaks into."""
-
-_MEDIAN_CYCLES = 24
-"""Width of the running median, six times a line's."""
+_FINER = 4  # Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power.
+LOWEST = _FINER * _LOBE_CYCLES  # First bin above those that the mean leaks into.
+_MEDIAN_CYCLES = 24  # Width of the running median, six times a line's.
 
 
 @dataclass(frozen=True)
 class NarrowBand:
-    """The narrow band that stands out most.
+    """The most significant narrow band."""
 
-    Attributes
-    ----------
-    channel : str
-        One of `CHANNELS`.
-    share : float
-        Of the variance of the channel, above the background.
-    p_value : float
-        Probability that noise with the same smooth spectrum has a band as prominent, at any frequency of any channel.
-    energy : str
-        Whether the band feeds energy into the rotation about its axis, drains it, or neither for sure.
-    power : float
-        Mean of residual times body rate in the band, in the unit of the residual times rad/s; 0 for forces.
-    power_error : float
-        Its standard error.
-    """
-
-    channel: str
+    channel: str  # One of `CHANNELS`.
     frequency_hz: float
-    share: float
+    share: float  # Of the variance of the channel, above the background.
+    # Probability that noise with the same smooth spectrum has a band as prominent, at any frequency of any channel.
     p_value: float
-    energy: Energy
-    power: float
-    power_error: float
+    energy: Energy  # Whether the band feeds energy into the rotation about its axis, drains it, or neither for sure.
+    power: float  # Mean of residual times body rate in the band, in the unit of the residual times rad/s; 0 for forces.
+    power_error: float  # Its standard error.
 
 
 def narrow_band(
@@ -68,34 +48,20 @@ def narrow_band(
     rng: np.random.Generator,
     significance: float = 1.0,
 ) -> NarrowBand | None:
-    """Search for one narrow band that stands out of the smooth spectrum of the residual.
+    """Search for one narrow band above the smooth spectrum of the residual.
 
     The periodogram over all flights is divided by its background; the largest ratio of all frequencies and channels is
     compared with that of noise drawn from the background. Rows from windows of 0.4 s at a hop of 0.2 s show lines up
     to 2.5 Hz, but those from 2.5 to 5 Hz look like 2.5 to 0 Hz; at a hop of an eighth of the window the windows let
     through nothing that could be mistaken, and lines are seen up to about two periods per window.
 
-    Parameters
-    ----------
-    residual : sequence of array, shape (window, 6), N m and N, or floors
-        Of each flight; a channel that a flight lacks is 0.
-    body_rate : sequence of array, shape (window, 3), rad/s
-        Over the same windows.
-    hop_s : float
-        From one window to the next, s.
-    draws : int
-        Of noise, at most.
-    significance : float
-        Largest p that anybody asks for: no noise is drawn once p has to be larger.
-
-    Returns
-    -------
-    NarrowBand or None
-        None where no flight is long enough to have a background, or all rows are 0.
-
-    References
-    ----------
-    Besag and Clifford 1991, sequential Monte Carlo p-values.
+    `residual`, each shape (window, 6), N m and N, or floors: of each flight; a channel that a flight lacks is 0.
+    `body_rate`, each shape (window, 3), rad/s: over the same windows.
+    `hop_s`: from one window to the next, s.
+    `draws`: of noise, at most.
+    `significance`: largest p that anybody asks for: no noise is drawn once p has to be larger.
+    None where no flight is long enough to have a background, or all rows are 0.
+    Reference: Besag and Clifford 1991, sequential Monte Carlo p-values.
     """
     kept = [number for number, rows in enumerate(residual) if len(rows) > 2 * _MEDIAN_CYCLES and rows.any()]
     if not kept:
@@ -169,41 +135,25 @@ def _mean_power(
 
 @dataclass(frozen=True)
 class Grid:
-    """Frequencies of the periodograms, four to each reciprocal of the longest flight.
+    """Frequencies of the periodograms, four to each reciprocal of the longest flight."""
 
-    Attributes
-    ----------
-    samples : int
-        To which series are filled up with zeros.
-    frequency : array, shape (frequency,), Hz
-    """
-
-    samples: int
-    frequency: Array
+    samples: int  # To which series are filled up with zeros.
+    frequency: Array  # Shape (frequency,), Hz.
 
 
 def grid(lengths: Sequence[int], period: float) -> Grid:
     """Choose the frequencies for series of different lengths.
 
-    Parameters
-    ----------
-    period : float
-        From one row to the next, s.
+    `period`: from one row to the next, s.
     """
     samples = next_fast_len(_FINER * max(lengths), real=True)
     return Grid(samples, rfftfreq(samples, period))
 
 
 def pooled_power(series: Sequence[Array], on: Grid) -> Array:
-    """Sum the periodograms of flights under a Hann taper.
+    """Sum the periodograms of flights under a Hann taper, shape (..., frequency).
 
-    Parameters
-    ----------
-    series : sequence of array, shape (..., time)
-
-    Returns
-    -------
-    array, shape (..., frequency)
+    `series`: each shape (..., time).
     """
     total: Array = np.zeros(())
     for values in series:
@@ -219,18 +169,9 @@ def background(power: Array, on: Grid) -> Array:
     The shape of a first-order autoregression times a running median over 24 reciprocals of the flight: the median does
     not see a line, and the shape keeps its edges straight.
 
-    Parameters
-    ----------
-    power : array, shape (..., frequency)
-
-    Returns
-    -------
-    array, shape (..., frequency)
-        Of the median of the power, not of its mean.
-
-    References
-    ----------
-    Mann and Lees 1996, robust estimation of background noise and signal detection.
+    `power`: shape (..., frequency).
+    Result: shape (..., frequency); of the median of the power, not of its mean.
+    Reference: Mann and Lees 1996, robust estimation of background noise and signal detection.
     """
     turn = np.pi * on.frequency / on.frequency[-1]
     correlation = (power @ np.cos(turn) / power.sum(axis=-1))[..., None]
@@ -256,18 +197,9 @@ def _running_median(power: Array) -> Array:
 
 
 def noise_like(smooth: Array, lengths: Sequence[int], present: BoolArray, on: Grid, rng: np.random.Generator) -> Array:
-    """Draw noise with a background and no line, and pool its periodogram.
+    """Draw noise with a background and no line, and pool its periodogram, shape (channel, frequency).
 
-    Parameters
-    ----------
-    smooth : array, shape (channel, frequency)
-    lengths : sequence of int
-        Of the flights.
-    present : array of bool, shape (flight, channel)
-
-    Returns
-    -------
-    array, shape (channel, frequency)
+    `smooth`: shape (channel, frequency); `lengths`: of the flights; `present`: shape (flight, channel).
     """
     series = []
     for length, there in zip(lengths, present, strict=True):

@@ -1,4 +1,4 @@
-"""What of a gap comes again where flights repeat their path, an effect that is missing, and what does not: gusts."""
+"""The repeatable part of a gap where flights repeat their path, a missing effect, and the rest: gusts and noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.balance.balance_system import System, left_over
+from cpfls_cli.gap.balance.balance_system import System, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
@@ -23,20 +23,14 @@ from cpfls_cli.result import about, result
 from cpfls_cli.weak_form.windows import Recording, Windows
 
 _SURE = 1 - 0.05 / 36
-"""Confidence from which on something comes again: 36 numbers are looked at, and chance shall pass none in 95 %."""
-OPEN = 0.5
-"""Share of a gap up to which it has to be known that no more comes again, to say that it does not."""
-_TOLD = 0.2
-"""Standard error of an explained share above which it says nothing: hardly any motion comes again there."""
+"""Confidence from which on something is repeatable: of 36 numbers, chance shall pass none in 95 %."""
+OPEN = 0.5  # Share of a gap above which it is not ruled out that it is repeatable.
+_LARGEST_ERROR = 0.2
+"""Standard error of an explained share above which it says nothing: hardly any motion is repeatable there."""
 
 
 class Band(NamedTuple):
-    """Windows, and the frequencies that they pass, about.
-
-    Attributes
-    ----------
-    low, high : float, Hz
-    """
+    """Windows, and the frequencies in Hz that they pass, about."""
 
     windows: Windows
     low: float
@@ -44,22 +38,20 @@ class Band(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Neighbouring bands in which something comes again.
-
-    Attributes
-    ----------
-    bands : slice
-    low, high : float, Hz
-    """
+    """Neighbouring bands in which a gap is repeatable, and their frequencies in Hz."""
 
     bands: slice
     low: float
     high: float
 
 
+def _by_band(text: str, unit: str = "SI") -> Any:
+    return about(text, "channel", "band", unit=unit, frame="body (FLU)", gaps=True, brief=False)
+
+
 @result
-class ComesAgain:
-    """What of a gap comes again in other runs of the same path, by channel and band, and what does not.
+class Repeatability:
+    """The repeatable part of a gap, by channel and band, from runs of the same path.
 
     With the gap r of a run and r' of another at the same place of the path, mean squares are over windows and pairs;
     N^2 m^2 and N^2, NaN where unknown.
@@ -69,66 +61,25 @@ class ComesAgain:
 
     low: Array = about("lower end of each band, about; the first band is all of them", "band", unit="Hz", brief=False)
     high: Array = about("upper end of each band, about", "band", unit="Hz", brief=False)
-    total: Array = about(
-        "mean square of the gap in a band, (N m)^2 and N^2",
-        "channel",
-        "band",
-        unit="SI",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
-    )
-    again: Array = about(
-        "what of it comes again: mean product with the gap of another run at the same place of the path",
-        "channel",
-        "band",
-        unit="SI",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
-    )
-    noise: Array = about(
-        "what white noise of the sensors leaves of the gap; NaN where signals were filtered",
-        "channel",
-        "band",
-        unit="SI",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
-    )
-    taken: Array = about(
-        "what comes again of the torque or force that the motion takes, as a mean product",
-        "channel",
-        "band",
-        unit="SI",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
-    )
-    share_error: Array = about(
-        "standard error of again over total", "channel", "band", frame="body (FLU)", gaps=True, brief=False
-    )
-    explained_error: Array = about(
-        "standard error of 1 less again over taken, the share of the motion that comes again and the model explains",
-        "channel",
-        "band",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
-    )
+    total: Array = _by_band("mean square of the gap in a band, (N m)^2 and N^2")
+    repeatable: Array = _by_band("mean product of the gap with that of another run at the same place of the path")
+    noise: Array = _by_band("mean square of the gap by white sensor noise; NaN where signals were filtered")
+    motion: Array = _by_band("repeatable part of the torque or force of the motion, as a mean product")
+    share_error: Array = _by_band("standard error of repeatable over total", unit="1")
+    explained_error: Array = _by_band("standard error of 1 less repeatable over motion", unit="1")
     resists: Array = about(
         "moments of inertia, kg m^2, and mass, kg", "channel", unit="SI", frame="body (FLU)", brief=False
     )
     flights: tuple[str, ...] = about("flights that repeat each other", "repeating")
     runs: int = about("runs that are compared with others")
     paths: int = about("different paths among them")
-    blocks: IntArray = about("blocks of the paths that tell the errors", "band", brief=False)
+    blocks: IntArray = about("blocks of the paths that the errors are from", "band", brief=False)
 
     @property
     def share(self) -> Array:
-        """Share of the gap that comes again, shape (channel, band)."""
+        """Repeatable share of the gap, shape (channel, band)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(self.again / self.total)
+            return np.asarray(self.repeatable / self.total)
 
     @property
     def share_half(self) -> Array:
@@ -137,14 +88,14 @@ class ComesAgain:
 
     @property
     def explained(self) -> Array:
-        """Share of the motion that comes again and is explained, shape (channel, band); NaN where hardly any does."""
+        """Explained share of the repeatable motion, shape (channel, band); NaN where hardly any is repeatable."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = 1 - self.again / self.taken
-        return np.where((self.taken > 0) & (self.explained_error < _TOLD), share, np.nan)
+            share = 1 - self.repeatable / self.motion
+        return np.where((self.motion > 0) & (self.explained_error < _LARGEST_ERROR), share, np.nan)
 
     @property
     def sure(self) -> BoolArray:
-        """Where more comes again than chance lets and than hardly counts, shape (channel, band)."""
+        """Where a gap is repeatable, beyond chance and what hardly counts, shape (channel, band)."""
         return np.asarray(self.share > np.maximum(half_width(self.share_error, self.blocks, _SURE), COUNTS))
 
     @property
@@ -154,28 +105,28 @@ class ComesAgain:
 
     @property
     def repeating(self) -> list[int]:
-        """Indices of the channels of which something comes again."""
+        """Indices of the channels with a repeatable gap."""
         return np.flatnonzero(self.sure.any(axis=1)).tolist()
 
     def parts(self, channel: int) -> list[Part]:
-        """List neighbouring bands in which a gap comes again; all of them where it shows in none alone."""
+        """List neighbouring bands in which a gap is repeatable; all of them where it shows in none alone."""
         sure = self.sure[channel]
         bands = [slice(first + 1, after + 1) for first, after in runs(sure[1:])]
         found = [Part(own, float(self.low[own.stop - 1]), float(self.high[own.start])) for own in bands]
         return found or ([Part(slice(0, 1), float(self.low[0]), float(self.high[0]))] if sure[0] else [])
 
     def share_in(self, channel: int, part: Part) -> float:
-        """Compute the share of a gap that comes again in some bands together."""
-        return float(np.nansum(self.again[channel, part.bands]) / np.nansum(self.total[channel, part.bands]))
+        """Compute the repeatable share of a gap in some bands together."""
+        return float(np.nansum(self.repeatable[channel, part.bands]) / np.nansum(self.total[channel, part.bands]))
 
     def at_most(self, channel: int) -> float:
-        """Bound the share of all of a gap that may come again, by 95 %; products that cancel are taken for none."""
+        """Bound the repeatable share of all of a gap, by 95 %; products that cancel are taken for none."""
         bound = np.maximum(self.share[channel, 0], 0.0) + self.share_half[channel, 0]
         return float(np.clip(np.nan_to_num(bound), 0.0, 1.0))
 
     @property
     def largest(self) -> tuple[float, int, Part] | None:
-        """Largest share of a gap that comes again in a part, with its channel; None where none surely does."""
+        """Largest repeatable share of a gap in a part, with its channel; None where none surely is."""
         pairs = [(channel, part) for channel in self.repeating for part in self.parts(channel)]
         found = [(self.share_in(*pair), *pair) for pair in pairs]
         return max(found, key=lambda each: each[0], default=None)
@@ -185,18 +136,18 @@ class ComesAgain:
         explained = self.explained[channel, part.bands]
         return (float(explained.min()), float(explained.max())) if (explained > COUNTS).all() else None
 
-    def kept_of(self, before: ComesAgain, channel: int, part: Part) -> float:
-        """Compute the share that is left of what came again in a part before effects."""
-        left, came = (np.nansum(each.again[channel, part.bands]) for each in (self, before))
-        return float(np.clip(left / came, 0.0, 1.0))
+    def kept_of(self, before: Repeatability, channel: int, part: Part) -> float:
+        """Compute the share of the repeatable gap in a part that effects do not explain."""
+        after, given = (np.nansum(each.repeatable[channel, part.bands]) for each in (self, before))
+        return float(np.clip(after / given, 0.0, 1.0))
 
-    def left_of(self, before: ComesAgain) -> dict[int, float]:
-        """Give by channel the largest share that is left of what came again before; infinite where none came."""
+    def unexplained_of(self, before: Repeatability) -> dict[int, float]:
+        """Give by channel the largest share of the repeatable gap that effects leave; infinite where there was none."""
         shares = {}
         for channel in self.repeating:
             bands = [part.bands for part in self.parts(channel)]
-            came, left = ([float(np.nansum(each.again[channel, own])) for own in bands] for each in (before, self))
-            shares[channel] = max(now / then if then > 0 else np.inf for then, now in zip(came, left, strict=True))
+            pairs = [[float(np.nansum(each.repeatable[channel, own])) for each in (before, self)] for own in bands]
+            shares[channel] = max(now / then if then > 0 else np.inf for then, now in pairs)
         return shares
 
     @property
@@ -211,19 +162,19 @@ class ComesAgain:
 
     @property
     def nothing(self) -> bool:
-        """Whether it is known that nothing of a gap comes again but a part that does not matter."""
+        """Whether it is known that no part of a gap that matters is repeatable."""
         return not self.repeating and self.most <= OPEN
 
     @property
     def most(self) -> float:
-        """Largest share of the gap of a channel that may come again."""
+        """Upper bound of the repeatable share over the channels."""
         return max((self.at_most(channel) for channel in self.known), default=0.0)
 
     @property
-    def does_not(self) -> Array:
-        """Root mean square of what is neither again nor noise of the sensors, rad/s^2 and m/s^2, shape (channel,)."""
+    def non_repeatable(self) -> Array:
+        """Root mean square of what is neither repeatable nor sensor noise, rad/s^2 and m/s^2, shape (channel,)."""
         noise = np.nan_to_num(self.noise[:, 0])
-        rest = self.total[:, 0] - np.clip(self.again[:, 0], 0.0, None) - noise
+        rest = self.total[:, 0] - np.clip(self.repeatable[:, 0], 0.0, None) - noise
         return np.asarray(np.sqrt(np.clip(rest, 0.0, None)) / self.resists)
 
     @property
@@ -238,49 +189,34 @@ class ComesAgain:
             "gap": np.sqrt(self.total),
             "share": self.share,
             "share_half_width": self.share_half,
-            "comes_again": self.sure,
+            "repeatable": self.sure,
             "noise": np.sqrt(self.noise),
             "explained": self.explained,
         }
         return {
-            CHANNELS[index]: {key: each[index] for key, each in values.items()} | {"does_not": self.does_not[index]}
+            CHANNELS[index]: {key: each[index] for key, each in values.items()}
+            | {"non_repeatable": self.non_repeatable[index]}
             for index in self.known
         }
 
 
 @dataclass(frozen=True)
 class RepeatedRuns:
-    """Runs of flights that repeat each other, and which of them are held against which.
+    """Runs of flights that repeat each other, and which of them are compared with which."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the flights.
-    pairs : tuple of (int, int)
-        Numbers of runs.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Of the flights.
     given: Instruments
-    pairs: tuple[tuple[int, int], ...]
+    pairs: tuple[tuple[int, int], ...]  # Numbers of runs.
     bands: tuple[Band, ...]
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], unseen: int = 0) -> Self | None:
         """Find the runs of a path among flights.
 
-        Parameters
-        ----------
-        recordings : sequence of Recording
-            Of one sampling period.
-        unseen : int
-            How many of them, the last ones, no fit has seen: only pairs with one of these are taken, where there are
-            any.
-
-        Returns
-        -------
-        RepeatedRuns or None
-            None where no flight repeats another.
+        `recordings`: of one sampling period.
+        `unseen`: how many of them, the last ones, no fit has seen: only pairs with one of these are taken, where there
+        are any.
+        None where no flight repeats another.
         """
         different = list(without_copies(recordings))
         flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
@@ -299,36 +235,25 @@ class RepeatedRuns:
             return None
         return cls(tuple(each.name for each in recordings), given, tuple(judged or pairs), bands)
 
-    def split(self, hypothesis: System, linear: Array) -> ComesAgain | None:
-        """Split what a model leaves of the balance into what comes again and what does not.
+    def split(self, hypothesis: System, linear: Array) -> Repeatability | None:
+        """Split the residual of the balance into its repeatable part and the rest.
 
-        Parameters
-        ----------
-        hypothesis : System
-            Of the flights that the runs are of.
-        linear : array, shape (column,)
-            Coefficients of its base.
-
-        Returns
-        -------
-        ComesAgain or None
-            None where the path is too short to tell an error.
-
-        References
-        ----------
-        Pintelon and Schoukens 2012 (repeated excitation); Efron and Tibshirani 1993, chapter 11 (jackknife).
+        `hypothesis`: of the flights that the runs are of.
+        `linear`, shape (column,): coefficients of its base.
+        None where the path is too short for an error.
+        Reference: Pintelon and Schoukens 2012 (repeated excitation); Efron and Tibshirani 1993, chapter 11 (jackknife).
         """
         flights = hypothesis.flights
-        sides = [_sides(left_over(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
+        sides = [_sides(residual_along(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
         found = [self._of_band(band.windows, sides) for band in self.bands]
         blocks = np.array([len(of_band) for of_band in found])
         if blocks[0] < FEWEST_BLOCKS:
             return None
         known = np.all([flight.known for flight in flights], axis=0)[:, None] & (blocks >= FEWEST_BLOCKS)
         values, errors = np.where(known, np.stack([_with_errors(of_band) for of_band in found], axis=-1), np.nan)
-        total, again, taken, *_ = values
+        total, repeatable, motion, *_ = values
         body = flights[0].signals.vehicle
-        return ComesAgain(
+        return Repeatability(
             low=np.array([band.low for band in self.bands]),
             high=np.array([band.high for band in self.bands]),
             noise=np.where(known, self._noise(flights, sides), np.nan),
@@ -338,15 +263,15 @@ class RepeatedRuns:
             runs=len(self.used),
             blocks=blocks,
             total=total,
-            again=again,
-            taken=taken,
+            repeatable=repeatable,
+            motion=motion,
             share_error=errors[3],
             explained_error=errors[4],
         )
 
     @property
     def used(self) -> tuple[int, ...]:
-        """Numbers of the runs that are held against others."""
+        """Numbers of the runs that are compared with others."""
         return tuple(sorted({number for pair in self.pairs for number in pair}))
 
     def _of_band(self, band: Windows, sides: Sequence[Array]) -> Array:
@@ -362,7 +287,7 @@ class RepeatedRuns:
             # Too short a run has no window.
             if not len(middles):
                 continue
-            mine, theirs = _laid(band, cut[number]), _laid(band, repeats.at(number, other, cut[other]))
+            mine, theirs = _averaged(band, cut[number]), _averaged(band, repeats.at(number, other, cut[other]))
             known = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middles])
             block = np.where(known, place[middles] // length, -1)
             for each in np.unique(block[known]):
@@ -371,35 +296,33 @@ class RepeatedRuns:
         return np.array(list(found.values())).reshape(-1, 4, 6)
 
     def _noise(self, flights: Sequence[WeakFlight], sides: Sequence[Array]) -> Array:
-        """Estimate the mean squares that white noise leaves of a gap, shape (6, band); NaN behind a filter."""
+        """Estimate the mean squares of a gap by white noise, shape (6, band); NaN behind a filter."""
         numbers = sorted({self.given.runs[number].flight for number in self.used})
         bands = [band.windows.alternating() for band in self.bands]
-        squares = [[np.mean(_laid(band, sides[number])[:, 0] ** 2, axis=0) for band in bands] for number in numbers]
+        squares = [[np.mean(_averaged(band, sides[number])[:, 0] ** 2, axis=0) for band in bands] for number in numbers]
         filtered = np.any([np.isfinite(flights[number].cut_off) for number in numbers], axis=0)
         return np.where(filtered[:, None], np.nan, np.mean(squares, axis=0).T)
 
 
 def _with_errors(sums: Array) -> Array:
-    """Compute shares over all blocks and their standard errors, shapes (block, 4, 6) to (2, 5, 6)."""
-    whole = sums.sum(axis=0)
+    """Compute means and shares over all blocks and their standard errors, shapes (block, 4, 6) to (2, 5, 6)."""
+
+    def ratio(above: Array, below: Array) -> Array:
+        return np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0)
+
+    def shares(sums: Array) -> Array:
+        own, cross, motion, count = np.moveaxis(sums, -2, 0)
+        means = [ratio(each, count) for each in (own, cross, motion)]
+        return np.stack([*means, ratio(cross, own), 1 - ratio(cross, motion)], axis=-2)
+
     if not len(sums):
         return np.full((2, 5, 6), np.nan)
-    return np.array([_shares(whole), jackknife_error(_shares(whole - sums))])
-
-
-def _shares(sums: Array) -> Array:
-    """Compute the means of `ComesAgain` and the shares that follow from sums, shapes (..., 4, 6) to (..., 5, 6)."""
-    own, crossed, taken, count = np.moveaxis(sums, -2, 0)
-    total, again, moved = (_ratio(each, count) for each in (own, crossed, taken))
-    return np.stack([total, again, moved, _ratio(crossed, own), 1 - _ratio(crossed, taken)], axis=-2)
-
-
-def _ratio(above: Array, below: Array) -> Array:
-    return np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0)
+    whole = sums.sum(axis=0)
+    return np.array([shares(whole), jackknife_error(shares(whole - sums))])
 
 
 def without_copies(recordings: Sequence[Recording]) -> Iterator[int]:
-    """Give the numbers of flights without those that are given once more: noise comes again in a copy, too."""
+    """Give the numbers of flights without copies: in a copy noise is repeatable, too."""
     for number, each in enumerate(recordings):
         if not any(np.array_equal(each.signals.body_rate, one.signals.body_rate) for one in recordings[:number]):
             yield number
@@ -417,20 +340,21 @@ def _bands(period: float) -> Iterator[Band]:
         yield Band(band_windows(period, BANDS[-1][1], None), 0.0, BANDS_HZ[-1][0])
 
 
-def _sides(left: Columns, taken: Columns) -> Array:
-    """Arrange what is left and what the motion takes, each as momentum and direct term, shape (time, 2, 2, 6)."""
-    none = np.zeros_like(left.direct)
-    parts = [(none if each.momentum is None else each.momentum, each.direct) for each in (left, taken)]
+def _sides(residual: Columns, motion: Columns) -> Array:
+    """Arrange residual and inertial side, each as momentum and direct term, shape (time, 2, 2, 6)."""
+    none = np.zeros_like(residual.direct)
+    parts = [(none if each.momentum is None else each.momentum, each.direct) for each in (residual, motion)]
     return np.stack([np.stack(each, axis=1) for each in parts], axis=1)
 
 
-def _laid(band: Windows, sides: Array) -> Array:
-    """Lay windows over both sides, shape (window, 2, 6)."""
+def _averaged(band: Windows, sides: Array) -> Array:
+    """Average both sides over windows, shape (window, 2, 6)."""
     return band.derivative(sides[:, :, 0]) + band.average(sides[:, :, 1])
 
 
 def _products(mine: Array, theirs: Array) -> Array:
-    """Sum products over windows: own and crossed ones of what is left, crossed ones of what is taken, and count."""
-    (left, taken), (there, taken_there) = mine.swapaxes(0, 1), theirs.swapaxes(0, 1)
-    count = np.full(left.shape[1], float(len(left)))
-    return np.array([(left**2).sum(axis=0), (left * there).sum(axis=0), (taken * taken_there).sum(axis=0), count])
+    """Sum over windows the squares of a residual, its products with another run's, those of the motion, and count."""
+    (residual, motion), (there, motion_there) = mine.swapaxes(0, 1), theirs.swapaxes(0, 1)
+    count = np.full(residual.shape[1], float(len(residual)))
+    sums = [each.sum(axis=0) for each in (residual**2, residual * there, motion * motion_there)]
+    return np.array([*sums, count])

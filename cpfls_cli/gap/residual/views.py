@@ -1,7 +1,5 @@
 """Views of a residual: its worst stretches of time, its mean over two signals, and its correlation over lags."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
@@ -10,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_closing, uniform_filter1d
 from scipy.special import chdtrc
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.arrays import Array, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
@@ -18,11 +16,9 @@ from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
-_OUTSTANDING_SHARE = 0.1
-"""Of the time is called worst."""
-
+_WORST_SHARE = 0.1  # Of the time is called worst.
 _LONGEST_PAUSE_S = 1.0
-"""With pauses up to this long in it, over which what is left is averaged: a zero crossing makes no gap small."""
+"""With pauses up to this long in it, over which the residual is averaged: a zero crossing makes no gap small."""
 
 
 class GapStretch(NamedTuple):
@@ -43,21 +39,12 @@ def stretches(
     Windows whose root mean square over their neighbours is above the level and among the largest tenth of the channel;
     runs with short pauses between them are one stretch.
 
-    Parameters
-    ----------
-    residual : array, shape (window, 6), floors
-    centres : array, shape (window,), s
-        Middle of each window.
-    flight_index : array of int, shape (window,)
-    level : float
-        Least root mean square, in floors.
-    most : int
-        Largest number per channel.
-
-    Returns
-    -------
-    tuple of GapStretch
-        Largest first.
+    `residual`: shape (window, 6), floors.
+    `centres`, shape (window,), s: middle of each window.
+    `flight_index`: shape (window,).
+    `level`: least root mean square, in floors.
+    `most`: largest number per channel.
+    Result: largest first.
     """
     largest = []
     for channel in range(residual.shape[1]):
@@ -77,19 +64,15 @@ def _of_channel(
         np.sqrt(np.maximum(uniform_filter1d(residual[rows] ** 2, max(1, pause), mode="nearest"), 0.0))
         for rows, pause in zip(flights, pauses, strict=True)
     ]
-    least = max(level, float(np.quantile(np.concatenate(size), 1 - _OUTSTANDING_SHARE)))
+    least = max(level, float(np.quantile(np.concatenate(size), 1 - _WORST_SHARE)))
     for rows, local, hop, pause in zip(flights, size, hops, pauses, strict=True):
-        for run in _runs(local >= least, pause):
-            inside = rows[run]
+        above = local >= least
+        joined = binary_closing(np.pad(above, pause), np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
+        for run in runs(above | joined):
+            inside = rows[slice(*run)]
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
             yield GapStretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
-
-
-def _runs(above: BoolArray, pause: int) -> list[slice]:
-    padded = np.pad(above, pause)
-    joined = above | binary_closing(padded, np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
-    return [slice(*run) for run in runs(joined)]
 
 
 @result
@@ -114,15 +97,9 @@ def heat_map(
     The outer cells also take the half per cent of windows beyond each end of the grid, so that a few windows do not
     stretch it.
 
-    Parameters
-    ----------
-    residual : array, shape (window,)
-        Of the channel.
-    signals : tuple of str
-    states : mapping of str to array, shape (window,)
-        By signal; windows where one is not a number are left out.
-    bins : int
-        Cells along each signal.
+    `residual`, shape (window,): of the channel.
+    `states`, each shape (window,): by signal; windows where one is not a number are left out.
+    `bins`: cells along each signal.
     """
     first, second = (states[name] for name in signals)
     known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
@@ -153,21 +130,11 @@ def _edges(signal: Array, bins: int) -> Array:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Autocorrelation of a residual, and the test whether it is that of noise.
+    """Autocorrelation of a residual, and the test whether it is that of noise."""
 
-    Attributes
-    ----------
-    autocorrelation : array, shape (lag, channel)
-        At lags of 1, 2, ... windows without common samples.
-    p_value : array, shape (channel,)
-        Small where the residual is not noise; 1 for channels that are 0.
-    windows : int
-        Used, over all flights.
-    """
-
-    autocorrelation: Array
-    p_value: Array
-    windows: int
+    autocorrelation: Array  # Shape (lag, channel): at lags of 1, 2, ... windows without common samples.
+    p_value: Array  # Shape (channel,): small where the residual is not noise; 1 for channels that are 0.
+    windows: int  # Used, over all flights.
 
 
 def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: int = 10) -> Whiteness:
@@ -176,18 +143,11 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     ``Q = n (n + 2) sum_k r_k^2 / n_k`` with n_k pairs of windows at lag k, against chi square with as many degrees of
     freedom as lags.
 
-    Parameters
-    ----------
-    residual : array, shape (window, channel)
-    flight_index : array of int, shape (window,)
-    stride : int
-        Windows from one to the next without common samples; 2 at an overlap of a half.
-    lags : int
-        Largest lag; fewer where flights are short.
-
-    References
-    ----------
-    Ljung and Box 1978, equation 1.4.
+    `residual`: shape (window, channel).
+    `flight_index`: shape (window,).
+    `stride`: windows from one to the next without common samples; 2 at an overlap of a half.
+    `lags`: largest lag; fewer where flights are short.
+    Reference: Ljung and Box 1978, equation 1.4.
     """
     flights = [residual[flight_index == number][::stride] for number in np.unique(flight_index)]
     longest = max((len(centred) for centred in flights), default=0)

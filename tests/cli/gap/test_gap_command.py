@@ -150,8 +150,8 @@ def test_people_read_the_verdict_first(again, shifted):
 @pytest.mark.usefixtures("undrawn")
 def test_a_rival_that_could_not_be_tried_is_told_with_the_signal_that_is_missing(cpfls, gap_config, shifted, tmp_path):
     said = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[]").stdout
-    assert "AMBIGUOUS: These flights cannot tell offset of the centre of mass from steady wind." in said
-    assert "To tell steady wind from offset of the centre of mass: log attitude and velocity" in said
+    assert "AMBIGUOUS: These flights cannot separate offset of the centre of mass from steady wind." in said
+    assert "To separate steady wind from offset of the centre of mass: log attitude and velocity" in said
 
 
 def test_nothing_hidden_nothing_named(none):

@@ -56,7 +56,7 @@ def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
     assert (settled["verdict"], [effect["name"] for effect in settled["effects"]]) == ("NAMED", ["com_offset"])
     result = cpfls("trajectory", folder / "study.yaml", "--for", folder / "settled.h5", "-o", folder / "none.h5")
     assert result.exit_code != 0
-    assert "settled.h5: its verdict is NAMED, and it leaves nothing to tell apart" in result.stderr
+    assert "settled.h5: its verdict is NAMED, and it leaves nothing to separate" in result.stderr
     assert not (folder / "none.h5").exists()
 
 

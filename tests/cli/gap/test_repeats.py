@@ -1,4 +1,4 @@
-"""`cpfls gap` on flights that repeat a path in gusts: what comes again leads page, terminal and JSON."""
+"""`cpfls gap` on flights that repeat a path in gusts: the repeatable part leads page, terminal and JSON."""
 
 import json
 from types import SimpleNamespace
@@ -63,27 +63,27 @@ def found(cpfls, tmp_path_factory):
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)
 
 
-def test_what_comes_again_stands_behind_the_verdict(found):
+def test_what_is_repeatable_is_written_after_the_verdict(found):
     (said,) = (line for line in found.stdout.splitlines() if line.startswith("REPEATS: "))
     assert said.startswith("REPEATS: Of the gap in the force along")
-    assert "comes again: the model as given lacks an effect there." in said
-    assert "Torque about x (roll): nothing comes again" in found.stdout
+    assert "is repeatable: the model as given lacks an effect there." in said
+    assert "Torque about x (roll): nothing is repeatable" in found.stdout
     assert "--repeat" not in found.stdout
 
 
 def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_one(found):
-    compared, before = found.summary["disagreement"]["comes_again"], found.summary["comes_again"]["before"]
+    compared, before = found.summary["disagreement"]["repeatability"], found.summary["repeatability"]["before"]
     assert (compared["runs"], compared["paths"], before["runs"]) == (3, 1, 3)
     for told in (compared, before):
         assert told["channels"]["force x"]["share"][0] > 0.7
-        assert all(told["channels"]["force x"]["comes_again"][:5])
-        assert not any(told["channels"]["torque x"]["comes_again"])
+        assert all(told["channels"]["force x"]["repeatable"][:5])
+        assert not any(told["channels"]["torque x"]["repeatable"])
     diagnosed, _ = read(found.folder / "diagnosis.h5", Diagnosis)
-    assert diagnosed.again_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
+    assert diagnosed.repeatability_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
 
 
 def test_the_report_shows_it_in_a_picture(found):
     page = (found.folder / "report.html").read_text()
-    assert "diagnose-1-comes-again" in page
-    assert "compare-1-comes-again" in page
+    assert "diagnose-1-repeatable" in page
+    assert "compare-1-repeatable" in page
     assert page.index("REPEATS") < page.index("band by band")

@@ -131,10 +131,10 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     )
     monkeypatch.undo()
     go_on = "its search was stopped (time limit), go on with `cpfls identify ... --resume`"
-    assert cpfls("check", output).stdout.startswith(f"{output}: keeps to its format (cpfls/model), but {go_on}\n")
+    assert cpfls("check", output).stdout.startswith(f"{output}: keeps to its format (cpfls/identified), but {go_on}\n")
     assert go_on.removeprefix("its search was ") in cpfls("info", output).stdout
     cpfls.done(*words, "-o", output, "--resume", "--time-limit", "2h")
-    assert cpfls("check", output).stdout.startswith(f"{output}: good (cpfls/model)\n")
+    assert cpfls("check", output).stdout.startswith(f"{output}: good (cpfls/identified)\n")
     assert output.read_bytes() == whole.read_bytes()
 
 

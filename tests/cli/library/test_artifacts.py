@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 import cpfls_cli
 from cpfls_cli import store
-from cpfls_cli.commands.formats import formats
 from cpfls_cli.errors import InputError
+from cpfls_cli.stages.info import formats
 from tests.builders.artifacts import edited
 from tests.builders.results import craft, drawn
 

@@ -1,6 +1,7 @@
 """Models beside each other, from artifacts with known numbers."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -254,7 +255,7 @@ def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, 
     assert [line.split()[0] for line in (one, two)] == ["still/vehicle.h5", "gusty/vehicle.h5"]
     assert differ == "differ beyond both intervals: Ixx"
     page = output.read_text(encoding="utf-8")
-    assert '<th scope="col" class="words sentence">Differ</th>' in page
+    assert re.search(r"<th[^>]*>Differ</th>", page)
     assert "still/vehicle.h5" in page
     same = cpfls("report", study, paths[0], "-o", tmp_path / "one.html").stdout.splitlines()
     assert same[-1].startswith("vehicle.h5 ")

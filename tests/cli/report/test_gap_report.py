@@ -67,7 +67,7 @@ def test_the_answer_comes_first_and_every_figure_once(full):
     assert full.summary["missing"] == []
     first = full.text[: full.text.index("why the forces decide")]
     for words in ("NAMED", "What the model misses is offset of the centre of mass.", made.SENTENCE, "97 % is gone",
-                  "Held out two.csv", "Fitted to one.csv"):  # fmt: skip
+                  "Held out : two.csv", "Fitted to : one.csv"):  # fmt: skip
         assert words in first, words
     assert "Where simulation and flight disagree" in full.text
     assert "No model was given" not in full.text
@@ -121,7 +121,7 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
     assert page.summary["missing"] == ["disagreement", "extended"]
     assert "too short to simulate" in page.text
     assert "cpfls compare CONFIG FLIGHT" in page.text
-    assert "force along" not in page.text[: page.text.index("effects and their numbers")]
+    assert "force along" not in page.text[: page.text.index("effects and their coefficients")]
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -6,11 +6,10 @@ from unittest.mock import patch
 
 import pytest
 
-from cpfls_cli.commands.report import read_sources
 from cpfls_cli.files import read_content
 from cpfls_cli.report.content import Table, Text, unfolded
-from cpfls_cli.report.outcome import as_json
 from cpfls_cli.result import plain
+from cpfls_cli.stages.report import read_sources
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("model", "sweep")
@@ -70,6 +69,6 @@ def test_the_report_says_what_the_command_says(answered, name):
 @pytest.mark.parametrize("name", FROM_COMMANDS)
 def test_what_json_prints_is_the_summary_of_the_record(told, name):
     """A command adds what is no fact of the record, such as how long it took."""
-    printed, summary = as_json(told[name].outcome.summary), plain(told[name].source.record)
+    printed, summary = plain(told[name].outcome.summary), plain(told[name].source.record)
     known = {key: value for key, value in summary.items() if value is not None}
     assert known == {key: printed.get(key) for key in known}

@@ -94,9 +94,9 @@ def test_a_single_effect_is_shown(cpfls, config, tmp_path):
     [
         (("--to-tell", "com_ofset,torque_bias"), "did you mean com_offset?"),
         (("--to-tell", "com_offset,gyro_bias"), "gyro_bias is a sensor fault"),
-        (("--to-tell", "motor_lag,channel_delay"), "no single flight tells them apart"),
-        (("--to-tell", "parameter_error"), "to_tell = [parameter_error]: nothing to tell"),
-        (("--to-tell", ""), "nothing to tell; name effects with --to-tell A,B"),
+        (("--to-tell", "motor_lag,channel_delay"), "no single flight separates them"),
+        (("--to-tell", "parameter_error"), "to_tell = [parameter_error]: nothing to separate"),
+        (("--to-tell", ""), "nothing to separate; name effects with --to-tell A,B"),
         ((*PAIR, "--box", "0.4,4,3"), "trajectory.next_flight.box_m = [0.4, 4.0, 3.0]"),
         ((*PAIR, "--box", "4,4,9"), "would reach into the ground; raise it to 4.5"),
         ((*PAIR, "--box", "4,4"), "trajectory.next_flight.box_m"),

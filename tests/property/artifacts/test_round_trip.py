@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, InputFile
-from cpfls_cli.commands.formats import formats
+from cpfls_cli.stages.info import formats
 from tests.builders.results import drawn
 
 names = st.text("abcdefghijklmnopqrstuvwxyz.-_ ", min_size=1, max_size=12)

@@ -54,7 +54,8 @@ def hostile(*texts):
 
 plain = c_source(hostile(*["x"] * 6), "vehicle")
 plain_python = ast.parse(python_source(hostile(*["x"] * 6), "x", "jax")).body
-texts = st.tuples(*[nasty] * 6)
+# Why a search stopped is said only of one that did.
+texts = st.tuples(*[nasty] * 5, nasty.filter(bool))
 few = settings(max_examples=25, deadline=None)
 
 

@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, forward_selection, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, forward_selection, in_place_of
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
@@ -181,7 +181,9 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
     (moved,) = refined(flights, [low], step.floor).chosen
     own, *ranking = in_place_of(moved, step)
-    pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
+    pairs = {
+        frozenset((rival.name, rival.jointly_with)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)
+    }
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 
@@ -204,7 +206,7 @@ def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
 
 def chances(flights, chosen):
     effects, together = [CATALOGUE[each] for each in STILL], system(flights, chosen)
-    return [chance_beside_its_like(together, index, effects, SETTINGS) for index in range(len(chosen))]
+    return [chance_given_actuation(together, index, effects, SETTINGS) for index in range(len(chosen))]
 
 
 @pytest.mark.parametrize(

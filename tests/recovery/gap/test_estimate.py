@@ -10,7 +10,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
 from cpfls_cli.gap.naming.estimate import estimates, fitted
-from cpfls_cli.gap.naming.leftover import beside_the_unnamed
+from cpfls_cli.gap.naming.open_questions import with_unnamed
 from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
@@ -242,7 +242,7 @@ def widened(hidden, named):
     effects = [CATALOGUE[name] for name in ("rotor_drag", "parasitic_drag", "inflow", "com_offset", "torque_bias")]
     last = rank_effects(flights, [named], effects, SETTINGS, np.random.default_rng(0))
     found = fitted(flights, [named], last.floor, SETTINGS)
-    return found, beside_the_unnamed(found, last, effects, np.random.default_rng(0))
+    return found, with_unnamed(found, last, effects, np.random.default_rng(0))
 
 
 def test_intervals_leave_room_for_what_is_too_small_for_a_name():

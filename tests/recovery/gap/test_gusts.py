@@ -72,7 +72,7 @@ def in_what_is_left(recordings):
 def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoints):
     run = diagnosed(recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints))
     assert run.air is not None
-    assert run.air.told[:3].all()
+    assert run.air.gusts_only[:3].all()
     tells_sizes(run.air.found)
     assert run.diagnosis.verdict is GapVerdict.NAMED
     (effect,) = run.diagnosis.effects
@@ -117,7 +117,7 @@ def test_gusts_alone_are_no_gap(flown, setpoints, told_by):
     assert run.diagnosis.verdict is GapVerdict.NO_GAP
     assert run.air is not None
     assert run.air.found.told_by == told_by
-    assert run.air.told.all()
+    assert run.air.gusts_only.all()
     tells_sizes(run.air.found)
 
 
@@ -126,7 +126,7 @@ def test_gusts_alone_are_no_gap(flown, setpoints, told_by):
 def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setpoints):
     known = recorded(flown[kind], TRUE.vehicle, setpoints=setpoints)
     found = in_what_is_left([replace(each, signals=replace(each.signals, velocity=None)) for each in known])
-    assert found.told.tolist() == [True] * 3 + [False] * 3
+    assert found.gusts_only.tolist() == [True] * 3 + [False] * 3
     tells_sizes(found.found)
     assert np.isnan(found.found.size[3:]).all()
 
@@ -137,7 +137,7 @@ def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypa
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
     found = in_what_is_left(recordings)
     assert found.found.told_by == "past"
-    assert found.told.all()
+    assert found.gusts_only.all()
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
     assert diagnosed(recordings).air is None
 
@@ -152,7 +152,7 @@ def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, m
     monkeypatch.setattr("cpfls_cli.gap.residual.air.gusts_in", without_pitch)
     found = in_what_is_left(recorded(flown["again"], TRUE.vehicle, setpoints=False))
     assert found.found.told_by == "repeats"
-    assert found.told.all()
+    assert found.gusts_only.all()
     assert found.split.all()
     tells_sizes(found.found)
 
@@ -161,7 +161,7 @@ def test_what_does_not_come_again_is_noise_beside_what_does(flown):
     # Half of the inertia is missed about x, which comes again; nothing is about the other axes.
     vehicle = replace(TRUE.vehicle, inertia_kg_m2=(2 * INERTIA[0], *INERTIA[1:]))
     found = in_what_is_left(recorded(flown["again"], vehicle, setpoints=False))
-    assert found.told[:3].tolist() == [False, True, True]
+    assert found.gusts_only[:3].tolist() == [False, True, True]
     assert found.split[:3].all()
     assert 0.5 < found.found.size[0] / INERTIA[0] / GUSTS[0] < 2.0
 
@@ -172,7 +172,7 @@ def test_what_stands_above_the_gusts_is_none_of_them(flown, monkeypatch, offset_
     moved = tuple(replace(each, position_m=(each.position_m[0] + offset_m, *each.position_m[1:])) for each in rotors)
     recordings = recorded(flown["asked"], replace(TRUE.vehicle, rotors=moved), setpoints=True)
     # As if instruments told nothing.
-    monkeypatch.setattr("cpfls_cli.gap.diagnose.that_stand", lambda *_: [])
+    monkeypatch.setattr("cpfls_cli.gap.diagnose.significant_effects", lambda *_: [])
     names = [effect.name for effect in diagnosed(recordings).diagnosis.effects]
     assert names == (["com_offset"] if stands else [])
 
@@ -186,7 +186,7 @@ def test_a_copy_of_a_flight_repeats_none(flown):
 
 def test_what_the_vehicle_does_is_not_called_gusts_where_nothing_was_asked(flown):
     found = in_what_is_left(recorded(flown["calm"], TRUE.vehicle, setpoints=False))
-    assert not found.told.any()
+    assert not found.gusts_only.any()
     assert np.isnan(found.found.size).all()
     assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
 
@@ -195,5 +195,5 @@ def test_what_the_vehicle_does_is_not_called_gusts_where_nothing_was_asked(flown
 def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
     found = in_what_is_left(recorded(flown[kind], TRUE.vehicle, setpoints=True))
     # In gusts four fifths of what is left are theirs.
-    assert found.told[:2].tolist() == turning
+    assert found.gusts_only[:2].tolist() == turning
     assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])

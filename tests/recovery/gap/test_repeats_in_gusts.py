@@ -44,11 +44,13 @@ def split(flown):
     return RepeatedRuns.of(recordings).split(model.system(flights), model.linear)
 
 
-def test_the_share_that_comes_again_is_that_of_the_effects(found):
+def test_the_repeatable_share_is_that_of_the_effects(found):
     """In still air all of the gap is theirs; in gusts the same comes again, beside what does not."""
     gusty, calm = found["gusts"], found["calm"]
-    rest = gusty.total - gusty.again
-    off = np.abs(gusty.share - calm.again / (calm.again + rest))[[0, 1, 3, 4]] / gusty.share_half[[0, 1, 3, 4]]
+    rest = gusty.total - gusty.repeatable
+    off = (
+        np.abs(gusty.share - calm.repeatable / (calm.repeatable + rest))[[0, 1, 3, 4]] / gusty.share_half[[0, 1, 3, 4]]
+    )
     # Of two dozen intervals of 95 % some do not hold the truth.
     assert (off < 1).mean() > 0.8
     assert (off < 2).all()
@@ -71,4 +73,4 @@ def test_gusts_alone_do_not_come_again_and_have_their_size(found, name):
     alone = found[name]
     assert alone.repeating == []
     assert max(alone.at_most(channel) for channel in range(6)) < 0.3
-    assert alone.does_not[:3] == pytest.approx(np.array(SETS[name][1]), rel=0.2)
+    assert alone.non_repeatable[:3] == pytest.approx(np.array(SETS[name][1]), rel=0.2)

@@ -62,7 +62,7 @@ def test_a_constant_torque_is_no_reason_for_a_fuzzy_inertia():
     found, verdict = judged(training, {"other": other})
     assert compare_torque(other, found.model.torque, found.baselines[0].torque).lower
     assert verdict.label == "not-better-than-rigid-body"
-    assert sum("a constant torque of" in text for text in verdict.reason) == 3
+    assert sum("a constant torque of" in text for text, _ in verdict.reasons) == 3
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -72,7 +72,7 @@ def test_all_parts_are_judged_in_whatever_order(order):
     assert judged(training, {"bent": parts["bent"]})[1].label == "good-inside-region"
     _, verdict = judged(training, dict(list(parts.items())[::order]))
     assert verdict.label == "not-better-than-rigid-body"
-    compared = [text for text in verdict.reason if text.startswith("squared error")]
+    compared = [text for text, _ in verdict.reasons if text.startswith("squared error")]
     assert sum("(bent)" in text for text in compared) == 2
     assert sum("(rigid)" in text for text in compared) == 2
 
@@ -82,7 +82,7 @@ def test_a_short_part_with_coloured_noise_proves_nothing(seed):
     training = flight_of_sines(rigid, seed, 0.2, memory=20)
     _, verdict = judged(training, {"other": flight_of_sines(rigid, seed + 50, 0.2, memory=20)[500:540]})
     assert verdict.label in ("not-better-than-rigid-body", "do-not-use")
-    assert not any("by more than chance over" in text for text in verdict.reason)
+    assert not any("by more than chance over" in text for text, _ in verdict.reasons)
 
 
 def test_a_short_part_of_a_bent_vehicle_proves_nothing_either():

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_t, norm
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, _Space, changed, drawn_by_chance
 from cpfls_cli.changes.numbers import UnsureRatio
-from cpfls_cli.changes.reference import Reference, kinds_of, load_directions, usual_covariance
+from cpfls_cli.changes.reference import Reference, kinds_of, thrust_directions, usual_covariance
 from cpfls_cli.stages.changed import flown_unlike
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
@@ -26,8 +26,8 @@ QUAD = VehicleSettings(
         for x, y, spin in ((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1))
     ),
 )
-LOADS = [f"load M{index}" for index in range(1, 5)]
-NAMES = [*LOADS, *(f"vibration gyroscope {axis}" for axis in "xyz"), "late roll", "late pitch", "late yaw"]
+LOADS = [f"thrust M{index}" for index in range(1, 5)]
+NAMES = [*LOADS, *(f"vibration gyroscope {axis}" for axis in "xyz"), "delay roll", "delay pitch", "delay yaw"]
 
 
 def hover(vehicle, weight, torque=(0.0, 0.0, 0.0), effective=1.0):
@@ -38,7 +38,7 @@ def hover(vehicle, weight, torque=(0.0, 0.0, 0.0), effective=1.0):
 @pytest.mark.parametrize("what", ["rotor", "mass", "x", "y", "yaw"])
 def test_directions_of_loads(what):
     """A hover of the changed vehicle, solved, against the first order of its loads."""
-    directions, weight, size = load_directions(QUAD), 1.2 * 9.81, 1e-5
+    directions, weight, size = thrust_directions(QUAD), 1.2 * 9.81, 1e-5
     before = hover(QUAD, weight)
     if what == "rotor":
         after, expected = hover(QUAD, weight, effective=[1.0, 1.0, 1.0 - size, 1.0]), directions.rotor[2]
@@ -55,7 +55,7 @@ def test_directions_of_loads(what):
     assert np.log(after / before) / size == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
-def space(listed, freedom=6.0, kinds=("load",) * 3):
+def space(listed, freedom=6.0, kinds=("thrust",) * 3):
     rng, size = np.random.default_rng(2), len(kinds)
     root = rng.normal(size=(size, size))
     covariance = (root @ root.T + np.eye(size)) * (np.array(kinds) == np.array(kinds)[:, None])
@@ -63,7 +63,7 @@ def space(listed, freedom=6.0, kinds=("load",) * 3):
 
 
 def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
-    own, covariance = space([], kinds=["load"] * 3 + ["late"] * 2)
+    own, covariance = space([], kinds=["thrust"] * 3 + ["delay"] * 2)
     rows = np.random.default_rng(1).normal(size=(5, 5)) * np.linspace(0.2, 3.0, 5)[:, None]
     told = own._density(own.whitened(rows.T), np.zeros((5, 0)), np.arange(0), {})
     expected = sum(
@@ -76,7 +76,7 @@ def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
 def test_quiet_numbers_of_another_kind_tell_nothing_of_a_change():
     """That what vibrates is as ever does not make a load surer, unless the change makes it vibrate as well."""
     direction = np.array([1.0, 0.5, 0.0, 0.0, 0.0])
-    kinds = ["load"] * 3 + ["late"] * 2
+    kinds = ["thrust"] * 3 + ["delay"] * 2
     ways = [direction, direction + np.array([0.0, 0.0, 0.0, 0.0, 0.7])]
     own, _ = space([Cause("rotor M1", way[:, None], 0.1, "1") for way in ways], kinds=kinds)
     rows = np.array([[4.0, 2.0, 1.0, 0.0, 0.0], [4.0, 2.0, 1.0, 1.5, -2.0]]).T
@@ -146,7 +146,7 @@ def test_unchanged_flights_seldom_look_changed():
     [
         ("rotor M3", -np.log(0.7) * np.eye(10)[2], 0.3),
         ("hover", np.log(1.3) * (np.arange(10) < 4), 0.3),
-        ("late", 0.04 * (np.arange(10) > 6), 0.04),
+        ("delay", 0.04 * (np.arange(10) > 6), 0.04),
         ("vibration", 2.5 * ((np.arange(10) > 3) & (np.arange(10) < 7)), 2.5),
     ],
 )
@@ -174,7 +174,7 @@ def test_two_rotors_at_once_are_no_third_change():
 def test_a_mass_at_a_place_by_a_hover_that_is_solved():
     """It adds to the weight, moves the centre of mass, and is turned about it, by the same number."""
     size, place = 1e-5, ARM * np.array([-1.0, 1.0])
-    names = [*LOADS, "follow roll", "follow pitch"]
+    names = [*LOADS, "gain roll", "gain pitch"]
     weight, in_wash = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
     weak = next(cause for cause in causes(names, QUAD) if cause.name == "rotor M3")
     moved = np.append(size * place, 0.0)
@@ -241,7 +241,7 @@ def test_less_voltage_asks_for_more():
 def test_speeds_and_commands_are_not_compared():
     rng = np.random.default_rng(9)
     before, today = flights(4, rng), [replace(flight, commanded=False) for flight in flights(1, rng)]
-    assert not [each for each in changed(today, before, QUAD, rng).numbers if each.name.startswith("load ")]
+    assert not [each for each in changed(today, before, QUAD, rng).numbers if each.name.startswith("thrust ")]
 
 
 def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
@@ -261,7 +261,7 @@ def flown(count, rng, agility):
     made = flights(count, rng)
     sooner = -0.03 * np.log(1 + agility)
     return [
-        having(flight, {name: x + less * name.startswith("late") for name, x in flight.values.items()}, agility=each)
+        having(flight, {name: x + less * name.startswith("delay") for name, x in flight.values.items()}, agility=each)
         for flight, each, less in zip(made, agility, sooner, strict=True)
     ]
 
@@ -276,7 +276,7 @@ def test_flights_that_are_flown_otherwise_are_no_change():
     assert changed([replace(today[0], agility=0.5)], alike, QUAD, rng).p <= FALSE_ALARM
     of_many = changed(today, many, QUAD, rng)
     assert of_many.p > 0.05
-    assert smallest(of_many)["late"] < 0.7 * smallest(changed(today, alike, QUAD, rng))["late"]
+    assert smallest(of_many)["delay"] < 0.7 * smallest(changed(today, alike, QUAD, rng))["delay"]
 
 
 def test_flights_that_are_flown_otherwise_are_said_to_be():
@@ -284,7 +284,7 @@ def test_flights_that_are_flown_otherwise_are_said_to_be():
     before, today = flown(5, rng, np.linspace(0.4, 0.6, 5)), flown(1, rng, np.array([3.0]))
     (words,) = flown_unlike(changed(today, before, QUAD, rng), today, before, QUAD)
     assert words.startswith("flown unlike the reference: with accelerations of 3 m/s^2 (root mean square), those of")
-    assert "late count" in words
+    assert "delay count" in words
     assert not [*flown_unlike(changed(before[:1], before[1:], QUAD, rng), before[:1], before[1:], QUAD)]
 
 
@@ -324,20 +324,20 @@ def test_a_larger_change_does_not_count_less():
 def test_a_ratio_that_is_reversed_today_is_a_change_and_one_that_is_missing_is_not():
     rng = np.random.default_rng(18)
     before, (today,) = flights(4, rng), flights(1, rng)
-    left = {name: value for name, value in today.values.items() if name != "late yaw"}
+    left = {name: value for name, value in today.values.items() if name != "delay yaw"}
     missing = changed([having(today, left)], before, QUAD, rng)
-    assert (missing.changed, missing.missing, missing.reversed) == (False, ("late yaw",), ())
-    turned = changed([having(today, left, reversed=("late yaw",))], before, QUAD, rng)
-    assert (turned.changed, turned.missing, turned.reversed) == (True, (), ("late yaw",))
+    assert (missing.changed, missing.missing, missing.reversed) == (False, ("delay yaw",), ())
+    turned = changed([having(today, left, reversed=("delay yaw",))], before, QUAD, rng)
+    assert (turned.changed, turned.missing, turned.reversed) == (True, (), ("delay yaw",))
 
 
 def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_than_to_the_reference():
     """In a quiet hover a flight tells ratios badly, which is no sign of a gyroscope that is mirrored."""
     rng = np.random.default_rng(19)
     before, (today,) = flights(4, rng), flights(1, rng)
-    usual = float(np.exp(np.mean([flight.values["late yaw"] for flight in before])))
-    left = {name: value for name, value in today.values.items() if name != "late yaw"}
-    for share, expected in ((0.7, ()), (0.3, ("late yaw",)), (-0.1, ("late yaw",))):
-        unsure = having(today, left, unsure=(UnsureRatio(name="late yaw", ratio=share * usual),))
+    usual = float(np.exp(np.mean([flight.values["delay yaw"] for flight in before])))
+    left = {name: value for name, value in today.values.items() if name != "delay yaw"}
+    for share, expected in ((0.7, ()), (0.3, ("delay yaw",)), (-0.1, ("delay yaw",))):
+        unsure = having(today, left, unsure=(UnsureRatio(name="delay yaw", ratio=share * usual),))
         told = changed([unsure], before, QUAD, rng)
-        assert (told.missing, told.undetermined) == (("late yaw",), expected)
+        assert (told.missing, told.undetermined) == (("delay yaw",), expected)

@@ -49,8 +49,8 @@ def test_names_and_noise(usual):
     # Of white noise a parabola through five samples leaves the same share each time.
     of_gyroscope = np.exp([usual.values[f"vibration gyroscope {axis}"] for axis in "xyz"])
     assert of_gyroscope == pytest.approx(np.full(3, 0.01 * np.sqrt(18 / 35)), rel=0.1)
-    assert usual.values["follow roll"] == pytest.approx(0.0, abs=0.05)
-    assert usual.values["late roll"] == pytest.approx(0.0, abs=0.002)
+    assert usual.values["gain roll"] == pytest.approx(0.0, abs=0.05)
+    assert usual.values["delay roll"] == pytest.approx(0.0, abs=0.002)
     assert abs(usual.values["swing"]) < 0.01
     assert np.isnan(usual.voltage)
 
@@ -58,7 +58,7 @@ def test_names_and_noise(usual):
 def test_a_weak_rotor_is_asked_for_more(usual):
     """Of a cross each rotor carries its share alone, but for what its drag turns about z."""
     told = flight_numbers(recorded(weaker(2, 0.2)))
-    more = [told.values[f"load M{index}"] - usual.values[f"load M{index}"] for index in range(1, 5)]
+    more = [told.values[f"thrust M{index}"] - usual.values[f"thrust M{index}"] for index in range(1, 5)]
     # The drag factor stayed: M3 turns faster, so that all others have to hold it.
     assert more[2] > 0.1
     assert int(np.argmax(more)) == 2
@@ -169,7 +169,7 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
             time=time, vehicle=VEHICLE, body_rate=np.stack(columns[:3], axis=1), rotor_speed=speed, commanded=True
         )
         told = flight_numbers(Recording("flight.csv", signals)).values
-        return np.array([told["follow roll"], told["follow pitch"]])
+        return np.array([told["gain roll"], told["gain pitch"]])
 
     less = follows(*WEAK) - follows(1.0, 1.0, 1.0, 1.0)
     assert less == pytest.approx([0.0, np.log(0.9)], abs=0.03)
@@ -199,7 +199,7 @@ def test_how_late_a_rotor_answers():
     told = flight_numbers(
         Recording("flight.h5", replace(signals, rotor_speed=speed, rotor_command=signals.speed))
     ).values
-    assert [told[f"answer M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
+    assert [told[f"lag M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
 
 
 def test_a_gyroscope_of_another_scale(usual):

@@ -9,7 +9,7 @@ from scipy.special import stdtrit
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
 from cpfls_cli.changes.reference import EACH_TEST, Reference, furthest, number_limits
-from cpfls_cli.changes.trend import most_told, trend
+from cpfls_cli.changes.trend import most_complete, trend
 from cpfls_cli.errors import InputError
 from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights, having
 
@@ -70,7 +70,7 @@ def test_a_rotor_is_named_with_its_size():
 def test_a_change_that_is_taken_back_is_two():
     rng = np.random.default_rng(5)
     given = flights(30, rng)
-    moved = {name: 6 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name.startswith("late")}
+    moved = {name: 6 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name.startswith("delay")}
     given[12:20] = [
         having(flight, {name: value + moved.get(name, 0.0) for name, value in flight.values.items()})
         for flight in given[12:20]
@@ -79,7 +79,7 @@ def test_a_change_that_is_taken_back_is_two():
     assert [shift.flight for shift in found.shifts] == [13, 21]
     # A reference that holds a change would tell of no limits.
     assert len(found.reference_flights) == 12
-    late = [any(name.startswith("late") for name in flight.beyond) for flight in found.flights]
+    late = [any(name.startswith("delay") for name in flight.beyond) for flight in found.flights]
     assert any(late[12:20])
     assert not any(late[20:])
 
@@ -91,7 +91,7 @@ def test_a_battery_that_is_used_up_is_no_change():
     given = [
         having(
             flight,
-            {name: x - np.log(each) * name.startswith("load") for name, x in flight.values.items()},
+            {name: x - np.log(each) * name.startswith("thrust") for name, x in flight.values.items()},
             voltage=each,
         )
         for flight, each in zip(flights(20, rng, scatter=0.5), volts.tolist(), strict=True)
@@ -102,13 +102,13 @@ def test_a_battery_that_is_used_up_is_no_change():
 
 def test_numbers_and_flights_that_are_the_most_together():
     given = flights(6, np.random.default_rng(7))
-    few = {name: value for name, value in given[0].values.items() if name.startswith("load")}
-    names, kept = most_told([having(given[0], few), *given[1:]])
+    few = {name: value for name, value in given[0].values.items() if name.startswith("thrust")}
+    names, kept = most_complete([having(given[0], few), *given[1:]])
     assert (names, len(kept)) == (NAMES, 5)
     speeds = [replace(flight, commanded=False) for flight in given[:2]]
-    assert not [name for name in most_told([*speeds, *given[2:]])[0] if name.startswith("load")]
+    assert not [name for name in most_complete([*speeds, *given[2:]])[0] if name.startswith("thrust")]
     with pytest.raises(InputError, match="no number in common"):
-        most_told([having(given[0], {})])
+        most_complete([having(given[0], {})])
 
 
 def test_too_few_flights_are_refused():
@@ -128,7 +128,7 @@ def test_the_reference_that_is_asked_for_is_taken():
 def test_a_single_flight_beyond_its_limits_is_no_green_answer():
     """One flight of thirty that is off by itself, in a direction that is no known change, and that ends again."""
     given = flights(30, np.random.default_rng(8))
-    moved = {name: 60 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name == "load M2"}
+    moved = {name: 60 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name == "thrust M2"}
     given[22] = having(given[22], {name: x + moved.get(name, 0.0) for name, x in given[22].values.items()})
     found = trend(given, QUAD, np.random.default_rng(1))
     assert found.p <= FALSE_ALARM
@@ -138,11 +138,11 @@ def test_a_single_flight_beyond_its_limits_is_no_green_answer():
 
 def test_a_flight_that_has_a_ratio_reversed_is_a_change():
     given = flights(12, np.random.default_rng(9))
-    left = {name: value for name, value in given[9].values.items() if name != "late yaw"}
-    given[9] = having(given[9], left, reversed=("late yaw",))
+    left = {name: value for name, value in given[9].values.items() if name != "delay yaw"}
+    given[9] = having(given[9], left, reversed=("delay yaw",))
     found = trend(given, QUAD, np.random.default_rng(1))
     assert found.left_out == ("flight10",)
-    assert found.reversed == ("flight10: late yaw reversed, or nothing",)
+    assert found.reversed == ("flight10: delay yaw reversed, or nothing",)
 
 
 def test_the_probability_and_the_limit_are_one_rule():

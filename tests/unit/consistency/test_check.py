@@ -95,10 +95,7 @@ FAULTS = {
         "the velocity has y, x, z where x, y, z should be",
     ),
     "velocity down": (lambda s: replace(s, velocity=s.velocity * UP_IS_DOWN), "the velocity has x, y, -z"),
-    "position in mm": (
-        lambda s: replace(s, position=1e3 * s.position),
-        ": is the position in mm",
-    ),
+    "position in mm": (lambda s: replace(s, position=1e3 * s.position), ": is the position in mm"),
     "acceleration in g": (lambda s: replace(s, acceleration=s.acceleration / 9.80665), "the acceleration is in g"),
     "world down": (upside_down, "along z, the thrust of the rotors is opposite to"),
     "world down, thrust unknown": (lambda s: upside_down(guessed(s, 30.0)), "opposite to velocity"),

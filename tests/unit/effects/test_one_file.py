@@ -15,7 +15,7 @@ ELSEWHERE = [path for path in sorted(PACKAGE.rglob("*.py")) if "catalogue" not i
 
 # Help for people, which may give an example: nothing is decided by it.
 MENTIONS = {
-    ("cli/app.py", "rotor_drag"),
+    ("stages/effects.py", "rotor_drag"),
     ("simulation/settings.py", "motor_lag"),
     ("simulation/settings.py", "battery_sag"),
 }

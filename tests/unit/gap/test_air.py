@@ -31,7 +31,7 @@ def averages(seconds, draws):
 def air():
     found = SimpleNamespace(size=np.full(6, SIZE), memory=np.full(6, MEMORY), noise=np.zeros((6, 2)))
     split = np.arange(6) < 3
-    return Air(found, told=np.zeros(6, dtype=bool), split=split)
+    return Air(found, gusts_only=np.zeros(6, dtype=bool), split=split)
 
 
 def test_the_floor_of_the_flights_that_gusts_were_found_in_is_their_size(air):

@@ -37,12 +37,7 @@ def test_a_damping_beyond_all_bodies_is_refused():
 
 @pytest.mark.parametrize(
     ("drag", "wind", "error", "admissible"),
-    [
-        (1.3e-3, 8.0, 1e-9, True),
-        (1.3e-3, 20.0, 1e-9, False),
-        (1.3e-3, 20.0, 5e-3, True),
-        (-1.3e-3, 8.0, 1e-9, False),
-    ],
+    [(1.3e-3, 8.0, 1e-9, True), (1.3e-3, 20.0, 1e-9, False), (1.3e-3, 20.0, 5e-3, True), (-1.3e-3, 8.0, 1e-9, False)],
     ids=["usual", "storm", "storm not sure", "drag that pushes"],
 )
 def test_wind_is_bounded_by_its_speed_not_by_its_column(drag, wind, error, admissible):

@@ -9,7 +9,7 @@ from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.drawn_numbers import flight_of
 
-LOADS = [f"load M{index}" for index in range(1, 5)]
+LOADS = [f"thrust M{index}" for index in range(1, 5)]
 GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
 
 

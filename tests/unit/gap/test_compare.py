@@ -190,22 +190,22 @@ def rerun(draw, extra=None):
     return Recording(f"run {draw}", replace(recording.signals, body_rate=noisy))
 
 
-def test_what_comes_again_is_gone_with_the_effect():
+def test_what_is_repeatable_is_gone_with_the_effect():
     """Judged on pairs with the held-out run; about all axes the damping of 0.12 comes again, and then only noise."""
     training, held = [rerun(0, damping), rerun(1, damping)], [rerun(2, damping)]
     compared_runs = compared([*training, *held])
-    assert (compared_runs.comes_again.share[:3, 0] > 0.7).all()
+    assert (compared_runs.repeatability.share[:3, 0] > 0.7).all()
     found = extend(training, held, [named("linear_damping")], compared_runs.audit, SETTINGS, None)
     shown = before_after(training, held, found.unseen, found.model, SETTINGS)
-    before, after = shown.again_before, shown.again_after
-    assert before.again[:3, 0] == pytest.approx(compared_runs.comes_again.again[:3, 0], rel=0.05)
-    assert (np.abs(after.again[:3, 0]) < 0.02 * before.again[:3, 0]).all()
+    before, after = shown.repeatability_before, shown.repeatability_after
+    assert before.repeatable[:3, 0] == pytest.approx(compared_runs.repeatability.repeatable[:3, 0], rel=0.05)
+    assert (np.abs(after.repeatable[:3, 0]) < 0.02 * before.repeatable[:3, 0]).all()
     assert (after.explained[:3, 2] > 0.99).all()
 
 
 def test_other_paths_are_not_split():
     found = compared([recording_of_sines(1, damping), recording_of_sines(2, damping)])
-    assert found.comes_again is None
+    assert found.repeatability is None
 
 
 def test_extension_that_does_not_help_is_refused():

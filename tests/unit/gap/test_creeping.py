@@ -24,7 +24,7 @@ class Ridge:
         step = abs(values[0] - self.shape_values[0])
         return Ridge(values[0], self.squares - 0.02 if step < 1 else 2e4, self.tried)
 
-    def left(self, _linear):
+    def residual_at(self, _linear):
         return np.array([[np.sqrt(self.squares)]])
 
 
@@ -32,7 +32,7 @@ def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
     asked = SimpleNamespace(solve=lambda: np.array([1000.0]), root=(np.eye(1), np.array([30.0])))
     monkeypatch.setattr(refine, "_exact", lambda hypothesis, _weight: hypothesis)
     monkeypatch.setattr(refine, "system", lambda _flights: SimpleNamespace(rotor_wrench=None))
-    monkeypatch.setattr(refine, "compensation", lambda _before, _after: 1.0)
+    monkeypatch.setattr(refine, "torque_loss_ratio", lambda _before, _after: 1.0)
     monkeypatch.setattr(refine, "fit_within_bounds", lambda *_: (np.zeros(0), np.zeros(0, dtype=bool)))
     monkeypatch.setattr(refine, "shape_columns", lambda *_: np.ones((1, 1, 1)))
     monkeypatch.setattr(refine, "equations", lambda *_: SimpleNamespace(around=lambda *_: asked))

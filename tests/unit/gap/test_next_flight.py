@@ -11,13 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.naming.odds import likely
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
-from cpfls_cli.gap.next_flight.rivals import (
-    physical_values,
-    questions_between,
-    questions_left,
-    require_tellable,
-    usual,
-)
+from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import (
@@ -106,7 +100,7 @@ def test_evidence_of_flights_adds_up_to_that_of_all():
     paths = path_of(2, 0.15), path_of(0, 1.0, 3)
     offset = question("com_offset", [LEVER, LEVER], "rotor_mismatch")
     one, two = (LOGGING.gathered(offset, [LOGGING.weak(along(path))]) for path in paths)
-    assert two.beside(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
+    assert two.after(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
 
 
 def test_effects_that_are_there_besides_are_free_too():
@@ -220,7 +214,7 @@ def test_paths_keep_to_their_room(limits):
             taken = np.abs(values) / limit if isinstance(limit, tuple) else np.linalg.norm(values, axis=1) / limit
             assert taken.max() < 1.02
         # A limit is reached: nothing that could be flown is left.
-        assert there.load(path) > 0.9 or np.abs(outside).min() < 0.05
+        assert there.share_of_limits(path) > 0.9 or np.abs(outside).min() < 0.05
 
 
 @pytest.mark.parametrize(
@@ -287,14 +281,14 @@ def test_a_special_case_is_not_told_from_what_holds_it():
 @pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
 def test_what_no_flight_tells_is_refused(names):
     with pytest.raises(InputError, match=names[0]):
-        require_tellable([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
+        require_visible([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
 
 
 def test_an_effect_of_the_propellers_asks_for_their_size():
     bare = replace(VEHICLE, rotors=tuple(replace(rotor, radius_m=None) for rotor in VEHICLE.rotors))
-    require_tellable([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
+    require_visible([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
     with pytest.raises(InputError, match=r"ground_effect needs vehicle\.rotors\.radius_m"):
-        require_tellable([CATALOGUE["ground_effect"]], "--to-tell", bare)
+        require_visible([CATALOGUE["ground_effect"]], "--to-tell", bare)
 
 
 def test_the_plan_counts_on_nothing_that_is_not_logged():
@@ -311,7 +305,7 @@ def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
     effect = named_effect("linear_damping", linear=size)
     rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
-    first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR, GapSettings())
+    first, second, *_ = open_questions([effect], rivals, [], [silent], FLOOR, GapSettings())
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
     known = goal([first, second], [silent], room(), LOGGING)
     assert min(answer.evidence.left.sum() for answer in known.answers(along(path_of(0, 1.0, 3)))) > 0
@@ -323,7 +317,7 @@ def test_a_rival_takes_the_size_that_imitates_the_named_effect():
     flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
     effect = named_effect("com_offset", linear=size)
     rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
-    first, second, *others = questions_left([effect], rivals, [], flights, FLOOR, GapSettings())
+    first, second, *others = open_questions([effect], rivals, [], flights, FLOOR, GapSettings())
     # What else looks like either by the catalogue must not take the place of the rival.
     asked = [(each.true.candidate.effect.name, each.rival.name) for each in others]
     assert ("com_offset", "rotor_mismatch") in asked

@@ -58,14 +58,14 @@ def of_two_paths():
     return split([run(path, draw) for path in (0, 1) for draw in range(3)])
 
 
-def test_what_the_path_brings_comes_again_and_the_rest_does_not(of_two_paths):
+def test_what_the_path_brings_is_repeatable_and_the_rest_is_not(of_two_paths):
     """Six sines of 0.3 N m are 0.27 (N m)^2, six of 0.2 are 0.12; about pitch and yaw nothing comes again."""
     found = of_two_paths
     assert (found.runs, found.paths, len(found.flights)) == (6, 2, 6)
-    roll, others = found.again[0, 0], found.again[1:3, 0]
+    roll, others = found.repeatable[0, 0], found.repeatable[1:3, 0]
     assert roll == pytest.approx(0.27, rel=0.2)
     assert np.abs(others).max() < 0.05
-    assert (found.total[:3, 0] - found.again[:3, 0]) == pytest.approx(np.full(3, 0.12), abs=0.05)
+    assert (found.total[:3, 0] - found.repeatable[:3, 0]) == pytest.approx(np.full(3, 0.12), abs=0.05)
     assert found.share[0, 0] > 6 * found.share_error[0, 0]
     assert np.isnan(found.total[3:]).all()
 
@@ -77,7 +77,7 @@ def test_each_band_holds_what_its_windows_see(of_two_paths, band):
     laid = [band_windows(0.01, *ends).average(missing(path)[:, 0]) for path in (0, 1)]
     truth = np.mean(np.concatenate(laid) ** 2)
     error = of_two_paths.share_error[0, band] * of_two_paths.total[0, band]
-    assert of_two_paths.again[0, band] == pytest.approx(truth, abs=max(3 * error, 0.1 * truth))
+    assert of_two_paths.repeatable[0, band] == pytest.approx(truth, abs=max(3 * error, 0.1 * truth))
 
 
 def test_the_noise_of_the_gyroscope_is_told_apart():

@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.naming.results import (
-    Alternative,
-    GapVerdict,
-    Unexplained,
-    gap_stays,
-    matters,
-    verdict_of,
-)
+from cpfls_cli.gap.naming.results import Alternative, GapVerdict, Unexplained, gap_stays, matters, verdict_of
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_artifacts import named_effect
 

@@ -12,7 +12,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, rotation_balance, translation_balance
-from cpfls_cli.gap.naming.leftover import bends_of
+from cpfls_cli.gap.naming.open_questions import bends_of
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows

@@ -80,4 +80,4 @@ def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
     blocks = made.blocks_of(replace(made.diagnosis(named=({},) * 3), air=air), "diagnose")
     rows = [row for block in blocks if isinstance(block, Facts) for row in block.rows]
     (words,) = [words for name, words in rows if name == "Gusts"]
-    assert words.startswith("What is left is gusts, ")
+    assert words.startswith("The residual is gusts, ")

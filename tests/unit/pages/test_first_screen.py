@@ -67,7 +67,7 @@ def next_steps(found):
         ),
         (
             {"verdict": "AMBIGUOUS", "alternatives": RIVALS},
-            "These flights cannot tell offset of the centre of mass from constant torque.",
+            "These flights cannot separate offset of the centre of mass from constant torque.",
         ),
         (
             {"verdict": "UNEXPLAINED", "named": ({"named": 0},)},
@@ -84,7 +84,7 @@ def next_steps(found):
         ),
         (
             {"named": ({"name": "parameter_error", "kind": "parameter"},)},
-            "A number of the vehicle is wrong: Izz +24.0 % against the config.",
+            "A parameter of the vehicle is wrong: Izz +24.0 % against the config.",
         ),
         (
             {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
@@ -132,7 +132,7 @@ def test_a_number_is_wrong_against_what_was_taken_for_it(moments, cautions, agai
     box, *_ = screen(
         diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)), config=config, cautions=cautions
     )
-    assert box.title == f"A number of the vehicle is wrong: Izz +24.0 % against {against}."
+    assert box.title == f"A parameter of the vehicle is wrong: Izz +24.0 % against {against}."
 
 
 def test_what_speaks_against_the_model_stands_in_the_box():
@@ -164,15 +164,15 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
         "It could be constant torque instead of offset of the centre of mass."
     )
     told = "constant torque from offset of the centre of mass: change the thrust"
-    assert ("To tell", told) in below
+    assert ("To separate", told) in below
     _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
     planned = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight."
-    assert facts["Next"] == f"To tell {told}. {planned} Until then t{USE[1:]}."
+    assert facts["Next"] == f"To separate {told}. {planned} Until then t{USE[1:]}."
     untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity", "")])
     assert planned not in next_steps(untried)
-    assert next_steps(untried).startswith("To tell steady wind from offset of the centre of mass: log velocity.")
+    assert next_steps(untried).startswith("To separate steady wind from offset of the centre of mass: log velocity.")
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
-    assert "To tell" not in dict(below)
+    assert "To separate" not in dict(below)
 
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tells_them():
@@ -187,8 +187,8 @@ def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tel
     ("given", "first"),
     [
         ({}, f"{USE}."),
-        ({"verdict": "PARTIAL"}, f"{USE}; then look at what is left."),
-        ({"verdict": "UNEXPLAINED", "named": ()}, "Look at what is left: its axis, what it follows, "),
+        ({"verdict": "PARTIAL"}, f"{USE}; then look at the residual."),
+        ({"verdict": "UNEXPLAINED", "named": ()}, "Look at the residual: its axis, what it follows, "),
         (
             {"verdict": "FLIGHTS_DIFFER", "named": ()},
             "Find out what changed between the flights; learn from flights of",
@@ -287,10 +287,10 @@ def test_what_cannot_be_played_back_is_said():
     ],
 )
 def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
-    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Left"] == (
+    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Residual"] == (
         f"In what it was fitted to: {said[0].lower()}{said[1:]}"
     )
-    assert "Left" not in screen(diagnosis())[1]
+    assert "Residual" not in screen(diagnosis())[1]
 
 
 def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
@@ -331,9 +331,7 @@ def test_effects_are_credited_with_what_the_vehicles_own_numbers_leave():
     record = diagnosis("PARTIAL")
     left = replace(record.residual, parameters=0.2 * record.residual.before)
     said = screen(replace(record, residual=left))[1]["How sure"]
-    assert said.startswith(
-        "Of the held-out gap above the noise that is left when the vehicle's own numbers are refitted, 97 % is gone"
-    )
+    assert said.startswith("Of the held-out gap above the noise, the vehicle's own parameters refitted, 97 % is gone")
 
 
 def test_what_differs_between_flights_stands_above_and_not_below():
@@ -348,7 +346,7 @@ def test_what_differs_between_flights_stands_above_and_not_below():
     [
         (({},), "with offset of the centre of mass"),
         (({"named": 0},), "with the closest effects, offset of the centre of mass, which are not the answer"),
-        ((), "with nothing but the vehicle's own numbers refitted"),
+        ((), "with nothing but the vehicle's own parameters refitted"),
     ],
 )
 def test_the_second_model_is_said_to_be_what_it_is(named, words):

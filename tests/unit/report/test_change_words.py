@@ -46,7 +46,7 @@ def told(name, **more):
         ("centre of mass", [-0.02, 0.01], "the centre of mass lies 20 mm to the back (18 to 22 mm) and 10 mm", None),
         ("turn M1", [np.log(1.21)], "rotor M1 turns 10 % faster (", None),
         ("vibration", [np.log(2)], "it vibrates 2.0 times as strong", "2.0 times the vibration"),
-        ("late", [-0.01], "rotation follows the rotors 10 ms earlier (9.0 to 11 ms)", None),
+        ("delay", [-0.01], "rotation follows the rotors 10 ms earlier (9.0 to 11 ms)", None),
         ("drift", [0.05, 0.02, 0.01], "the gyroscope is off by 0.050 rad/s about x, 0.020 rad/s about y and", None),
         ("odd thing", [0.5], "odd thing: 0.50", "odd thing: 0.50"),
     ],
@@ -76,12 +76,12 @@ NOTHING = {"p": 0.5, "causes": (), "numbers": ()}
         (
             {"causes": ()},
             "CHANGED",
-            "More than chance, but no change that is known explains it: load M3 by ",
+            "More than chance, but no change that is known explains it: thrust M3 by ",
             "warning",
         ),
         ({"reversed": ("scale z",)}, "CHANGED", "Scale z is reversed, or nothing, and in no reference", "warning"),
         (NOTHING, "NO CHANGE", "nothing beyond what flights of this vehicle differ by; unchanged within", "good"),
-        (NOTHING | {"missing": ("load M4",)}, "NO CHANGE SEEN", "nothing beyond", "warning"),
+        (NOTHING | {"missing": ("thrust M4",)}, "NO CHANGE SEEN", "nothing beyond", "warning"),
         (NOTHING | {"fewest": 6}, "NO CHANGE SEEN", "nothing beyond what is usual of vehicles; unchanged", "warning"),
         (NOTHING | {"shows": ()}, "CANNOT TELL", "no change of any size that is looked for would have", "unsure"),
         (NOTHING | {"undetermined": ("scale z",)}, "CANNOT TELL", "scale z may be zero or reversed today", "unsure"),
@@ -95,7 +95,7 @@ def test_verdicts_of_today(more, verdict, title, tone):
 
 
 def test_alike_changes_and_notes():
-    alike = tuple(Alike(name=name, belief=0.2) for name in ("rotors M1 and M3", "mass", "late"))
+    alike = tuple(Alike(name=name, belief=0.2) for name in ("rotors M1 and M3", "mass", "delay"))
     causes = (found("rotor M3", 0.2, alike=alike), found("hover", 0.1, named=False, belief=0.5, alike=alike[1:]))
     notes = ("left out: b.csv: flies for 1 s", "another <note> of *it*")
     blocks = told("changed", causes=causes, warnings=notes, other_ranges=("c.csv",))

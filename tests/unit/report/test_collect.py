@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from cpfls_cli.report.canvas import band, line, plot
 from cpfls_cli.report.collect import panels_of
-from cpfls_cli.report.html import figure_tables
+from cpfls_cli.report.figure_tables import figure_tables
 
 
 def collected(draw, panels=1):

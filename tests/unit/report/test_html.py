@@ -1,6 +1,6 @@
 """What stands between backticks in a sentence is code on a page, and nothing in it is markup."""
 
-from cpfls_cli.report.html import with_code
+from cpfls_cli.report.figure_tables import with_code
 
 
 def test_commands_and_keys_are_code_and_the_rest_is_escaped():

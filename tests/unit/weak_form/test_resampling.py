@@ -48,8 +48,8 @@ def test_fit_uses_all_blocks_and_its_errors_are_those_of_textbooks():
     np.testing.assert_allclose(coefficients[:, 0], expected, rtol=1e-6)
     assert error.sum() == pytest.approx(left @ left)
     covariance = np.linalg.inv(flat.T @ flat) * (left @ left) / len(left)
-    beside, unsure = normal.beside(chosen[:1]).fit(chosen[1:])
-    np.testing.assert_allclose(beside, expected[1:], rtol=1e-6)
+    conditional, unsure = normal.conditional_on(chosen[:1]).fit(chosen[1:])
+    np.testing.assert_allclose(conditional, expected[1:], rtol=1e-6)
     np.testing.assert_allclose(unsure, np.sqrt(np.diag(covariance))[1:], rtol=1e-6)
 
 
@@ -57,7 +57,7 @@ def test_errors_never_fall_below_those_of_unit_noise():
     columns, right, block = problem(2)
     flat = columns.reshape(-1, COLUMNS)
     expected = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
-    _, unsure = folds(columns, 0.1 * right, block).beside(np.array([0])).fit(np.arange(1, 5))
+    _, unsure = folds(columns, 0.1 * right, block).conditional_on(np.array([0])).fit(np.arange(1, 5))
     np.testing.assert_allclose(unsure, expected[1:], rtol=1e-6)
 
 
@@ -69,12 +69,14 @@ def test_columns_beside_a_base_are_judged_as_one_fit_of_both(known):
     columns[..., 2] = 0.0
     columns[block != 2, :, 4] = 0.0
     normal, base = folds(columns, right, block, np.full(COLUMNS, known)), np.array([0, 4])
-    beside = normal.beside(base)
-    np.testing.assert_allclose(beside.before, normal.solve(base, 2)[1], rtol=1e-9)
+    conditional = normal.conditional_on(base)
+    np.testing.assert_allclose(conditional.before, normal.solve(base, 2)[1], rtol=1e-9)
     for own in ([1], [3], [2], [1, 2, 3], []):
         together = np.array([*base, *own])
-        np.testing.assert_allclose(beside.unseen(np.array(own, dtype=int)), normal.solve(together, 2)[1], rtol=1e-6)
-        found, _ = beside.fit(np.array(own, dtype=int))
+        np.testing.assert_allclose(
+            conditional.unseen(np.array(own, dtype=int)), normal.solve(together, 2)[1], rtol=1e-6
+        )
+        found, _ = conditional.fit(np.array(own, dtype=int))
         np.testing.assert_allclose(found, normal.fit(together)[0][2:, 0], rtol=1e-6)
 
 
@@ -95,7 +97,7 @@ def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what
     columns[..., 1] *= 1e-3
     # Of blocks whose windows stand one after another, and of others.
     kept, block = np.array([0, 4]), block[order]
-    found = folds(columns, right, block).beside(kept).subtracted(1, weight)
+    found = folds(columns, right, block).conditional_on(kept).subtracted(1, weight)
     by_hand = weight[:, None] * columns[..., kept], weight[:, None] * (right - columns[..., [1]])
     for b in range(BLOCKS):
         seen, unseen = (tuple(each[rows] for each in by_hand) for rows in (block != b, block == b))
@@ -137,7 +139,7 @@ def test_a_block_that_alone_shows_a_candidate_is_no_evidence_against_it():
     normal, base, own = folds(columns, right, block), np.array([0]), np.array([3])
     candidate = Candidate(CATALOGUE["torque_bias"], {})
     before, plain = normal.solve(base)[1], normal.solve(np.array([0, 3]))[1]
-    error = ranking._error(candidate, own, np.ones(6), normal.beside(base))
+    error = ranking._error(candidate, own, np.ones(6), normal.conditional_on(base))
     assert plain[2, 0] > before[2, 0] == error[2, 0]
     others = np.arange(normal.blocks) != 2
     np.testing.assert_allclose(error[others], plain[others])
@@ -151,10 +153,7 @@ def test_a_column_of_zeros_does_no_harm():
     assert not coefficients[:, 1].any()
 
 
-@given(
-    st.lists(st.integers(1, 400), min_size=1, max_size=5),
-    st.floats(0.5, 20),
-)
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=5), st.floats(0.5, 20))
 def test_blocks_are_contiguous_within_flights_and_numbered_without_gaps(lengths, block_s):
     flight = np.repeat(np.arange(len(lengths)), lengths)
     centres = np.concatenate([0.2 * np.arange(length) for length in lengths])

@@ -1,1 +1,0 @@
-"""One module per command: open records, call the numerics, write a record, hand over its page."""

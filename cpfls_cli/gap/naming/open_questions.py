@@ -1,0 +1,219 @@
+"""Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, mean_error
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import System, residual_along, system, window_noise
+from cpfls_cli.gap.balance.refine import least_squares
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
+from cpfls_cli.gap.naming.odds import names_of
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.search import of_motion
+from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
+
+
+def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
+    """List the channels with an unexplained residual: size, dependence on signals, narrow band, energy."""
+    hypothesis, settings, block = found.hypothesis, found.settings, found.block
+    residual = hypothesis.residual_at(found.estimates.linear)
+    noise = window_noise(hypothesis, residual, found.floor)
+    sizes = size_in_floors(residual, noise)
+    states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
+    dependence = rank_dependence(
+        residual / noise, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
+    )
+    # The largest of each channel.
+    dependent = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
+    band = _band(found, rng)
+    rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
+    # A force turns nothing.
+    directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
+    unexplained = []
+    for place, (channel, size, energy) in enumerate(zip(CHANNELS, sizes.tolist(), directions, strict=True)):
+        follows, rings = dependent.get(channel), band if band and band.channel == channel else None
+        if size > CLEAR or (size**2 > hypothesis.most_noise[place] and (follows or rings)):
+            signal, share = (follows.signal, follows.r2) if follows else (None, 0.0)
+            frequency = None
+            if rings:
+                share, frequency, energy = max(share, rings.share), rings.frequency_hz, rings.energy
+            unexplained.append(Unexplained(channel, size, signal, share, frequency, energy))
+    return tuple(unexplained)
+
+
+def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
+    """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
+    hypothesis, settings = found.hypothesis, found.settings
+    windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
+    for number, flight in enumerate(hypothesis.flights):
+        rows.append(
+            replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear))
+        )
+        rates.append(windows.average(flight.signals.body_rate))
+    band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
+    return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
+
+
+def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
+    """Say of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
+
+    By the sign of the mean power ``M omega`` against its scatter over blocks of windows.
+    """
+    numbers = np.unique(block)
+    if len(numbers) < FEWEST_BLOCKS:
+        return ["neither"] * torque.shape[1]
+    power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
+    means = np.array([power[block == number].mean(axis=0) for number in numbers])
+    # Any of the axes, at the rate of errors of names.
+    mean, seldom = means.mean(axis=0), 0.5 * RARE / means.shape[1]
+    sure = np.abs(mean) > half_width(mean_error(means), len(means), 1 - seldom)
+    return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
+
+
+def with_unnamed(
+    found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
+) -> tuple[Estimates, tuple[str, ...]]:
+    """Widen the intervals of named effects by what is more than chance and too small for a name.
+
+    A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
+    formula that is right in slow flight bends in fast flight: where a bend shows, its number changes with it.
+
+    `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
+    are with the unnamed effects, whose names come too, and without them.
+    """
+    flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
+    if not named:
+        return found.estimates, ()
+    step = last
+    if names_of(named) != names_of(last.hypothesis.chosen):
+        step = rank_effects(flights, named, effects, settings, rng)
+    chosen = _beyond_chance(step, effects, settings, rng)
+    bends = bends_of(named, flights)
+    if bends:
+        chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
+    if len(chosen) == len(named):
+        return found.estimates, ()
+    wider = fitted(flights, chosen, found.floor, settings).estimates
+    held = []
+    for numbers, others in zip(found.estimates.effects, wider.effects, strict=False):
+        there = {number.name: number for number in others}
+        pairs = [(number, there.get(number.name, number)) for number in numbers]
+        held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
+    return replace(found.estimates, effects=tuple(held)), tuple(each.effect.name for each in chosen[len(named) :])
+
+
+def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
+    """Make an effect of the bend of each formula in the air velocity u: the formula times ``|u|^2 / (|u|^2 + U^2)``.
+
+    U is the root mean square of u over the flights. Bounded, because powers hang on the fastest seconds of a flight.
+    """
+    flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
+    squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
+    usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
+    effects = (each.effect for each in named if each.effect.kind == "wrench" and "velocity" in each.effect.needs)
+    return [_bend(effect, usual) for effect in effects if not (effect.shapes or effect.physical)]
+
+
+def _bend(effect: Effect, usual: float) -> Effect:
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert effect.columns is not None
+        squared = (signals.air_velocity**2).sum(axis=1)
+        return Columns(effect.columns(signals, shape).direct * (squared / (squared + usual**2))[:, None, None])
+
+    either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
+    return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
+
+
+def _beyond_chance(
+    step: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+) -> list[Candidate]:
+    """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
+    flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
+    for _ in range(settings.effects_max):
+        more = (each for each in step.ranking if each.candidate.effect in effects and step.p_value(each.gain) <= CHANCE)
+        gains = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
+        added = next((each for each, gain in gains if step.p_value(gain) <= CHANCE), None)
+        if added is None:
+            break
+        chosen.append(added.candidate)
+        step = rank_effects(flights, chosen, effects, settings, rng)
+    return chosen
+
+
+def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:
+    """List the effects that could be present unseen above a floor, shape (6,), with the reason."""
+    # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
+    names = names_of([*hypothesis.free, *hypothesis.chosen])
+    reasons = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
+    return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
+
+
+_RADIUS = "rotor radius"  # A signal that comes from the config, not from a log.
+
+
+def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:
+    """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten.
+
+    Effects that the user ignores are not listed.
+    """
+    rivals = []
+    for effect in named:
+        for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
+            missing, to_log = _lacked(hypothesis, CATALOGUE[name])
+            if missing and not {"command", "measured_rotor_speed"} & {*missing}:
+                logged = [name for name in to_log if name != _RADIUS]
+                asked = [f"log {' and '.join(logged)}"] if logged else []
+                asked += ["state rotors.radius_m in the config"] if _RADIUS in to_log else []
+                separated_by = f"{' and '.join(asked)}, without which it was not tried"
+                rivals.append(Alternative(name, effect.name, np.nan, separated_by))
+    return tuple(rivals)
+
+
+def _lacked(hypothesis: System, effect: Effect) -> tuple[Sequence[str], Sequence[str]]:
+    """Name the signals that an effect needs and no flight has, and what a log has to hold for them."""
+    missing = [effect.missing(signals) for signals in hypothesis.signals]
+    if not all(missing):
+        return (), ()
+    return missing[0], [name.replace("_", " ") for name in hypothesis.signals[0].to_log(missing[0])]
+
+
+def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+    missing, to_log = _lacked(hypothesis, effect)
+    if "command" in missing:
+        return "rotor speeds are measured, so nothing between command and speed shows"
+    if missing:
+        return f"the flights lack {', '.join(to_log)}"
+    if effect.columns is None:
+        return ""
+    shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
+    columns = hypothesis.columns(Candidate(effect, shape))
+    base, tested = ((rows / floor[:, None]).reshape(-1, rows.shape[2]) for rows in (hypothesis.base, columns))
+    beyond = (tested - base @ least_squares(base, tested)).reshape(columns.shape)
+    new = beyond * usual_size(effect, hypothesis.vehicle, columns.shape[2])
+    # The best channel of the best coefficient decides.
+    if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:
+        return ""
+    return f"it would not show; {effect.excitation}"
+
+
+def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
+    """Size linear coefficients, so many as `width`, that are large but not unheard of, shape (width,)."""
+    bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
+    if not bounds:
+        return np.ones(width)
+    if effect.physical is not None:
+        return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))
+    return _USUAL_OF_BOUND * np.array(bounds)[:width]

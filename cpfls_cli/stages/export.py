@@ -1,0 +1,242 @@
+"""Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from cpfls_cli import store
+from cpfls_cli.arguments import ExportAnywayOption
+from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.mcap_form import mcap_bytes
+from cpfls_cli.export.registry import FORMS, exported
+from cpfls_cli.export.text import checked_identifier, identifier
+from cpfls_cli.export.tracks import TIME, View, csv_text
+from cpfls_cli.export.viewed import view_of
+from cpfls_cli.result import about, part, plain, result
+from cpfls_cli.stage import Run, kind_of, stage
+from cpfls_cli.stages._sheets import sheet_of
+
+Formats = StrEnum("Formats", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv")
+ModelArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
+        "disagreement, diagnosis or response.",
+    ),
+]
+FormatOption = Annotated[
+    Formats | None,
+    typer.Option(
+        "--format",
+        help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
+        "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+        "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
+        "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
+        "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
+        "FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
+    ),
+]
+NameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--name", metavar="NAME", help="Prefix of the names in C, name in JSON and XML; default: from the name of FILE."
+    ),
+]
+VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
+"""What is drawn by other programs, which is no model."""
+ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
+# What the module imports beside the standard library: under such a name it would import itself.
+_IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
+
+
+@result
+class Model:
+    """A model in another form."""
+
+    name: str = about("prefix of its names")
+    complete: bool = about("whether its search came to its end")
+    verdict: str | None = about("on the model, in a word")
+    cautions: tuple[str, ...] = about("what speaks against it", "caution")
+    impossible: str | None = about("its numbers that no vehicle has")
+    rotors: int = about("count of them")
+    weights: int = about("coefficients of torque and force that are not zero")
+    effects: tuple[str, ...] = about("that it holds", "effect")
+    learned: bool = about("whether a part of it has no name")
+    parameters: int | None = about("of an identified model")
+    fuzzy: bool = about("whether its inertia depends on the attitude")
+    rigid_body: bool = about("whether it has an inertia")
+    region_share: float | None = about("share of the attitudes that training visited")
+    said: tuple[str, ...] = about("what it is, and what the form does not hold", "sentence", brief=False)
+    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
+
+
+@result
+class Track:
+    """A quantity over time."""
+
+    name: str = about("with its flight")
+    unit: str = about("of its values")
+    frame: str = about("of its components")
+    samples: int = about("count of them")
+    first_s: float = about("time of the first", unit="s")
+    values: tuple[str, ...] = about("measured, of a model, ...", "value")
+    axes: tuple[str, ...] = about("names of its components", "component")
+
+
+@result
+class Viewed:
+    """What programs draw of an artifact."""
+
+    on_log_clock: bool = about("whether times are those of the log")
+    tracks: tuple[Track, ...] = part()
+    curves: tuple[str, ...] = about("over something else than time", "curve")
+
+
+@result
+class Written:
+    """Files for other programs."""
+
+    dry_run: bool = about("whether nothing was written")
+    format: str = about("that they are of")
+    output: tuple[str, ...] = about("their names", "file")
+    bytes: int = about("in all of them")
+    sizes: Mapping[str, int] = about("bytes of each", brief=False)
+    model: Model | None = part(default=None, brief=False)
+    view: View | None = None
+
+
+@stage(Written, words={"TIME": TIME})
+def export(
+    run: Run,
+    model: ModelArgument,
+    format: FormatOption = None,  # the name of the option
+    name: NameOption = None,
+    anyway: ExportAnywayOption = False,
+) -> Written:
+    """Write a model, or what programs draw, in another form."""
+    form = format.value if format else _form_of(run.output)
+    if run.output.suffix != ENDINGS[form]:
+        raise InputError(f"{run.output}: --format {form} writes a file that ends in {ENDINGS[form]}; name it so")
+    return _drawn(run, model, form) if form in VIEWERS else _modelled(run, model, form, name, anyway=anyway)
+
+
+def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: bool) -> Written:
+    """Write a model."""
+    prefix, outputs = _prefix_of(run.output, form, name), _outputs_of(run.output, form)
+    source = run.take({"model": model})["model"]
+    for output in outputs[:-1]:
+        check_output(output, run.force, run.inputs)
+    sheet = sheet_of(model, prefix, source, force=run.force, anyway=anyway)
+    made = exported(sheet, form, run.output.name)
+    run.texts |= zip(outputs, made.texts.values(), strict=True)
+    identified = sheet.identified
+    found = Model(
+        name=sheet.name,
+        complete=sheet.complete,
+        verdict=sheet.verdict,
+        cautions=sheet.cautions,
+        impossible=sheet.impossible or None,
+        rotors=sheet.model.rotors,
+        weights=len(sheet.weights),
+        effects=tuple(effect.name for effect in sheet.model.effects),
+        learned=sheet.model.remainder is not None,
+        parameters=None if identified is None else identified.structure.parameters,
+        fuzzy=sheet.rules is not None,
+        rigid_body=bool(sheet.rigid_body.any()),
+        region_share=None if identified is None else float(np.mean(identified.visited)),
+        said=(*sheet.told, *made.told),
+        warnings=sheet.warnings,
+    )
+    run.also = plain(found) | {"missing": [asdict(each) for each in made.missing]}
+    return _written(run, form, model=found)
+
+
+def _drawn(run: Run, artifact: Path, form: str) -> Written:
+    """Write the quantities of an artifact over the clock of its log."""
+    run.take({"artifact": artifact})
+    given, origin = store.read(artifact, kind_of(artifact))
+    view = view_of(artifact, given, origin.config)
+    run.texts[run.output] = mcap_bytes(view) if form == "mcap" else csv_text(view)
+    tracks = (
+        Track(
+            name=each.path,
+            unit=each.unit,
+            frame=each.frame,
+            samples=len(each.time),
+            first_s=float(np.min(each.time, initial=np.inf)),
+            values=tuple(each.values),
+            axes=each.axes,
+        )
+        for each in view.tracks
+    )
+    curves = tuple(curve.name for curve in view.curves)
+    run.also = plain(Viewed(on_log_clock=view.on_log_clock, tracks=tuple(tracks), curves=curves))
+    return _written(run, form, view=view)
+
+
+def _written(run: Run, form: str, model: Model | None = None, view: View | None = None) -> Written:
+    sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
+    return Written(
+        dry_run=run.dry_run,
+        format=form,
+        output=tuple(sizes),
+        bytes=sum(sizes.values()),
+        sizes=sizes,
+        model=model,
+        view=view,
+    )
+
+
+def _form_of(output: Path) -> str:
+    """Choose a form by the suffix of a file."""
+    if output.suffix == ".py":
+        raise InputError(f"{output}: rotorpy, casadi and jax write Python; name one of them with --format")
+    for form, ending in ENDINGS.items():
+        if output.suffix == ending:
+            return form
+    first: dict[str, str] = {}
+    for form, ending in ENDINGS.items():
+        if ending != ".py":
+            first.setdefault(ending, form)
+    endings = ", ".join(f"{ending} ({form})" for ending, form in first.items())
+    raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
+
+
+def _prefix_of(output: Path, form: str, name: str | None) -> str:
+    """Choose the prefix of the names in source code."""
+    if name is None:
+        return identifier(output.stem)
+    if ENDINGS[form] == ".py":
+        raise InputError(f"--name {name}: a Python module is named after its file; leave --name out, or rename -o")
+    return checked_identifier(name)
+
+
+def _outputs_of(output: Path, form: str) -> list[Path]:
+    """Name the files to be written, the one that needs the others last."""
+    stem = output.stem
+    importable = (
+        stem.isidentifier() and not keyword.iskeyword(stem) and stem not in {*_IMPORTED, *sys.stdlib_module_names}
+    )
+    if output.suffix == ".py" and not importable:
+        raise InputError(
+            f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
+            f"its own words or modules, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
+            f"{identifier(output.stem)}_model.py"
+        )
+    if not FORMS[form].also:
+        return [output]
+    if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
+        raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
+    return [output.with_suffix(FORMS[form].also), output]

@@ -1,0 +1,165 @@
+"""Show what the command that wrote an artifact answered, what it holds and where it comes from.
+
+Without FILE, list all formats, or describe one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cpfls_cli import store
+from cpfls_cli.errors import InputError
+from cpfls_cli.report.source import source_of_result
+from cpfls_cli.result import about, datasets, part, plain, result
+from cpfls_cli.stage import Run, Stage, loaded, stage, stage_that_made
+from cpfls_cli.words import did_you_mean
+
+_LONG = "too long to be shown: its values are in the file"
+
+FileArgument = Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Any artifact.")]
+NameOption = Annotated[
+    str | None, typer.Option("--format", metavar="NAME", help="Describe the datasets of a format, such as flight.")
+]
+
+
+@result
+class Dataset:
+    """A dataset of a format."""
+
+    dimensions: tuple[str, ...] = about("its axes", "axis of it")
+    units: str = about("of its values")
+    frame: str = about("of its components")
+    required: bool = about("whether every file holds it")
+    gaps: bool = about("whether values may be missing: not finite")
+    description: str = about("what it holds")
+
+
+@result
+class Format:
+    """A format of files."""
+
+    format: str = about("its name")
+    description: str = about("what a file of it holds")
+    commands: tuple[str, ...] = about("that write it", "command")
+    datasets: Mapping[str, Dataset] = part(brief=False)
+
+
+@result
+class Input:
+    """A file that another one was made from."""
+
+    name: str = about("of the file")
+    sha256: str = about("of its content")
+    format: str = about("of the file")
+
+
+@result
+class Held:
+    """What a file holds."""
+
+    file: str = about("as it was given")
+    format: str = about("that it is of")
+    cpfls_version: str = about("of the program that made it")
+    seed: int | None = about("of the run that made it, or None where it needs none")
+    inputs: Mapping[str, Input] = part()
+    cautions: tuple[str, ...] = about("what speaks against it", "caution")
+    answer: str = about("what its command answered, in Markdown", brief=False)
+    datasets: Mapping[str, Dataset] = part(brief=False)
+
+
+@result
+class Shown:
+    """A file, all formats, or one of them."""
+
+    file: Held | None = part(default=None, brief=False)
+    listed: tuple[Format, ...] = part(default=(), brief=False)
+    described: Format | None = part(default=None, brief=False)
+
+
+def short(described: Format) -> str:
+    """Give the name of a format as it is typed."""
+    return described.format.removeprefix("cpfls/")
+
+
+@stage(Shown, output=False, words={"short": short})
+def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
+    """Show a file, or formats."""
+    if file and name is not None:
+        raise InputError("--format describes files of a format in general: leave out FILE or --format")
+    if file is None:
+        return _formats(run, name)
+    own = stage_that_made(file)
+    long = store.is_long(file, own.kind)
+    if long:
+        store.check_rows(file, own.kind, store.held_rows(file, own.kind))
+    given, origin = store.read_first(file, own.kind) if long else store.read(file, own.kind)
+    source = source_of_result(given, origin, file, file.name, "")
+    held = Held(
+        file=str(file),
+        format=own.kind.FORMAT,
+        cpfls_version=origin.version,
+        seed=origin.seed,
+        inputs={role: Input(**vars(each)) for role, each in origin.inputs.items()},
+        cautions=tuple(origin.cautions),
+        answer=_LONG if long else own.text(given, about=source),
+        datasets=_datasets(own),
+    )
+    run.also = plain(held) | ({} if long else {"result": plain(given)})
+    run.next.append(("cpfls", "check", file))
+    return Shown(file=held)
+
+
+def _formats(run: Run, name: str | None) -> Shown:
+    """Describe the format of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
+    every = tuple(map(described, formats()))
+    if name is None:
+        run.also = {"formats": plain(every)}
+        run.next.append(("cpfls", "info", "--format", short(every[0])))
+        return Shown(listed=every)
+    known = {short(each): each for each in every}
+    chosen = known.get(asked := name.removeprefix("cpfls/"))
+    if chosen is None:
+        hint = did_you_mean(asked, list(known), "", most=3)
+        raise InputError(f"--format {name}: no such format{f' ({hint})' if hint else ''}; there are {', '.join(known)}")
+    run.also = {"formats": [plain(chosen) | {"datasets": plain(chosen.datasets)}]}
+    return Shown(described=chosen)
+
+
+def formats() -> list[Stage]:
+    """List the stages whose results have a format of their own, one for each format.
+
+    What only answers has none, nor what fills a folder with results of other stages.
+    """
+    files = (file for file in sorted(Path(__file__).parent.glob("*.py")) if "\n@stage(" in file.read_text("utf-8"))
+    stages = {str(own.kind.FORMAT): own for file in files if hasattr((own := loaded(file.stem)).kind, "FORMAT")}
+    return [stages[name] for name in sorted(stages)]
+
+
+def described(own: Stage) -> Format:
+    """Describe the format of a stage."""
+    first = str(own.kind.__doc__).split("\n", 1)[0].rstrip(".")
+    return Format(
+        format=own.kind.FORMAT,
+        description=first[0].lower() + first[1:],
+        commands=tuple(str(getattr(own.kind, "MADE_BY", own.name)).split(" or ")),
+        datasets=_datasets(own),
+    )
+
+
+def _datasets(own: Stage) -> dict[str, Any]:
+    return {
+        path: Dataset(
+            dimensions=each.about.axes,
+            units="text" if each.scalar is str else each.about.unit,
+            frame=each.about.frame,
+            required=each.required,
+            gaps=each.about.gaps,
+            description=each.about.text,
+        )
+        for path, each in datasets(own.kind)
+        if each.about
+    }

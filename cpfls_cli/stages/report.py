@@ -1,0 +1,103 @@
+"""Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cpfls_cli.artifacts.model import AnyModel
+from cpfls_cli.config.study import Study
+from cpfls_cli.files import read_content
+from cpfls_cli.pages.comparison import BEYOND, differing
+from cpfls_cli.pages.page import report_page
+from cpfls_cli.pages.source import Source, Sources, unique_labels
+from cpfls_cli.pages.trust import model_words
+from cpfls_cli.report.forms import Form, form_of
+from cpfls_cli.report.source import source_of_result
+from cpfls_cli.result import about, result
+from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
+from cpfls_cli.store import read
+from cpfls_cli.version import __version__
+
+ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
+FormOption = Annotated[
+    Form | None,
+    typer.Option("--format", help="Form of the report; default: by the suffix of FILE (.md, .json), else html."),
+]
+
+
+@result
+class Report:
+    """A page about artifacts."""
+
+    output: str = about("file of the page")
+    bytes: int = about("of the file")
+    sections: tuple[str, ...] = about("names of its sections", "section", default=())
+    figures: tuple[str, ...] = about("names of its figures", "figure", default=())
+    tables: tuple[str, ...] = about("names of its tables", "table", default=())
+    missing: tuple[str, ...] = about("formats of which none was given", "format", default=())
+    verdicts: Mapping[str, str] | None = about("how far to trust each model", brief=False, default=None)
+    differing: tuple[str, ...] | None = about(
+        "constants that differ between vehicles", "constant", brief=False, default=None
+    )
+    repeated: tuple[str, ...] = about("artifacts that are shown once", "sentence", brief=False, default=())
+
+
+@stage(Report, study=True, words={"BEYOND": BEYOND})
+def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> Report | None:
+    """Write a report about artifacts."""
+    form = form or form_of(run.output)
+    inputs = run.take({str(path): path for path in artifacts})
+    if len(artifacts) == 1 and not (own := stage_that_made(artifacts[0])).study:
+        return _written(run, own.report(artifacts[0], form))
+    files = {path: inputs[str(path)].sha256 for path in artifacts}
+    first = {sha256: path for path, sha256 in reversed(files.items())}
+    kept = [path for path, sha256 in files.items() if first[sha256] == path]
+    given = Sources(
+        read_sources(kept, [files[path] for path in kept]), vehicle=run.study.vehicle, settings=run.study.report
+    )
+    again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
+    equal = [f"{path}: holds the same as {first[files[path]]}; shown once" for path in files if path not in kept]
+    if run.dry_run:
+        return None
+    page = report_page(given, __version__, form)
+    return _written(
+        run,
+        page.text,
+        sections=page.sections,
+        figures=page.figures,
+        tables=page.tables,
+        missing=page.missing,
+        verdicts={model.label: model_words(model.record).sentence for model in given.of_kind(AnyModel)},
+        differing=differing(given),
+        repeated=(*again, *equal),
+    )
+
+
+def _written(run: Run, text: str, **more: Any) -> Report | None:
+    run.texts[run.output] = text
+    return None if run.dry_run else Report(output=str(run.output), bytes=len(text.encode()), **more)
+
+
+def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+    """Read artifacts of any format for a report, each under a name of its own."""
+    labels = map(_printable, unique_labels(paths))
+    return [
+        source_of_result(*read(path, kind_of(path)), path, label, sha256)
+        for path, label, sha256 in zip(paths, labels, hashes, strict=True)
+    ]
+
+
+def page_about(study: Study, paths: Sequence[Path]) -> str:
+    """Write the page of files that a stage filled a folder with."""
+    sources = read_sources(paths, [read_content(path).sha256 for path in paths])
+    return report_page(Sources(sources, study.vehicle, study.report), __version__).text
+
+
+def _printable(name: str) -> str:
+    """Replace what a page cannot show: control characters, and bytes that are not text."""
+    return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in name)

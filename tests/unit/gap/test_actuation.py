@@ -1,0 +1,169 @@
+"""What lies between command and rotors in gusts is what instruments say, and no name where they say nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.naming import actuation
+from cpfls_cli.gap.naming.actuation import decided_by_instruments
+from cpfls_cli.gap.naming.by_instruments import unidentified
+from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_flights import candidate
+
+LATE = ("motor_lag", "command_delay", "low_pass_filter", "notch_filter")
+LAG, DELAY, BOTH = ("motor_lag",), ("command_delay",), ("motor_lag", "command_delay")
+BLOCKS = 12
+LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
+SURE, ABSENT, OPEN = (0.03, 0.001), (0.001, 0.002), (0.03, 0.04)
+GIVEN = SimpleNamespace(flown=[SimpleNamespace(motion=SimpleNamespace(period=0.01))])
+
+
+def found_with(names, sizes):
+    chosen = [candidate(name, **{shape.name: shape.grid[0] for shape in CATALOGUE[name].shapes}) for name in names]
+    numbers = [
+        tuple(
+            Estimate(shape.name, shape.unit, value, value - half, value + half, (shape.grid[0], shape.grid[-1]))
+            for shape in each.effect.shapes
+        )
+        for each, (value, half) in zip(chosen, sizes, strict=True)
+    ]
+    hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=(), can=lambda _candidate: True)
+    estimates = SimpleNamespace(effects=numbers)
+    return SimpleNamespace(hypothesis=hypothesis, estimates=estimates, settings=GapSettings())
+
+
+def apart(monkeypatch, own, left, sizes=None):
+    """Judge sets that leave so much by block of what was known before, of numbers with half an interval."""
+    tried = []
+
+    def fit(_self, names):
+        tried.append(names)
+        return found_with(names, (sizes or {}).get(names, [SURE] * len(names))) if names in left else None
+
+    monkeypatch.setattr(actuation._Sets, "_fit", fit)
+    monkeypatch.setattr(
+        actuation,
+        "predictable_residual",
+        lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
+    )
+    start = found_with(own, [SURE] * len(own))
+    told = decided_by_instruments(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
+    names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
+    return names, {(each.name, each.instead_of, each.jointly_with) for each in told.alike}, told, tried
+
+
+@pytest.mark.parametrize("own", [LAG, DELAY, ()], ids=["lag", "delay", "nothing"])
+@pytest.mark.parametrize(
+    ("together", "names", "rivals"),
+    [
+        ([SURE, ABSENT], LAG, set()),
+        ([ABSENT, SURE], DELAY, set()),
+        ([ABSENT, ABSENT], LAG, {("command_delay", "motor_lag", "")}),
+    ],
+    ids=["it is the lag", "it is the delay", "the usual one of two"],
+)
+def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
+    found, alike, told, tried = apart(monkeypatch, own, left, {BOTH: together})
+    assert (found, alike) == (names, rivals)
+    assert told.chances[names[0]] < 1e-6
+    # A filter has a number more, and nothing is left for it.
+    assert not {"low_pass_filter", "notch_filter"} & {*sum(tried, ())}
+
+
+def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
+    assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
+
+
+@pytest.mark.parametrize(
+    ("together", "names"),
+    [([OPEN, SURE], BOTH), ([ABSENT, SURE], DELAY)],
+    ids=["a lag that nothing excludes", "no lag that anybody has"],
+)
+def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
+    assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
+
+
+def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_tells(monkeypatch):
+    assert apart(monkeypatch, LAG, {(): LITTLE, LAG: LITTLE[::-1]})[0] == LAG
+
+
+def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone_leaves_nothing(monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
+    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
+
+
+def test_a_delay_beside_the_lag_that_is_likely_not_0_is_a_rival_of_the_lag_alone(monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: 9.0, BOTH: LITTLE}
+    # One in forty that it is 0, and one in five.
+    for half, rivals in ((0.0137, {("command_delay", "motor_lag", "motor_lag")}), (0.025, set())):
+        assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.016, half)]})[:2] == (LAG, rivals)
+
+
+def test_less_than_nothing_is_nothing(monkeypatch):
+    left = {(): 90.0, LAG: -2.0, DELAY: LITTLE, BOTH: LITTLE}
+    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
+    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
+
+
+def test_a_filter_that_leaves_nothing_is_a_rival_of_one_that_surely_leaves_something(monkeypatch):
+    some = np.where(np.arange(BLOCKS) < 10, 3.0, -2.0)
+    left = {(): 90.0, DELAY: some, ("low_pass_filter",): 4.5 * LITTLE + 0.5, ("notch_filter",): 30.0}
+    names, rivals, *_ = apart(monkeypatch, DELAY, left)
+    assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
+
+
+def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
+    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.0035, 0.001)]})[0] == LAG
+
+
+def test_what_formulas_are_off_by_tells_nothing(monkeypatch):
+    left = {(): 9000.0, LAG: 9.0, DELAY: 1.0, BOTH: LITTLE}
+    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
+    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
+
+
+@pytest.mark.parametrize(
+    ("together", "filtered", "names", "rivals"),
+    [
+        (SURE, LITTLE, BOTH, {("low_pass_filter", "motor_lag", "")}),
+        (SURE, 30.0, BOTH, set()),
+        (ABSENT, LITTLE, ("low_pass_filter",), set()),
+    ],
+    ids=["a filter does what both do", "both", "a filter does what neither does"],
+)
+def test_more_numbers_are_tried_where_one_leaves_something(together, filtered, names, rivals, monkeypatch):
+    left = {(): 90.0, LAG: 30.0, DELAY: 31.0, BOTH: LITTLE, ("low_pass_filter",): filtered, ("notch_filter",): 30.0}
+    assert apart(monkeypatch, LAG, left, {BOTH: [together, together]})[:2] == (names, rivals)
+
+
+def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(monkeypatch):
+    for left, sizes in (({(): 90.0}, {}), ({(): 90.0, LAG: LITTLE}, {LAG: [ABSENT]})):
+        names, rivals, told, _ = apart(monkeypatch, LAG, left, sizes)
+        assert (names, rivals, told.chances) == ((), set(), {})
+
+
+def test_a_lateness_at_the_end_of_what_is_possible_is_none(monkeypatch):
+    end = CATALOGUE["motor_lag"].shapes[0].grid[-1]
+    assert apart(monkeypatch, LAG, {(): 90.0, LAG: LITTLE}, {LAG: [(end, 0.001)]})[0] == ()
+
+
+def test_rotors_that_are_measured_are_never_late():
+    found = found_with((), [])
+    found.hypothesis.can = lambda _candidate: False
+    told = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
+    assert told.found is told.without is found
+
+
+def test_numbers_that_instruments_do_not_tell_are_listed():
+    before = found_with(("motor_lag", "command_delay"), [SURE, SURE])
+    after = SimpleNamespace(
+        hypothesis=before.hypothesis, estimates=SimpleNamespace(effects=[(), *before.estimates.effects[1:]])
+    )
+    assert [effect.name for effect in unidentified(before, after)] == ["command_delay"]

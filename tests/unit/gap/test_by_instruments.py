@@ -1,0 +1,135 @@
+"""What instruments say of an effect, and of what is left: whether it is 0, whether it is the air."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import ttest_1samp
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming import by_instruments
+from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects
+from cpfls_cli.gap.naming.estimate import NamedFit
+from cpfls_cli.gap.residual.air import _growing
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.instruments import held as stays
+from cpfls_cli.playback.newness import PER_WINDOW, news
+
+BLOCKS, WINDOWS = 20, 12
+OWN, OTHER = np.array([True, False]), np.array([False, True])
+
+
+def crossed(values, rng):
+    """Products by block of two numbers that move alike, in gusts that the loop mixes into both."""
+    known = rng.standard_normal((BLOCKS, WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+    gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
+    moved = known + gust * [0.7, -0.5]
+    left = gust[..., 0]
+    rows = np.concatenate([moved, (left + moved @ np.array(values))[..., None]], axis=2)
+    known = np.concatenate([known, np.zeros((BLOCKS, WINDOWS, 1))], axis=2)
+    return np.einsum("bwk,bwl->bkl", known, rows)
+
+
+def test_what_is_nothing_is_taken_for_something_as_often_as_chance_does():
+    rng = np.random.default_rng(1)
+    # The other number is not 0, and refitted.
+    chances = np.array([_chance(crossed([0.0, 2.0], rng), OWN, OTHER, np.zeros(2)) for _ in range(400)])
+    assert 0.02 < (chances < 0.05).mean() < 0.09
+    assert 0.4 < chances.mean() < 0.6
+    assert _chance(crossed([2.0, 2.0], rng), OWN, OTHER, np.zeros(2)) < 1e-3
+
+
+def test_alone_it_is_a_test_of_means():
+    products = crossed([0.2, 0.0], np.random.default_rng(2))
+    nothing = np.zeros(2, dtype=bool)
+    expected = ttest_1samp(products[:, 0, -1], 0.0).pvalue
+    assert _chance(products, OWN, nothing, np.zeros(2)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
+def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(apart, told):
+    """A load and a wrong thrust, which in hover do the same; and one of which nothing is known."""
+    rng = np.random.default_rng(5)
+    known = rng.standard_normal((BLOCKS, WINDOWS, 3))
+    known[..., 1] = known[..., 0] + apart * known[..., 1]
+    moved = known + rng.standard_normal((BLOCKS, WINDOWS, 1)) * [0.3, 1.0, 1.0]
+    known[..., 2] = rng.standard_normal((BLOCKS, WINDOWS))
+    left = np.zeros((BLOCKS, WINDOWS, 1))
+    products = np.einsum("bwk,bwl->bkl", np.concatenate([known, left], axis=2), np.concatenate([moved, left], axis=2))
+    assert _strong(products, np.ones(3, dtype=bool)).tolist() == told
+
+
+def told(true, found, reach, rng):
+    """What a source knows of three numbers, found where they are not: `reach` of what they move, beside gusts."""
+    known = rng.standard_normal((BLOCKS, WINDOWS, 3)) * reach
+    gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
+    moved = known + gust * [0.7, -0.5, 0.3]
+    left = gust[..., 0] + moved @ (np.array(true) - found)
+    rows = np.concatenate([moved, left[..., None]], axis=2)
+    known = np.concatenate([known, np.zeros_like(gust)], axis=2)
+    return _Source(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("true", "names"),
+    [([1.0, 2.0, -1.0], ["wind"]), ([1.0, 0.0, 0.0], ["rotor_drag"]), ([0.0, 0.0, 0.0], [])],
+    ids=["a wind", "a drag in still air", "nothing"],
+)
+@pytest.mark.parametrize("knows", [True, False], ids=["both sources know it", "one hardly does"])
+def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that_is_all(
+    true, names, knows, monkeypatch
+):
+    found, stand = np.array(true) + 0.02, []
+    wind = Candidate(CATALOGUE["wind"].exact, {"W_x": found[1], "W_y": found[2]})
+    hypothesis = SimpleNamespace(chosen=[wind], places=((wind, slice(1)),), shape_values=found[1:])
+    numbers = SimpleNamespace(linear=found[:1], effects=[()])
+    fit = NamedFit(hypothesis, numbers, np.ones(6), GapSettings())
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
+        monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
+        stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
+    assert stand.count(names) >= 17
+
+
+def test_what_grows_with_the_motion_is_no_air_in_its_own_channel():
+    rng = np.random.default_rng(3)
+    block = np.repeat(np.arange(24), 20)
+    speed = np.repeat(rng.uniform(0.2, 3.0, 24), 20)[:, None] * rng.standard_normal((480, 1))
+    left = rng.standard_normal((480, 6))
+    left[:, 4] *= np.abs(np.repeat(np.sqrt(np.bincount(block, speed[:, 0] ** 2) / 20), 20))
+    found = _growing(left, speed, np.zeros(480, dtype=int), block, 199, rng)
+    assert found.tolist() == [False, False, False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("asked", "reach", "held"),
+    [([0.0, 0.0, 2.0], 0.3, True), ([0.0, 0.0, 2.0], 3.0, False), (None, 0.3, False)],
+    ids=["it stays", "it flies though the setpoint stands still", "nothing is known"],
+)
+def test_who_is_asked_to_stay_and_does_is_asked_for_nothing(asked, reach, held):
+    flown = reach * np.sin(np.linspace(0, 20, 200))[:, None] * [1.0, 0.5, 0.2] + [0.0, 0.0, 2.0]
+    setpoints = {} if asked is None else {"position": np.tile(asked, (200, 1))}
+    flight = SimpleNamespace(setpoints=setpoints, has_position=True, motion=SimpleNamespace(position=flown))
+    assert stays(flight) is held
+
+
+def test_what_was_before_knows_nothing_of_what_is_new_in_a_gust():
+    rng, fades = np.random.default_rng(3), 0.9
+    gust = lfilter([1.0], [1.0, -fades], rng.standard_normal((30000, 6)), axis=0)
+    # A loop that answers gusts, and what is asked of it. Its number is right: what is left is the gust alone.
+    moved = lfilter([1.0], [1.0, -0.9], rng.standard_normal(gust.shape) - 0.5 * gust, axis=0)
+    (new,), (known,), lasts = news([np.stack([moved, gust], axis=2)], [gust], [moved[..., None]])
+    assert lasts[:, 0] == pytest.approx(fades ** (PER_WINDOW // 4), abs=0.05)
+    assert (moved * gust).sum() / (moved**2).sum() < -0.15
+    assert abs((known[..., 0] * new[..., 1]).sum() / (known[..., 0] * new[..., 0]).sum()) < 0.05
+
+
+def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
+    rng = np.random.default_rng(4)
+    rows = [rng.standard_normal((5, 6, 3)), rng.standard_normal((40, 6, 3))]
+    new, known, _ = news(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
+    assert [len(each) for each in new] == [len(each) for each in known]
+    assert len(new[0]) == 0 < len(new[1])
