@@ -59,10 +59,10 @@ def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, wh
     output, option, runs = tmp_path / "model.h5", (), []
     while not runs or runs[-1].exit_code == 130:
         # The first runs do not even finish the initial population.
-        interrupt_at(7)
+        interrupt_at(5)
         runs.append(cpfls(*words, "-o", output, *option))
         option = ("--resume",)
-        assert stored(output, "history/evaluations")[-1] == min(7 * len(runs), stored(whole, "history/evaluations")[-1])
+        assert stored(output, "history/evaluations")[-1] == min(5 * len(runs), stored(whole, "history/evaluations")[-1])
     assert runs[-1].exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["model.h5"]

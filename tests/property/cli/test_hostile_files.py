@@ -8,8 +8,8 @@ from tests.builders.command_line import undrawn
 from tests.builders.hostile_files import DAMAGED, KINDS, Good, tried
 
 # `make fuzz` tries ten thousand of each, with all figures drawn.
-EXAMPLES = {"YAML": 30, "HDF5 structure": 15, "HDF5 bytes": 25, "CSV": 40, "Parquet": 40, "ULog": 40}
-EXAMPLES |= {"names": 15, "rotors": 20, "ULog nested": 30, "bombs": 5, **dict.fromkeys(DAMAGED, 12)}
+EXAMPLES = {"YAML": 30, "HDF5 structure": 20, "HDF5 bytes": 25, "CSV": 40, "Parquet": 40, "ULog": 40}
+EXAMPLES |= {"names": 30, "rotors": 20, "ULog nested": 30, "bombs": 5, **dict.fromkeys(DAMAGED, 25)}
 
 
 @pytest.fixture(scope="module")

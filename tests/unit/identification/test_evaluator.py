@@ -160,3 +160,15 @@ def test_undefined_chromosomes_get_the_worst_objectives():
     np.testing.assert_array_equal(evaluated.objectives[0], [np.inf] * 3)
     np.testing.assert_array_equal(evaluated.genes[0], chromosomes[0])
     assert np.isfinite(evaluated.objectives[1]).all()
+
+
+def test_objectives_are_those_of_a_plain_least_squares_fit():
+    evaluator, rng = problem("seesaw", "none")
+    chromosome = rng.integers(20000, LARGEST_GENE, evaluator.structure.genes)
+    evaluated = evaluator(chromosome[None])
+    Q, torque = written_out(evaluator, evaluator.fit(chromosome))(chromosome.astype(float))
+    error = torque - Q @ (np.linalg.pinv(Q, rcond=1e-10) @ torque)
+    singular = np.linalg.svd(Q, compute_uv=False)
+    singular = singular[singular > 1e-10 * singular[0]]
+    expected = [np.mean(error**2), np.abs(error).max(), singular[0] / singular[-1]]
+    np.testing.assert_allclose(evaluated.objectives[0], expected, rtol=1e-7)

@@ -189,6 +189,23 @@ def test_dependent_columns_get_the_parameters_of_smallest_norm():
     assert found.conditioning == pytest.approx(6 / SMALLEST_SINGULAR_SHARE)
 
 
+@pytest.mark.parametrize("kind", ["even", "one", "cluster"])
+@pytest.mark.parametrize(("condition", "full"), [(3.0, True), (1e5, True), (3e7, False)])
+def test_cholesky_and_lanczos_find_what_the_eigendecomposition_does(kind, condition, full):
+    A = columns(decay(condition, kind))[0]
+    matrix, tolerance = A.T @ A, SMALLEST_SINGULAR_SHARE**2
+    found, expected = least_squares._factored(matrix, tolerance), np.linalg.eigvalsh(matrix)
+    assert (found is not None) == full
+    if found is not None:
+        # Rounding of the matrix moves its smallest eigenvalue by 1e-16 of the largest.
+        assert found.smallest == pytest.approx(expected[0], rel=1e-9 + 1e-14 * condition**2)
+        assert found.largest == pytest.approx(expected[-1], rel=1e-12)
+        assert found.missing == 0
+        right_side = matrix @ np.ones(PARAMETERS)
+        np.testing.assert_allclose(matrix @ found.apply(right_side), right_side, rtol=1e-9)
+        np.testing.assert_allclose(found.lowest.T @ found.lowest, np.eye(3), atol=1e-9)
+
+
 def test_normal_equations_without_any_excitation():
     found = solved(np.zeros((6, 3)), np.ones(6))
     assert found.conditioning == np.inf

@@ -1,5 +1,6 @@
 """Which blocks are chosen: those that were flown, whatever else is tried."""
 
+from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +11,8 @@ from cpfls_cli.playback import structure
 from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Structure, choose, tried_blocks
+from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
+from cpfls_cli.search.vehicle_search import KeptStructure
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 from tests.builders.vehicle_search import WITHOUT_FORESIGHT
 
@@ -31,6 +33,25 @@ def flights():
 
 def chosen(flights, progress=lambda *_: None, kept=None, settings=QUICK):
     return choose(STATED, flights, settings, np.random.default_rng(0), progress, kept or {})
+
+
+def stopping_at(number):
+    def progress(judged, _):
+        if len(judged) == number:
+            raise SearchStoppedError
+
+    return progress
+
+
+def test_a_stopped_search_gives_what_it_has(flights):
+    choice = chosen(flights, stopping_at(4))
+    assert (choice.complete, choice.evaluated) == (False, 4)
+    assert choice.best.error <= choice.chosen.error < choice.nothing.error
+
+
+def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
+    with pytest.raises(SearchStoppedError):
+        chosen(flights, stopping_at(2))
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +79,29 @@ def test_a_search_among_hardly_anything_comes_to_its_end(flights, tried):
     assert set(choice.everything.structure.blocks) == set(tried)
 
 
+@pytest.mark.parametrize("number", [1, 7])
+def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
+    """Nothing is judged twice, and every fit starts from where it would have started."""
+    parts = []
+
+    def stopping(judged, _):
+        parts.append(judged)
+        if len(judged) == number:
+            raise SearchStoppedError
+
+    without, told = searched
+    with suppress(SearchStoppedError):
+        chosen(flights, stopping)
+    kept = dict(KeptStructure.of(each).pair for each in parts[-1])
+    resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
+    assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
+    pairs = list(zip(told[-1][0], parts[-1], strict=True))
+    assert [one.structure for one, _ in pairs] == [other.structure for _, other in pairs]
+    assert all(a.error == b.error and np.array_equal(a.by_block, b.by_block) for a, b in pairs)
+    assert resumed.chosen.structure == without.chosen.structure
+    assert resumed.complete
+
+
 def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, searched, monkeypatch):
     quick, _ = searched
     for name, value in WITHOUT_FORESIGHT.items():
@@ -66,6 +110,23 @@ def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, se
     assert quick.chosen.structure == whole.chosen.structure
     assert quick.chosen.error == pytest.approx(whole.chosen.error, rel=1e-3)
     assert quick.evaluated < whole.evaluated
+
+
+def test_errors_are_foretold_near_a_fit(flights):
+    """A block less, and one more: fitted, both come to what was foretold from the fit between them."""
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
+    judged = bench.judge(Structure(base))
+    asked = [Structure(base[:4] + base[5:]), Structure((*base, "drag_factor"))]
+    outlook = bench.outlook(judged, asked)
+    for each in asked:
+        fitted = bench.judge(each)
+        assert outlook.errors(each.blocks) == pytest.approx(fitted.by_block, rel=0.2)
+        assert outlook.errors(each.blocks).mean() == pytest.approx(fitted.by_block.mean(), rel=0.05)
+        error, numbers, condition = outlook.objectives(each.blocks)
+        assert error == pytest.approx(fitted.error, rel=0.05)
+        assert numbers == fitted.numbers
+        assert 10**condition == pytest.approx(fitted.condition_number, rel=0.5)
 
 
 class Bench:
