@@ -27,6 +27,7 @@ from cpfls_cli.playback.table import (
     WrenchTable,
     airflow_of,
     body_of,
+    learned_wrench,
     lever_weights,
     remainder_weights,
     rotor_weights,
@@ -34,6 +35,7 @@ from cpfls_cli.playback.table import (
     wrench_of_numbers,
 )
 from cpfls_cli.result import About, about, part, result
+from cpfls_cli.vehicle.motion import Acting, Acts, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -323,3 +325,30 @@ class VehicleModel:
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
         return body_of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
+
+
+def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
+    """List what acts on a model in any state: rotors, effects, and what is learned."""
+    response, vehicle = model.response, model.vehicle
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
+    hover = float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift))
+    numbers = {
+        "linear": model.thrust_linear * hover,
+        "slow_roll_pitch": response.slow_roll_pitch,
+        "slow_yaw": response.slow_yaw,
+    }
+    parts = [Acting("rotors", rotor_wrench, numbers)]
+    for one in model.effects:
+        if one.name not in model.beside_table:
+            acts, known = one.known.acts, one.known
+            assert acts is not None, "what is held has it"
+            of_thrust = known.of_all_forces and not one.is_lever
+            parts.append(Acting(one.name, _of_thrust(acts) if of_thrust else acts, one.values, one.is_lever))
+    if model.remainder is not None:
+        parts.append(Acting("remainder", learned_wrench(model.remainder)))
+    return tuple(parts)
+
+
+def _of_thrust(lever: Acts) -> Acts:
+    """Give a lever the thrust of the rotors in place of all forces."""
+    return lambda see, p: lever(replace(see, force=(0, 0, see.thrust)), p)

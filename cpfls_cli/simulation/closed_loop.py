@@ -13,6 +13,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.model import acting_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
 from cpfls_cli.simulation.autopilot import Autopilot, PlanPilot, plan_of
@@ -21,7 +22,6 @@ from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     TURNING_NUMBERS,
     Plant,
-    acting_of,
     flown_vehicle,
     given_turning,
     turning_of,

@@ -10,19 +10,16 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.table import learned_wrench
-from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects, in_table
+from cpfls_cli.playback.model import acting_of
+from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.motion import (
     ATTITUDE,
     BODY_RATE,
     VEHICLE_STATES,
     Acting,
     Carried,
-    Instant,
-    Numbers,
     Turning,
     Vehicle,
-    Wrench,
     rotor_wrench,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -51,41 +48,9 @@ def flown_vehicle(vehicle: VehicleSettings, model: VehicleModel | None, effects:
     )
 
 
-def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
-    """List what the table of weights of a model holds: rotors, effects, and what is learned."""
-    response, vehicle = model.response, model.vehicle
-    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
-    hover = float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift))
-    numbers = {
-        "linear": model.thrust_linear * hover,
-        "slow_roll_pitch": response.slow_roll_pitch,
-        "slow_yaw": response.slow_yaw,
-    }
-    parts = [Acting("rotors", rotor_wrench, numbers)]
-    levers = {one.name for one in model.effects if one.is_lever}
-    for one in in_table(model).listed:
-        acting = _acting(one)
-        if acting.of_all_forces and acting.name not in levers:
-            acting = Acting(acting.name, _of_thrust(acting), acting.numbers)
-        parts.append(acting)
-    if model.remainder is not None:
-        parts.append(Acting("remainder", learned_wrench(model.remainder)))
-    return tuple(parts)
-
-
 def _acting(one: SimulatedEffect) -> Acting:
     assert one.effect.acts is not None, "chosen so"
     return Acting(one.effect.name, one.effect.acts, one.values, one.effect.of_all_forces)
-
-
-def _of_thrust(lever: Acting) -> Callable[[Instant, Numbers], Wrench]:
-    """Give a lever the thrust of the rotors in place of all forces."""
-
-    def acts(see: Instant, p: Numbers) -> Wrench:
-        thrust = Instant(see.vehicle, see.rotor_speed, force=(0, 0, see.thrust), functions=see.functions)
-        return lever.acts(thrust, p)
-
-    return acts
 
 
 def _carried(one: SimulatedEffect) -> Carried:

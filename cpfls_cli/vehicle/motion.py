@@ -165,6 +165,9 @@ class Instant:
         return self.functions.rotors(values)
 
 
+Acts = Callable[[Instant, Numbers], Wrench]
+
+
 @dataclass(frozen=True)
 class Acting:
     """An effect with its numbers.
@@ -178,7 +181,7 @@ class Acting:
     """
 
     name: str
-    acts: Callable[[Instant, Numbers], Wrench]
+    acts: Acts
     numbers: Mapping[str, Value] = field(default_factory=dict)
     of_all_forces: bool = False
 
