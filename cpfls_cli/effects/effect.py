@@ -14,7 +14,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench, about_centre
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.values import Linear, Vector, zero
+from cpfls_cli.vehicle.values import Tangent, Vector, zero
 
 Kind = Literal["wrench", "actuator", "sensor", "parameter"]
 
@@ -201,7 +201,7 @@ def columns_of(
     """Make columns of what an effect does at an instant, which is linear in the coefficients of these names."""
 
     def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-        see, unit = signals.instants, {name: Linear({place: 1.0}) for place, name in enumerate(names)}
+        see, unit = signals.instants, {name: Tangent(0, {place: 1.0}) for place, name in enumerate(names)}
         given = acts(see, Numbers({**shape, **unit}))
         torque, force = about_centre(see, given)
         direct = _filled((*torque, *force), len(signals), names)
@@ -215,7 +215,7 @@ def _filled(components: Vector, samples: int, names: Sequence[str]) -> Array:
     """Arrange components as columns, shape (time, 6, coefficient)."""
     filled = np.zeros((samples, 6, max(len(names), 1)))
     for row, component in enumerate(components):
-        by = component.by if isinstance(component, Linear) else {0: component}
+        by = component.by if isinstance(component, Tangent) else {0: component}
         for place, values in by.items():
             filled[:, row, place] = values
     return filled

@@ -66,6 +66,10 @@ class Wrench(NamedTuple):
     momentum: Vector = ZERO
 
 
+_GEOMETRY = ("hubs", "spins", "radii")
+"""Of an `Instant`, what its state does not change."""
+
+
 @dataclass(frozen=True)
 class Instant:
     """What effects see.
@@ -87,6 +91,8 @@ class Instant:
         Squared speed that slow actuation has come to.
     force : vector, N, body frame
         Of all that has no lever for it.
+    thrust_scale, drag_scale : value
+        Ratios of the thrust and drag factors to those of `vehicle`.
     """
 
     vehicle: VehicleSettings
@@ -99,6 +105,8 @@ class Instant:
     height: Value = 0
     slow_square: Value = 0
     force: Vector = ZERO
+    thrust_scale: Value = 1
+    drag_scale: Value = 1
     functions: Functions = field(default=SYMBOLS)
 
     @cached_property
@@ -129,12 +137,12 @@ class Instant:
     @cached_property
     def thrust_factors(self) -> Value:
         """Thrust of each rotor for a unit of its squared speed, N s^2."""
-        return self._by_rotor(*(rotor.thrust_factor_n_s2 for rotor in self.vehicle.rotors))
+        return self._by_rotor(*(rotor.thrust_factor_n_s2 for rotor in self.vehicle.rotors)) * self.thrust_scale
 
     @cached_property
     def drag_factors(self) -> Value:
         """Size of the reaction torque of each rotor for a unit of its squared speed, N m s^2."""
-        return self._by_rotor(*(rotor.drag_factor_n_m_s2 for rotor in self.vehicle.rotors))
+        return self._by_rotor(*(rotor.drag_factor_n_m_s2 for rotor in self.vehicle.rotors)) * self.drag_scale
 
     @cached_property
     def rotor_thrust(self) -> Value:
@@ -160,6 +168,12 @@ class Instant:
         """Sum the torques of thrusts and reactions of the rotors, N and N m by rotor."""
         total, (x, y, _) = self.functions.total, self.hubs
         return total(y * thrust), -total(x * thrust), -total(self.spins * drag)
+
+    def moved(self, **changes: Any) -> Instant:
+        """Give the same vehicle in another state, without working out again where its rotors are."""
+        other = replace(self, **changes)
+        other.__dict__.update({name: self.__dict__[name] for name in _GEOMETRY if name in self.__dict__})
+        return other
 
     def _by_rotor(self, *values: Any) -> Value:
         return self.functions.rotors(values)
@@ -317,6 +331,13 @@ class Vehicle:
             functions=functions,
         )
 
+    def wrench(self, instant: Instant) -> tuple[Vector, Vector]:
+        """Sum torque and force of all that acts, N m and N, body frame, without weight."""
+        torque, force = total_wrench(self.acting, instant)
+        # The momentum of rotors changes with their accelerations, that of the body adds to the inertia.
+        spun = instant.moved(rotor_speed=instant.rotor_acceleration, air_velocity=ZERO, body_rate=ZERO)
+        return add(torque, self._momentum(spun)), force
+
     def derivative(self, instant: Instant, state: Vector, push: Vector | None, turning: Turning | None) -> Vector:
         """Differentiate the state.
 
@@ -327,12 +348,9 @@ class Vehicle:
         turning : Turning or None
             Where the inertia depends on the attitude.
         """
-        torque, force = total_wrench(self.acting, instant)
+        torque, force = self.wrench(instant)
         if push is not None:
             torque, force = add(torque, push[:3]), add(force, push[3:])
-        # The momentum of rotors changes with their accelerations, that of the body adds to the inertia.
-        spun = Instant(self.settings, instant.rotor_acceleration, functions=instant.functions)
-        torque = add(torque, self._momentum(spun))
         rate, settings = instant.body_rate, self.settings
         if turning is None:
             assert self.inertia is not None, "an inertia that depends on the attitude comes with each step"

@@ -1,4 +1,4 @@
-"""Numbers that the vehicle is written in: floats, arrays, the symbols of `tracing`; vectors of them, and one a rotor.
+"""Numbers that the vehicle is written in: floats, arrays, both with derivatives, the symbols of `tracing`; vectors.
 
 Vectors are tuples of components. What is always 0 is a plain 0, takes no part in sums and products, and costs nothing.
 """
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Value = Any
-"""A float, an array, a `tracing.Symbol`, or `Each`."""
+"""A float, an array, a `Tangent` of them, a `tracing.Symbol`, or `Each`."""
 Vector = tuple[Value, ...]
 """Components along x, y, z, or as many as a state has."""
 
@@ -45,48 +45,114 @@ class Functions(NamedTuple):
     total: Callable[[Value], Value]
 
 
-class Linear:
-    """What is linear in unknown numbers: the factor of each of them, by its place."""
+class Tangent:
+    """A number with its derivatives by some others, each by its place; those that are always 0 are left out."""
 
-    __slots__ = ("by",)
+    __slots__ = ("by", "value")
     __array_ufunc__ = None
 
-    def __init__(self, by: Mapping[int, Value]) -> None:
-        self.by = by
+    def __init__(self, value: Value, by: Mapping[int, Value]) -> None:
+        self.value, self.by = value, by
 
-    def each(self, change: Callable[[Value], Value]) -> Linear:
-        """Apply what is linear to all of them."""
-        return Linear({place: change(value) for place, value in self.by.items()})
+    def chained(self, value: Value, slope: Value) -> Tangent:
+        """Give what a function of it is, from its value and its slope."""
+        return Tangent(value, {place: times(slope, change) for place, change in self.by.items()})
 
-    def __add__(self, other: Value) -> Linear:
-        if zero(other):
-            return self
-        return Linear({place: plus(self.by.get(place, 0), other.by.get(place, 0)) for place in {**self.by, **other.by}})
+    def _merged(self, value: Value, other: Tangent) -> Tangent:
+        by = dict(self.by)
+        for place, change in other.by.items():
+            by[place] = plus(by[place], change) if place in by else change
+        return Tangent(value, by)
 
-    def __sub__(self, other: Value) -> Linear:
-        return self.__add__(-other)
+    def __add__(self, other: Value) -> Value:
+        if isinstance(other, Each):
+            return NotImplemented
+        if isinstance(other, Tangent):
+            return self._merged(plus(self.value, other.value), other)
+        return self if zero(other) else Tangent(plus(self.value, other), self.by)
 
-    def __rsub__(self, other: Value) -> Linear:
+    def __sub__(self, other: Value) -> Value:
+        return self.__add__(other if zero(other) else -other)
+
+    def __rsub__(self, other: Value) -> Value:
         return (-self).__add__(other)
 
-    def __mul__(self, other: Value) -> Linear:
-        return self.each(lambda value: times(value, other))
+    def __mul__(self, other: Value) -> Value:
+        if isinstance(other, Each):
+            return NotImplemented
+        if not isinstance(other, Tangent):
+            return self.chained(times(self.value, other), other)
+        if zero(self.value):
+            return self.chained(0, other.value)
+        given = other.chained(times(self.value, other.value), self.value)
+        return given if zero(other.value) else given._merged(given.value, self.chained(0, other.value))
 
-    def __truediv__(self, other: Value) -> Linear:
-        return self.each(lambda value: value / other)
+    def __truediv__(self, other: Value) -> Value:
+        if isinstance(other, (Each, Tangent)):
+            return self * other**-1
+        return Tangent(0 if zero(self.value) else self.value / other, {at: d / other for at, d in self.by.items()})
 
-    def __neg__(self) -> Linear:
-        return self.each(lambda value: -value)
+    def __rtruediv__(self, other: Value) -> Value:
+        return self**-1 * other
+
+    def __neg__(self) -> Tangent:
+        return Tangent(minus(0, self.value), {place: -change for place, change in self.by.items()})
+
+    def __pow__(self, power: float) -> Tangent:
+        if power == 2:
+            return self.chained(self.value * self.value, 2.0 * self.value)
+        # Powers of integers are not defined below 0.
+        value = np.asarray(self.value, dtype=float)
+        return self.chained(value**power, power * value ** (power - 1))
+
+    def __gt__(self, other: Value) -> Value:
+        return self.value > value_of(other)
+
+    def __lt__(self, other: Value) -> Value:
+        return self.value < value_of(other)
 
     __radd__, __rmul__ = __add__, __mul__
 
 
+def value_of(x: Value) -> Value:
+    """Give a number without its derivatives."""
+    return x.value if isinstance(x, Tangent) else x
+
+
+def _lifted(function: Callable[[Value], Value], slope: Callable[[Value, Value], Value]) -> Callable[[Value], Value]:
+    """Make a function of numbers with derivatives from one of arrays and its slope, from argument and value."""
+
+    def lifted(x: Value) -> Value:
+        if not isinstance(x, Tangent):
+            return function(x)
+        value = function(x.value)
+        return x.chained(value, slope(x.value, value))
+
+    return lifted
+
+
 def _array_where(condition: Value, yes: Value, no: Value) -> Value:
-    if not (isinstance(yes, Linear) or isinstance(no, Linear)):
+    if not (isinstance(yes, Tangent) or isinstance(no, Tangent)):
         return np.where(condition, yes, no)
-    ends = [one if isinstance(one, Linear) else Linear({}) for one in (yes, no)]
+    ends = [one if isinstance(one, Tangent) else Tangent(one, {}) for one in (yes, no)]
+    values = [one.value for one in ends]
+    value = 0 if all(map(zero, values)) else np.where(condition, *values)
     places = {**ends[0].by, **ends[1].by}
-    return Linear({at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
+    return Tangent(value, {at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
+
+
+def _array_arctan2(y: Value, x: Value) -> Value:
+    above, beside = value_of(y), value_of(x)
+    angle = np.arctan2(above, beside)
+    if not (isinstance(y, Tangent) or isinstance(x, Tangent)):
+        return angle
+    share = 1.0 / np.maximum(above * above + beside * beside, _LEAST)
+    turned = minus(times(Tangent(0, getattr(y, "by", {})), share * beside), times(x - beside, share * above))
+    return Tangent(angle, turned.by)
+
+
+_LEAST = 1e-300
+"""Square below which a direction has no slope."""
 
 
 def _array_rotors(values: Iterable[Value]) -> Value:
@@ -94,14 +160,47 @@ def _array_rotors(values: Iterable[Value]) -> Value:
 
 
 def _array_total(x: Value) -> Value:
-    return x.each(_array_total) if isinstance(x, Linear) else x if zero(x) else x.sum(axis=0)
+    if not isinstance(x, Tangent):
+        return x if zero(x) else x.sum(axis=0)
+    if zero(x.value):
+        return Tangent(0, {place: change.sum(axis=0) for place, change in x.by.items()})
+    # What is the same for all rotors counts once for each.
+    shape = x.value.shape
+    return Tangent(
+        x.value.sum(axis=0),
+        {
+            place: (change if np.shape(change) == shape else np.broadcast_to(change, shape)).sum(axis=0)
+            for place, change in x.by.items()
+        },
+    )
+
+
+def _array_extreme(choose: Callable[[Value, Value], Value], first: bool) -> Callable[[Value, Value], Value]:
+    def extreme(a: Value, b: Value) -> Value:
+        if not (isinstance(a, Tangent) or isinstance(b, Tangent)):
+            return choose(a, b)
+        larger = value_of(a) > value_of(b)
+        return _array_where(larger, *((a, b) if first else (b, a)))
+
+    return extreme
 
 
 ARRAYS = Functions(
-    *(np.sqrt, np.exp, np.sin, np.cos, np.arctan2, np.floor, np.abs),
-    *(_array_where, np.maximum, np.minimum, _array_rotors, _array_total),
+    sqrt=_lifted(np.sqrt, lambda _, root: 0.5 / np.maximum(root, _LEAST)),
+    exp=_lifted(np.exp, lambda _, value: value),
+    sin=_lifted(np.sin, lambda x, _: np.cos(x)),
+    cos=_lifted(np.cos, lambda x, _: -np.sin(x)),
+    arctan2=_array_arctan2,
+    floor=lambda x: np.floor(value_of(x)),
+    absolute=_lifted(np.abs, lambda x, _: np.sign(x)),
+    where=_array_where,
+    largest=_array_extreme(np.maximum, True),
+    smallest=_array_extreme(np.minimum, False),
+    rotors=_array_rotors,
+    total=_array_total,
 )
-"""Functions of arrays over time, whose first axis is that of the rotors where there is one value for each of them."""
+"""Functions of arrays over time, whose first axis is that of the rotors where there is one value for each of them, and
+of such with derivatives."""
 
 
 class Each:
