@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects import scales
 from cpfls_cli.effects.polynomial import Probe
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Body, Parameters, Terms
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.kernels import Parameters, Terms
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, of_thrust
+from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.parameters import (
     DELAY,
     DRAG,
@@ -31,8 +34,11 @@ from cpfls_cli.playback.parameters import (
     Physical,
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import body_of, effect_weights, rotor_weights, used_terms, weights_by_step
+from cpfls_cli.playback.table import body_of, effect_weights, learned_wrench, rotor_weights, used_terms, weights_by_step
+from cpfls_cli.playback.windows import MOTION, Flown
+from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, dot
 
 _TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
@@ -202,6 +208,77 @@ class VehicleAt:
             else:
                 found[name] = Physical(coefficients.get(name, value), number.unit)
         return found
+
+    @cached_property
+    def flown(self) -> Flown:
+        """The vehicle as runs fly it."""
+        return self._flown(lambda _, value: value, np.zeros((0, 3, 3)))
+
+    @cached_property
+    def differentiated(self) -> Flown:
+        """The same with the derivatives by all numbers."""
+
+        def number(name: str, value: float) -> Value:
+            place = self.free.index.get(name)
+            return value if place is None else Tangent(value, {MOTION + place: 1.0})
+
+        return self._flown(number, inertia_derivatives(self))
+
+    def _flown(self, number: Callable[[str, float], Value], inertia_by: Array) -> Flown:
+        free, stated = self.free, self.free.vehicle
+        thrust, drag = number(THRUST, self.get(THRUST, 1.0)), number(DRAG, self.get(DRAG, 1.0))
+        hover = scales.hover_speed(stated)
+        numbers = {
+            "linear": number(LAW, self.get(LAW, 0.0)) * hover,
+            "slow_roll_pitch": number(SLOW_SHARES[0], self.get(SLOW_SHARES[0], 0.0)),
+            "slow_yaw": number(SLOW_SHARES[1], self.get(SLOW_SHARES[1], 0.0)),
+        }
+
+        def rotors(see: Instant, p: Numbers) -> Wrench:
+            return rotor_wrench(see.moved(thrust_scale=thrust, drag_scale=drag), p)
+
+        counted = [number(name, float(value)) for name, value in zip(free.counting, self.log_counted, strict=True)]
+
+        def coefficient(name: str) -> Value:
+            size = ARRAYS.exp(dot(free.shares[name].tolist(), counted))
+            return number(name, float(self.values[free.index[name]])) * size
+
+        acting = [Acting("rotors", rotors, numbers)]
+        for block in free.effects:
+            known = CATALOGUE[block]
+            assert known.acts is not None, "blocks have it"
+            acts = of_thrust(known.acts) if known.of_all_forces else known.acts
+            own = {each.name.split(".")[1]: coefficient(each.name) for each in free.of_block(block)}
+            acting.append(Acting(block, acts, own))
+        learned = [block for block in free.blocks if block in LEARNED]
+        if learned:
+            values = [coefficient(each.name) for block in learned for each in free.of_block(block)]
+            filled = np.empty(len(values), dtype=object)
+            filled[:] = values
+            remainder = free.remainder(learned, np.zeros(len(values)))
+            shaped = filled.reshape(remainder.coefficients.shape)
+            acting.append(Acting("remainder", learned_wrench(remainder, shaped)))
+        return Flown(
+            Vehicle(stated, tuple(acting)),
+            Body.of(replace(stated, mass_kg=self.mass), self.inertia),
+            inertia_by,
+            free.index.get(LOG_MASS),
+            drag / thrust,
+        )
+
+
+def inertia_derivatives(at: VehicleAt) -> Array:
+    """Differentiate the inertia tensor by each number, shape (number, 3, 3), kg m^2."""
+    inertia, root, index = at.inertia, at.root_inertia, at.free.index
+    derivatives = np.zeros((len(index), 3, 3))
+    for axis, name in enumerate(LOG_INERTIA):
+        if name in index:
+            derivatives[index[name], axis] += 0.5 * inertia[axis]
+            derivatives[index[name], :, axis] += 0.5 * inertia[:, axis]
+    for name, (row, column) in zip(PRODUCT_NAMES, INERTIA_ENTRIES[3:], strict=True):
+        if name in index:
+            derivatives[index[name], row, column] = derivatives[index[name], column, row] = root[row] * root[column]
+    return derivatives
 
 
 @dataclass(frozen=True)

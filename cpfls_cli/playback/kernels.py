@@ -19,6 +19,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.compiling import Function, compiled, part
 from cpfls_cli.effects.polynomial import STATE_TERMS
+from cpfls_cli.playback.motion import FASTEST, Body, MeasuredMotion
 
 
 def _inlined(function: Function) -> Function:
@@ -29,39 +30,6 @@ def _inlined(function: Function) -> Function:
 def _inlined_sum(function: Function) -> Function:
     """Compile into the caller, and let the processor take the terms of a sum in the order that suits its registers."""
     return part(function, fastmath={"reassoc", "contract"}, forceinline=True)
-
-
-class MeasuredMotion(NamedTuple):
-    """Measured motion, where runs start and what they are held against.
-
-    Attributes
-    ----------
-    position, velocity : array, shape (time, 3), m and m/s, world frame
-    rotation : array, shape (time, 3, 3)
-        Body to world.
-    rate : array, shape (time, 3), rad/s, body frame
-    period : float, s
-    """
-
-    position: Array
-    velocity: Array
-    rotation: Array
-    rate: Array
-    period: float
-
-
-class Body(NamedTuple):
-    """What is moved.
-
-    Attributes
-    ----------
-    inertia, inverse : array, shape (3, 3)
-    """
-
-    mass: float
-    gravity: float
-    inertia: Array
-    inverse: Array
 
 
 class Airflow(NamedTuple):
@@ -272,10 +240,6 @@ def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Arr
         out[3 + i] = inverse[i, 0] * m0 + inverse[i, 1] * m1 + inverse[i, 2] * m2
     out[2] -= body.gravity
     out[6], out[7], out[8] = f0, f1, f2
-
-
-FASTEST = 300.0
-"""Body rate in rad/s, and speed in m/s, at which a run is called diverged and stands still."""
 
 
 class Terms(NamedTuple):

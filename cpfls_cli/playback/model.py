@@ -343,12 +343,12 @@ def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
             acts, known = one.known.acts, one.known
             assert acts is not None, "what is held has it"
             of_thrust = known.of_all_forces and not one.is_lever
-            parts.append(Acting(one.name, _of_thrust(acts) if of_thrust else acts, one.values, one.is_lever))
+            parts.append(Acting(one.name, of_thrust(acts) if of_thrust else acts, one.values, one.is_lever))
     if model.remainder is not None:
         parts.append(Acting("remainder", learned_wrench(model.remainder)))
     return tuple(parts)
 
 
-def _of_thrust(lever: Acts) -> Acts:
+def of_thrust(lever: Acts) -> Acts:
     """Give a lever the thrust of the rotors in place of all forces."""
     return lambda see, p: lever(replace(see, force=(0, 0, see.thrust)), p)

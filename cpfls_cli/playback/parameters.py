@@ -13,6 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.kernels import Airflow, airflow_terms
 from cpfls_cli.playback.table import (
@@ -141,6 +142,31 @@ def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     stated, changed = (known.columns(each, {}).direct for each in (signals, other))
     grows, acts = np.any(changed != stated, axis=0).T, np.any(stated, axis=0).T
     return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=256)
+def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
+    """Evaluate what a unit of each coefficient of an effect does at some motions, shape (coefficient, motion, 6)."""
+    known, rotors = CATALOGUE[block], len(vehicle.rotors)
+    rng = np.random.default_rng(0)
+    speed = rng.uniform(500.0, 1500.0, (_MOTIONS, rotors))
+    signals = Signals(
+        time=np.arange(_MOTIONS, dtype=float),
+        body_rate=rng.uniform(-2.0, 2.0, (_MOTIONS, 3)),
+        vehicle=vehicle,
+        attitude=rng.uniform(-1.0, 1.0, (_MOTIONS, 3)),
+        velocity=rng.uniform(-3.0, 3.0, (_MOTIONS, 3)),
+        position=rng.uniform(1.0, 2.0, (_MOTIONS, 3)),
+        rotor_speed=speed,
+    )
+    assert known.columns is not None, "blocks have them"
+    columns = known.columns(signals, {})
+    given = columns.direct if columns.momentum is None else columns.direct + columns.momentum
+    return np.moveaxis(given, 2, 0)
+
+
+_MOTIONS = 8
+"""Motions at which effects are evaluated to see on what they act."""
 
 
 @lru_cache(maxsize=64)
@@ -285,6 +311,26 @@ class FreeNumbers:
             for column in range(airflow_terms(self.airflow) // 2)
             for power, rotor in ((0, hover), (1, 1.0))
         )
+
+    @cached_property
+    def shares(self) -> dict[str, Array]:
+        """Axes on which the coefficients of effects and remainder act, as shares, by name, shape (3,).
+
+        A coefficient of torque is counted in units of the inertia about the axes on which it acts, so that a fit can
+        change the inertia alone; 0 for one that has a force, which knows no inertia.
+        """
+        found = {}
+        for block in (each for each in self.blocks if each in LEARNED or each in self.effects):
+            if block in LEARNED:
+                each_row = len(self.of_block(block)) // len(LEARNED[block])
+                acts = np.repeat(np.eye(6)[list(LEARNED[block])], each_row, axis=0) > 0
+            else:
+                acts = np.array([np.any(each, axis=0) for each in unit_wrenches(block, self.vehicle)])
+            for number, (own, pushes) in zip(
+                self.of_block(block), zip(acts[:, :3], acts[:, 3:], strict=True), strict=True
+            ):
+                found[number.name] = own / max(own.sum(), 1) * (not pushes.any())
+        return found
 
     @cached_property
     def columns(self) -> dict[str, Column]:

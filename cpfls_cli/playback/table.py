@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -48,9 +49,16 @@ class Remainder:
     )
 
 
-def learned_wrench(learned: Remainder) -> Callable[[Instant, Numbers], Wrench]:
-    """Make of a remainder what acts on a vehicle as an effect does."""
+def learned_wrench(learned: Remainder, coefficients: Any = None) -> Callable[[Instant, Numbers], Wrench]:
+    """Make of a remainder what acts on a vehicle as an effect does.
+
+    Parameters
+    ----------
+    coefficients : array of values, shape (row, column, 2), or None
+        In the place of its own, with derivatives.
+    """
     rules, order, peaks = max(len(learned.breakpoints) - 1, 1), learned.harmonic_order, learned.breakpoints.tolist()
+    given = learned.coefficients if coefficients is None else coefficients
 
     def acts(see: Instant, _p: Numbers) -> Wrench:
         functions, (x, y, _) = see.functions, see.air_velocity
@@ -60,7 +68,7 @@ def learned_wrench(learned: Remainder) -> Callable[[Instant, Numbers], Wrench]:
         turn = angle * (0.5 / pi)
         turn = turn - functions.floor(turn)
         total: list[Value] = [0] * 6
-        for row, by_column in zip(learned.rows.tolist(), learned.coefficients, strict=True):
+        for row, by_column in zip(learned.rows.tolist(), given, strict=True):
             by_power = by_column.T.reshape(2, rules, len(features)).tolist()
             slow, fast = (
                 _blended([dot(features, rule) for rule in by_rule], peaks, turn, functions) for by_rule in by_power

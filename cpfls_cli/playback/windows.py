@@ -1,0 +1,629 @@
+"""Free runs in windows of a flight, all windows side by side, and their derivatives by the numbers of the vehicle.
+
+A state is position (world), velocity (world), rotation (body to world) and body rate, in components, runs last. Between
+two samples the rotors are constant, and one step of the midpoint rule is taken:
+
+    R' = R [omega]_x,   m v' = m g + R F,   L' = M - omega x L,   L = I omega.
+
+Torque and force follow from the vehicle itself (`cpfls_cli.vehicle.motion`): on arrays for the runs, and on numbers
+with derivatives at all states that the runs passed, which are then composed step by step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.playback.motion import FASTEST, Body, MeasuredMotion
+from cpfls_cli.vehicle.motion import Instant, Vehicle
+from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, Vector, add, zero
+
+_SAMPLES = 4_000
+"""States at a time of which derivatives are taken, so that they stay in the cache."""
+
+_RUNS = 1_200
+"""Runs side by side."""
+
+MOTION = 6
+"""Places of the derivatives by the motion that a wrench depends on, air velocity and body rate; numbers follow."""
+
+STATES = 9
+"""Components of the derivatives of a state: velocity, rotation as a vector in the body frame, body rate."""
+
+
+class Turned(NamedTuple):
+    """How bodies turn in the states of runs.
+
+    Attributes
+    ----------
+    rate : array, shape (3, run), rad/s
+        That has the momentum.
+    direct : array, shape (3, run), N m
+        Torque that the motion takes beyond the change of momentum.
+    exists : array of bool, shape (run,)
+        False where no body has the inertia.
+    """
+
+    rate: Array
+    direct: Array
+    exists: BoolArray
+
+
+class Turning(NamedTuple):
+    """An inertia that depends on the attitude.
+
+    Attributes
+    ----------
+    momentum : callable
+        From rotations and rates, shapes (3, 3, run) and (3, run), to momenta.
+    turned : callable
+        From rotations and momenta.
+    """
+
+    momentum: Callable[[Array, Array], Array]
+    turned: Callable[[Array, Array], Turned]
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A vehicle that runs fly.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+        What acts on it; its numbers may have derivatives, by places from `MOTION` on.
+    body : Body
+        What is moved.
+    inertia_by : array, shape (number, 3, 3), kg m^2
+        Derivatives of the inertia by each number; without rows for nothing but runs.
+    log_mass : int or None
+        Place of the number that is the logarithm of the mass, if any.
+    drag_scale : value
+        Ratio of the drag factors that effects share to those stated.
+    turning : Turning or None
+        In the place of a constant inertia.
+    """
+
+    vehicle: Vehicle
+    body: Body
+    inertia_by: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    log_mass: int | None = None
+    drag_scale: Value = 1
+    turning: Turning | None = None
+
+    @cached_property
+    def _at_rest(self) -> Instant:
+        still = np.zeros((len(self.vehicle.settings.rotors), 1))
+        at = Instant(self.vehicle.settings, still, drag_scale=self.drag_scale, functions=ARRAYS)
+        # Worked out here once for all states that follow.
+        assert at.hubs
+        assert np.any(at.spins)
+        return at
+
+    def wrench(self, air: Vector, rate: Vector, rotors: Rotors) -> tuple[Vector, Vector]:
+        """Compute torque and force, N m and N, body frame, without weight."""
+        slow = rotors.slow_square
+        at = self._at_rest.moved(
+            rotor_speed=rotors.speed,
+            rotor_acceleration=rotors.acceleration,
+            slow_square=slow,
+            air_velocity=air,
+            body_rate=rate,
+        )
+        torque, force = self.vehicle.wrench(at)
+        push = rotors.push
+        return (torque, force) if push is None else (add(torque, push[:3]), add(force, push[3:]))
+
+
+class Rotors(NamedTuple):
+    """What drives runs over steps.
+
+    Attributes
+    ----------
+    speed, acceleration, slow_square : value by rotor, arrays of shape (rotor, ...)
+        rad/s, rad/s^2, rad^2/s^2.
+    push : vector of 6 or None
+        Torque and force on top of what the vehicle gives, N m and N, body frame.
+    """
+
+    speed: Value
+    acceleration: Value
+    slow_square: Value
+    push: Vector | None = None
+
+
+class Steps(NamedTuple):
+    """Rotors over the steps of runs.
+
+    Attributes
+    ----------
+    terms : array, shape (step, run, 1 + 4 rotors)
+        See `cpfls_cli.playback.rotors`.
+    push : array, shape (step, run, 6), N m and N, or None
+    terms_by : mapping of int to array, shape (step, run, 1 + 4 rotors)
+        Derivatives by numbers of their response, by place.
+    push_by : mapping of int to array, shape (step, run, 6)
+        Derivatives by numbers of the push, by place.
+    """
+
+    terms: Array
+    push: Array | None = None
+    terms_by: Mapping[int, Array] = {}
+    push_by: Mapping[int, Array] = {}
+
+    def of_runs(self, part: slice) -> Steps:
+        """Take some of the runs."""
+        return Steps(
+            self.terms[:, part],
+            None if self.push is None else self.push[:, part],
+            {place: each[:, part] for place, each in self.terms_by.items()},
+            {place: each[:, part] for place, each in self.push_by.items()},
+        )
+
+    def each(self) -> Iterator[Rotors]:
+        """Give the rotors over one step after another."""
+        pushes = [None] * len(self.terms) if self.push is None else self.push
+        # What is read again and again lies side by side.
+        parts = (np.ascontiguousarray(each.swapaxes(1, 2)) for each in _rotor_motion(self.terms))
+        for speed, acceleration, slow, push in zip(*parts, pushes, strict=True):
+            yield Rotors(speed, acceleration, slow, None if push is None else tuple(push.T))
+
+    def for_both_stages(self) -> Rotors:
+        """Give the rotors over all steps of all runs, once for each stage of a step, with derivatives."""
+        values = [_doubled(each) for each in _rotor_motion(self.terms)]
+        by: list[dict[int, Value]] = [{}, {}, {}]
+        for place, each in self.terms_by.items():
+            faster, change, late = (_doubled(own) for own in _divided(each))
+            for own, moved in zip(by, (faster, change, late + 2.0 * values[0] * faster), strict=True):
+                own[MOTION + place] = moved
+        given: list[Value] = [Tangent(x, own) if own else x for x, own in zip(values, by, strict=True)]
+        speed, change, slow = given
+        return Rotors(speed, change, slow, None if self.push is None else self._pushes(self.push))
+
+    def _pushes(self, push: Array) -> Vector:
+        by = {MOTION + place: _doubled(each) for place, each in self.push_by.items()}
+        return tuple(
+            Tangent(own, {place: each[row] for place, each in by.items()}) for row, own in enumerate(_doubled(push))
+        )
+
+
+def _doubled(values: Array) -> Array:
+    """Arrange values of steps and runs for both stages, shape (..., 2 step run)."""
+    return np.tile(values.reshape(-1, values.shape[-1]).T, 2)
+
+
+def _divided(terms: Array) -> tuple[Array, Array, Array]:
+    """Take speeds, accelerations, and slow less present squares, shapes (..., rotor), from terms of the rotors."""
+    rotors = terms.shape[-1] // 4
+    mean, _, change, late = (terms[..., 1 + n * rotors : 1 + (n + 1) * rotors] for n in range(4))
+    return mean, change, late
+
+
+def _rotor_motion(terms: Array) -> tuple[Array, Array, Array]:
+    """Give speeds, accelerations and slow squares, shapes (..., rotor), of terms of the rotors."""
+    speed, acceleration, late = _divided(terms)
+    return speed, acceleration, late + speed**2
+
+
+class _State(NamedTuple):
+    """States of runs, runs last."""
+
+    position: Array
+    velocity: Array
+    rotation: Array
+    momentum: Array
+
+
+class _Path(NamedTuple):
+    """Where runs went.
+
+    Attributes
+    ----------
+    velocity, rate : array, shape (step + 1, 3, run)
+    position : array, shape (step + 1, 3, run)
+    rotation : array, shape (step + 1, 3, 3, run)
+        At their samples; a run that diverged stays as it was before the step in which it did.
+    stages : tuple of array, shapes (2, step, 3, run), (2, step, 3, 3, run) and (2, step, 3, run)
+        Velocity, rotation and rate at the begin and in the middle of each step; empty where not asked for.
+    diverged : array of int, shape (run,)
+        Step at which a run diverged; -1 for those that did not.
+    """
+
+    position: Array
+    velocity: Array
+    rotation: Array
+    rate: Array
+    stages: tuple[Array, Array, Array] | None
+    diverged: IntArray
+
+
+def exponential(turn: Array) -> tuple[Array, Array]:
+    """Compute rotations ``exp [a]_x`` and their right Jacobians, ``exp [a + d]_x = exp [a]_x exp [J d]_x``.
+
+    Parameters
+    ----------
+    turn : array, shape (3, ...), rad
+
+    Returns
+    -------
+    rotation, right : array, shape (3, 3, ...)
+    """
+    square = (turn * turn).sum(axis=0)
+    small = square < 1e-8
+    safe = np.where(small, 1.0, square)
+    angle = np.sqrt(safe)
+    first = np.where(small, 1.0 - square / 6.0, np.sin(angle) / angle)
+    second = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(angle)) / safe)
+    third = np.where(small, 1.0 / 6.0 - square / 120.0, (1.0 - first) / safe)
+    pairs = turn[:, None] * turn
+    rotation, right = second * pairs, third * pairs
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        rotation[i, i] += 1.0 - second * square
+        right[i, i] += 1.0 - third * square
+        rotation[k, j] += first * turn[i]
+        rotation[j, k] -= first * turn[i]
+        right[k, j] -= second * turn[i]
+        right[j, k] += second * turn[i]
+    return rotation, right
+
+
+def _product(first: Array, second: Array) -> Array:
+    """Multiply matrices, shapes (3, k, ...) and (k, n, ...)."""
+    return np.asarray(sum(first[:, k, None] * second[k] for k in range(first.shape[1])))
+
+
+def _applied(matrix: Array, vector: Array) -> Array:
+    return np.asarray(sum(matrix[:, k] * vector[k] for k in range(3)))
+
+
+def _back(matrix: Array, vector: Array) -> Array:
+    """Multiply with the transposed matrix."""
+    return np.asarray(sum(matrix[k] * vector[k] for k in range(3)))
+
+
+def _crossed(first: Array, second: Array) -> Array:
+    (a, b, c), (u, v, w) = first, second
+    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+
+
+def _filled(components: Vector, count: int) -> Array:
+    out = np.zeros((3, count))
+    for row, value in zip(out, components, strict=True):
+        if not zero(value):
+            row[:] = value.value if isinstance(value, Tangent) else value
+    return out
+
+
+def _turned(flown: Flown, rotation: Array, momentum: Array) -> Turned:
+    if flown.turning is not None:
+        return flown.turning.turned(rotation, momentum)
+    rate = flown.body.inverse @ momentum
+    return Turned(rate, _crossed(rate, momentum), np.ones(rate.shape[1], dtype=bool))
+
+
+def _moved(
+    flown: Flown,
+    start: _State,
+    at: tuple[_State, Turned],
+    rotors: Rotors,
+    interval: float,
+    translates: bool,
+) -> _State:
+    """Move states for an interval with the derivatives at others."""
+    here, turned = at
+    torque, force = flown.wrench(tuple(_back(here.rotation, here.velocity)), tuple(turned.rate), rotors)
+    count = turned.rate.shape[1]
+    momentum = start.momentum + interval * (_filled(torque, count) - turned.direct)
+    rotation = _product(start.rotation, exponential(interval * turned.rate)[0])
+    if not translates:
+        return _State(start.position, start.velocity, rotation, momentum)
+    acceleration = _applied(here.rotation, _filled(force, count)) / flown.body.mass
+    acceleration[2] -= flown.body.gravity
+    return _State(
+        start.position + interval * here.velocity, start.velocity + interval * acceleration, rotation, momentum
+    )
+
+
+def _run(flown: Flown, start: _State, steps: Steps, period: float, translates: bool, *, stages: bool) -> _Path:
+    """Fly all runs."""
+    horizon, count = steps.terms.shape[:2]
+    position, velocity, rate = np.empty((3, horizon + 1, 3, count))
+    rotation = np.empty((horizon + 1, 3, 3, count))
+    passed = (np.empty((2, horizon, 3, count)), np.empty((2, horizon, 3, 3, count)), np.empty((2, horizon, 3, count)))
+    diverged, state, now = np.full(count, -1), start, _turned(flown, start.rotation, start.momentum)
+    position[0], velocity[0], rotation[0], rate[0] = state.position, state.velocity, state.rotation, now.rate
+    with np.errstate(all="ignore"):
+        for step, rotors in enumerate(steps.each()):
+            middle = _moved(flown, state, (state, now), rotors, 0.5 * period, translates)
+            there = _turned(flown, middle.rotation, middle.momentum)
+            end = _moved(flown, state, (middle, there), rotors, period, translates)
+            after = _turned(flown, end.rotation, end.momentum)
+            fastest = np.maximum(np.abs(after.rate).max(axis=0), np.abs(end.velocity).max(axis=0))
+            good = (diverged < 0) & now.exists & there.exists & after.exists & (fastest < FASTEST)
+            if stages:
+                for stage, (at, turned) in enumerate(((state, now), (middle, there))):
+                    for own, value in zip(passed, (at.velocity, at.rotation, turned.rate), strict=True):
+                        own[stage, step] = value
+            if good.all():
+                state, now = end, after
+            else:
+                # A run that no body flies stands still from there on.
+                diverged[(diverged < 0) & ~good] = step
+                state = _State(*(np.where(good, new, old) for new, old in zip(end, state, strict=True)))
+                now = Turned(*(np.where(good, new, old) for new, old in zip(after, now, strict=True)))
+            place = step + 1
+            position[place], velocity[place], rotation[place], rate[place] = (
+                state.position,
+                state.velocity,
+                state.rotation,
+                now.rate,
+            )
+    return _Path(position, velocity, rotation, rate, passed if stages else None, diverged)
+
+
+def _begun(flown: Flown, motion: MeasuredMotion, starts: IntArray) -> _State:
+    rotation, rate = motion.rotation[starts].transpose(1, 2, 0), motion.rate[starts].T
+    momentum = flown.body.inertia @ rate if flown.turning is None else flown.turning.momentum(rotation, rate)
+    return _State(motion.position[starts].T, motion.velocity[starts].T, rotation, momentum)
+
+
+def rotation_errors(measured: Array, predicted: Array) -> Array:
+    """Compute the rotation vectors from measured to predicted attitudes, rad, body frame of the measured one.
+
+    Parameters
+    ----------
+    measured, predicted : array, shape (..., 3, 3, run)
+
+    Returns
+    -------
+    array, shape (..., 3, run)
+        Its length is the geodesic distance.
+    """
+
+    def entry(i: int, j: int) -> Array:
+        return np.asarray((measured[..., :, i, :] * predicted[..., :, j, :]).sum(axis=-2))
+
+    pairs = [0.5 * (entry(2, 1) - entry(1, 2)), 0.5 * (entry(0, 2) - entry(2, 0)), 0.5 * (entry(1, 0) - entry(0, 1))]
+    skew = np.stack(pairs, axis=-2)
+    sine = np.sqrt((skew**2).sum(axis=-2))
+    cosine = 0.5 * (entry(0, 0) + entry(1, 1) + entry(2, 2) - 1.0)
+    shown = sine > _TINY
+    scale = np.where(shown, np.arctan2(sine, cosine) / np.where(shown, sine, 1.0), 1.0)
+    # Half a turn: the axis does not show in the skew part, its length is all that is used.
+    half_turn = np.asarray(~shown & (cosine < 0.0))
+    vector = skew * scale[..., None, :]
+    vector[..., 0, :] = np.where(half_turn, np.pi, vector[..., 0, :])
+    return np.asarray(vector)
+
+
+_TINY = 1e-12
+"""Sine of an angle, in rad, that is rounding: the axis does not show."""
+
+
+class Loss(NamedTuple):
+    """How errors are weighed: ``sum over signals of weight delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
+
+    Attributes
+    ----------
+    weight, delta : array, shape (horizon, 4)
+        For position, velocity, attitude, rate; position is not weighed.
+    """
+
+    weight: Array
+    delta: Array
+
+    def of(self, squares: Array) -> Array:
+        """Weigh squared errors, shape (horizon, 4, ...)."""
+        weight, delta = (each.reshape(*each.shape, *[1] * (squares.ndim - 2)) for each in self)
+        return np.asarray(weight * delta**2 * (np.sqrt(1.0 + squares / delta**2) - 1.0))
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Windows of a flight that a vehicle is flown in.
+
+    Attributes
+    ----------
+    starts : array of int, shape (run,)
+        Samples of the motion.
+    translates : bool
+        Whether velocity and position are simulated; otherwise they stay.
+    """
+
+    motion: MeasuredMotion
+    starts: IntArray
+    translates: bool
+
+    def blocks(self, steps: Steps, most: int) -> Iterator[tuple[slice, Runs, Steps]]:
+        """Take some runs at a time."""
+        for first in range(0, len(self.starts), most):
+            part = slice(first, first + most)
+            yield part, Runs(self.motion, self.starts[part], self.translates), steps.of_runs(part)
+
+    def fly(self, flown: Flown, steps: Steps, *, stages: bool = False) -> _Path:
+        """Fly all runs."""
+        begun = _begun(flown, self.motion, self.starts)
+        return _run(flown, begun, steps, self.motion.period, self.translates, stages=stages)
+
+    def errors(self, path: _Path) -> Array:
+        """Compare with what was measured: predicted less measured, shape (4, step, 3, run); see `errors_of_runs`."""
+        motion, at = self.motion, self.starts + np.arange(1, len(path.rate))[:, None]
+        measured = (each[at].swapaxes(1, 2) for each in (motion.position, motion.velocity, motion.rate))
+        position, velocity, rate = measured
+        turned = rotation_errors(motion.rotation[at].transpose(0, 2, 3, 1), path.rotation[1:])
+        return np.stack([path.position[1:] - position, path.velocity[1:] - velocity, turned, path.rate[1:] - rate])
+
+
+def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntArray]:
+    """Fly runs and give their errors.
+
+    Returns
+    -------
+    errors : array, shape (run, horizon, 4, 3)
+        Predicted less measured position, velocity, rotation vector, rate. A run that diverges stays as it was before
+        the step in which it did.
+    diverged : array of int, shape (run,)
+        Step at which a run diverged; -1 for those that did not.
+    """
+    found = [(own.fly(flown, part), own) for _, own, part in runs.blocks(steps, _RUNS)]
+    errors = [own.errors(path).transpose(3, 1, 0, 2) for path, own in found]
+    return np.concatenate(errors), np.concatenate([path.diverged for path, _ in found])
+
+
+def losses_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss) -> Array:
+    """Weigh the errors of runs, shape (run,)."""
+    found = []
+    for _, own, part in runs.blocks(steps, _RUNS):
+        path = own.fly(flown, part)
+        found.append(_lost(path.diverged, loss, loss.of(_squares(own.errors(path)))).sum(axis=(0, 1)))
+    return np.concatenate(found)
+
+
+def _squares(errors: Array) -> Array:
+    """Sum the squares of the components, shape (step, 4, run)."""
+    return np.asarray((errors**2).sum(axis=2).swapaxes(0, 1))
+
+
+def _lost(diverged: IntArray, loss: Loss, found: Array) -> Array:
+    """Count what a run leaves behind: as bad as the largest error, and of no direction."""
+    if (diverged < 0).all():
+        return found
+    gone = _gone(diverged, len(found))
+    return np.where(gone[:, None], (loss.weight * loss.delta * FASTEST)[:, :, None], found)
+
+
+def _gone(diverged: IntArray, horizon: int) -> BoolArray:
+    return np.asarray((diverged >= 0) & (np.arange(horizon)[:, None] >= diverged))
+
+
+def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
+    """Sum the gradient and the Gauss-Newton Hessian of the loss of runs by the numbers.
+
+    The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
+    the vector, and the loss depends on its length alone.
+
+    Parameters
+    ----------
+    group : array of int, shape (run,)
+        Which sum a run is added to.
+
+    Returns
+    -------
+    gradient : array, shape (group, number)
+    hessian : array, shape (group, number, number)
+    """
+    numbers, groups, horizon = len(flown.inertia_by), int(group.max(initial=0)) + 1, len(loss.weight)
+    gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
+    for part, own, of_steps in runs.blocks(steps, max(1, _SAMPLES // (2 * horizon))):
+        path = own.fly(flown, of_steps, stages=True)
+        errors = own.errors(path)[1:]
+        weight, delta = loss.weight[:, 1:, None], loss.delta[:, 1:, None]
+        share = np.sqrt(weight / np.sqrt(1.0 + _squares(errors) / delta**2))
+        share[np.broadcast_to(_gone(path.diverged, horizon)[:, None], share.shape)] = 0.0
+        changes = _tangents(flown, path, of_steps, own.motion.period, own.translates)
+        # Rows of a Jacobian by step, run and component, with what they come to.
+        shares = np.repeat(share.transpose(0, 2, 1), 3, axis=2)
+        rows = changes * shares[..., None]
+        residual = shares * errors.transpose(1, 3, 0, 2).reshape(horizon, -1, STATES)
+        for place in np.unique(group[part]):
+            kept = group[part] == place
+            jacobian = rows[:, kept].reshape(-1, numbers)
+            gradient[place] += residual[:, kept].reshape(-1) @ jacobian
+            hessian[place] += jacobian.T @ jacobian
+    return gradient, hessian
+
+
+def _tangents(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
+    """Compose the derivatives of the states by the numbers, shape (step, run, STATES, number)."""
+    moved = _steps_by(flown, path, steps, period, translates)
+    horizon, count, _, width = moved.shape
+    changes, change = np.empty((horizon, count, STATES, width - STATES)), np.zeros((count, STATES, width - STATES))
+    with np.errstate(all="ignore"):
+        for step in range(horizon):
+            change = moved[step, ..., :STATES] @ change + moved[step, ..., STATES:]
+            changes[step] = change
+    gone = _gone(path.diverged, horizon)
+    changes[gone] = 0.0
+    return changes
+
+
+def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
+    """Differentiate steps by the state at their begin and by numbers, shape (step, run, STATES, STATES + number)."""
+    assert path.stages is not None
+    _, horizon, _, count = path.stages[0].shape
+    numbers, samples = len(flown.inertia_by), horizon * count
+    parts = (np.moveaxis(each, (0, 1), (-3, -2)) for each in path.stages)
+    velocity, rotation, rate = (each.reshape(*each.shape[:-3], -1) for each in parts)
+    by = _accelerations_by(flown, velocity, rotation, rate, steps.for_both_stages(), translates)
+    by = by.reshape(2, samples, 6, -1)
+    rates = rate.reshape(3, 2, samples)
+    first, rest = np.zeros((2, samples, STATES, STATES + numbers))
+    second = np.zeros((samples, STATES, STATES))
+    diagonal = [0, 1, 2, 6, 7, 8]
+    for own, half, into_state, into_number in (
+        (by[0], 0.5 * period, first[..., :STATES], first[..., STATES:]),
+        (by[1], period, second, rest[..., STATES:]),
+    ):
+        for row, component in enumerate(diagonal):
+            into_state[:, component] = half * own[:, row, :STATES]
+            into_number[:, component] = half * own[:, row, STATES:]
+    for stage, interval, by_turn, by_rate in ((0, 0.5 * period, first, first), (1, period, rest, second)):
+        turn, right = exponential(interval * rates[:, stage])
+        by_turn[:, 3:6, 3:6] = turn.transpose(2, 1, 0)
+        by_rate[:, 3:6, 6:9] = interval * right.transpose(2, 0, 1)
+    for component in diagonal:
+        first[:, component, component] += 1.0
+        rest[:, component, component] = 1.0
+    return np.asarray(second @ first + rest).reshape(horizon, count, STATES, -1)
+
+
+def _accelerations_by(
+    flown: Flown, velocity: Array, rotation: Array, rate: Array, rotors: Rotors, translates: bool
+) -> Array:
+    """Differentiate accelerations, world and body frame, by state and numbers, shape (samples, 6, STATES + number).
+
+    ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
+    ``I d omega' = dM - d omega x I omega - omega x I d omega``.
+    """
+    air, body, numbers = _back(rotation, velocity), flown.body, len(flown.inertia_by)
+    seen = [Tangent(own, {place: 1.0}) for place, own in enumerate((*air, *rate))]
+    torque, force = flown.wrench(tuple(seen[:3]), tuple(seen[3:]), rotors)
+    samples = rate.shape[1]
+    wrench = np.zeros((samples, 6, MOTION + numbers))
+    for row, value in enumerate((*torque, *force)):
+        for place, change in value.by.items() if isinstance(value, Tangent) else ():
+            wrench[:, row, place] = change
+    turned, pushed = _filled(torque, samples), _filled(force, samples)
+    by = np.empty((samples, 6, STATES + numbers))
+    by[..., STATES:] = wrench[..., MOTION:]
+    by[..., :6] = wrench[..., :3] @ np.concatenate([rotation.transpose(2, 1, 0), _skew(air)], axis=2)
+    by[..., 6:9] = wrench[..., 3:6]
+    momentum = body.inertia @ rate
+    by[:, :3, 6:9] -= _skew(rate) @ body.inertia - _skew(momentum)
+    accelerated = body.inverse @ (turned - _crossed(rate, momentum))
+    for place, change in enumerate(flown.inertia_by):
+        if change.any():
+            by[:, :3, STATES + place] -= (change @ accelerated + _crossed(rate, change @ rate)).T
+    by[:, 3:, 3:6] -= _skew(pushed)
+    if flown.log_mass is not None:
+        by[:, 3:, STATES + flown.log_mass] -= pushed.T
+    # Accelerations of the state's order: world, then body.
+    out = np.empty_like(by)
+    out[:, :3] = rotation.transpose(2, 0, 1) @ by[:, 3:] / body.mass if translates else 0.0
+    out[:, 3:] = body.inverse @ by[:, :3]
+    return out
+
+
+def _skew(vectors: Array) -> Array:
+    """Arrange vectors, shape (3, samples), as matrices of their cross product, shape (samples, 3, 3)."""
+    out = np.zeros((vectors.shape[1], 3, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[:, k, j], out[:, j, k] = vectors[i], -vectors[i]
+    return out
