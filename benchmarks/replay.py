@@ -16,7 +16,7 @@ from benchmarks.shared.measure import in_turn, program, seconds, table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import Airflow
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of

@@ -19,8 +19,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.numbers import Numbers
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import Body, MeasuredMotion
 from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable, body_of

@@ -192,6 +192,6 @@ def model_notes(name: str, model: VehicleModel, flights: Sequence[LoggedFlight])
     audit = model.repairs
     for repair in () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named)):
         yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
-    still = [flight.name for flight in flights if model.table.feels_air and not flight.playback.translates]
+    still = [flight.name for flight in flights if model.feels_air and not flight.playback.translates]
     if still:
         yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"

@@ -33,8 +33,8 @@ from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.constants import constants_of_past
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy, foretold_by_run, instruments, late, late_by
-from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
 from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.vehicle.rotors import rotor_demand

@@ -23,9 +23,9 @@ from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy
-from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.past import PastBalances
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 

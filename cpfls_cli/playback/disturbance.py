@@ -204,10 +204,8 @@ def find_gusts(
     """
     rows = 6 if all(flight.translates for flight in given.flown) else 3
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
-    parts = {
-        name: [_wrench_of_part(model, weights, flight)[:, :rows] for flight in given.flown]
-        for name, weights in model.parts.items()
-    }
+    by_flight = [_wrench_of_parts(model, flight) for flight in given.flown]
+    parts = {name: [each[name][:, :rows] for each in by_flight] for name in by_flight[0]}
     by_past = given.kind == "none" and told
     found = gusts_in(sides, given, "past" if by_past else given.kind if told else "none", parts)
     if found is None:
@@ -254,18 +252,16 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     return replace(replace(found, **ends), foretold=foretold, foretold_without=without, white=white)
 
 
-def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
-    """Evaluate torque and force of a part of a model in the flow of a flight, shape (time, 6).
+def _wrench_of_parts(model: VehicleModel, flight: PlaybackFlight) -> dict[str, Array]:
+    """Evaluate torque and force of each part of a model in the flow of a flight, shapes (time, 6).
 
     The body does not turn and all rotors turn alike: what is in proportion to rates and commands, which answer what is
-    played, would excite itself, and the flights tell it as numbers.
+    played, would excite itself, and the flights identify it as numbers.
     """
-    part, found = replace(model.table, weights=weights), np.zeros((len(flight), 6))
     alike = np.sqrt((flight.speed**2).mean(axis=1, keepdims=True)) * np.ones(flight.speed.shape[1])
     flow = replace(flight, speed=alike, motion=flight.motion._replace(rate=np.zeros_like(flight.motion.rate)))
-    for stretch in flight.stretches:
-        found[stretch] = wrench_during(model, flow, stretch, part)
-    return found
+    found = [model.wrench_by_part(*during(model, flow, stretch)) for stretch in flight.stretches]
+    return {name: np.concatenate([each[name] for each in found]) for name in found[0]}
 
 
 def gusts_in(

@@ -14,7 +14,6 @@ from cpfls_cli.effects.polynomial import Probe
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Parameters, Terms
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, of_thrust
 from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.parameters import (
@@ -34,7 +33,7 @@ from cpfls_cli.playback.parameters import (
     Physical,
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import body_of, effect_weights, learned_wrench, rotor_weights, used_terms, weights_by_step
+from cpfls_cli.playback.table import effect_weights, learned_wrench, rotor_weights
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -209,6 +208,34 @@ class VehicleAt:
                 found[name] = Physical(coefficients.get(name, value), number.unit)
         return found
 
+    def rotor_terms(self, flight: PlaybackFlight, samples: IntArray, by: str = "") -> Array:
+        """Evaluate the terms of the rotors over the steps that begin at samples of a flight.
+
+        Parameters
+        ----------
+        by : str
+            Number of the response that they are differentiated by; empty for the terms themselves.
+
+        Returns
+        -------
+        array, shape (samples, 1 + 4 rotors)
+        """
+        response = self.response
+        if not by:
+            slow = response.slow_s if SLOW in self.free.index else None
+            return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
+        slopes = [
+            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, _TIMES[by])
+            for part in flight.stretches
+        ]
+        # The number is the logarithm of the slow time.
+        return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
+
+    @property
+    def times(self) -> list[str]:
+        """Numbers that are times of the rotors' response."""
+        return [name for name in _TIMES if name in self.free.index]
+
     @cached_property
     def flown(self) -> Flown:
         """The vehicle as runs fly it."""
@@ -301,92 +328,9 @@ class Evaluated:
         return [_weight_derivative(self.at, number.name) for number in self.at.free.numbers]
 
     @cached_property
-    def flown(self) -> Terms:
-        """Terms of the motion that have weights."""
-        return used_terms(self.at.table, self.at.free.used_airflow)
-
-    @cached_property
-    def used(self) -> Terms:
-        """Terms of the motion that have weights, or derivatives."""
-        touched = self.at.table != 0
-        for each in self.derivatives:
-            if each is not None:
-                touched |= each != 0
-        return used_terms(touched, self.at.free.used_airflow)
-
-    @cached_property
-    def body(self) -> Body:
-        """What is moved."""
-        return body_of(self.at.free.vehicle, self.at.inertia)
-
-    @cached_property
     def inertia_derivatives(self) -> Array:
         """Derivatives of the inertia tensor by each number, shape (number, 3, 3)."""
-        inertia, root, index = self.at.inertia, self.at.root_inertia, self.at.free.index
-        derivatives = np.zeros((len(index), 3, 3))
-        for axis, name in enumerate(LOG_INERTIA):
-            if name in index:
-                derivatives[index[name], axis] += 0.5 * inertia[axis]
-                derivatives[index[name], :, axis] += 0.5 * inertia[:, axis]
-        for name, (row, column) in zip(PRODUCT_NAMES, INERTIA_ENTRIES[3:], strict=True):
-            if name in index:
-                derivatives[index[name], row, column] = derivatives[index[name], column, row] = root[row] * root[column]
-        return derivatives
-
-    def rotor_terms(self, flight: PlaybackFlight, samples: IntArray, by: str = "") -> Array:
-        """Evaluate the terms of the rotors over the steps that begin at samples of a flight.
-
-        Parameters
-        ----------
-        by : str
-            Number of the response that they are differentiated by; empty for the terms themselves.
-
-        Returns
-        -------
-        array, shape (samples, 1 + 4 rotors)
-        """
-        response = self.at.response
-        if not by:
-            slow = response.slow_s if SLOW in self.at.free.index else None
-            return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
-        slopes = [
-            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, _TIMES[by])
-            for part in flight.stretches
-        ]
-        # The number is the logarithm of the slow time.
-        return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
-
-    def weights(self, terms: Array, used: Terms) -> Array:
-        """Evaluate the weights over steps of given terms of the rotors, shape (samples, 6, active)."""
-        return weights_by_step(self.at.table, used, terms)
-
-    @cached_property
-    def _entries(self) -> tuple[IntArray, Array, IntArray]:
-        """Weights of the used terms that change with each number: row and term, by terms of the rotors, first ones."""
-        places, weights = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, self.at.free.table_shape[2]))]
-        for derivative in self.derivatives:
-            own = (self.at.table if derivative is None else derivative)[:, self.used.active]
-            # The first term of the rotors is constant, so the response in time leaves it.
-            places.append(np.argwhere(own[:, :, 0 if derivative is not None else 1 :].any(axis=2)))
-            weights.append(own[places[-1][:, 0], places[-1][:, 1]])
-        first = np.cumsum([len(each) for each in places], dtype=np.int64)
-        return np.concatenate(places), np.concatenate(weights), first
-
-    def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
-        """Differentiate the weights over these steps, and the inertia, by each number."""
-        places, by_entry, first = self._entries
-        values = terms @ by_entry.T
-        for name in _TIMES.keys() & self.at.free.index.keys():
-            part = slice(*first[self.at.free.index[name] :][:2])
-            values[:, part] = self.rotor_terms(flight, samples, name) @ by_entry[part].T
-        return Parameters(
-            np.ascontiguousarray(places[:, 0]),
-            np.ascontiguousarray(places[:, 1]),
-            first,
-            values,
-            self.inertia_derivatives,
-            np.asarray(np.any(self.inertia_derivatives, axis=(1, 2))),
-        )
+        return inertia_derivatives(self.at)
 
 
 def _weight_derivative(at: VehicleAt, name: str) -> Array | None:

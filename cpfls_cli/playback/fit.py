@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,11 +13,12 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gauss_newton import minimised
-from cpfls_cli.playback.evaluation import Evaluated
+from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import NO_PARAMETERS, Loss, MeasuredMotion, errors_of_runs, sensitivities
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.windows import Loss, Runs, Steps, losses_of_runs, sums_of_runs
 
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
 """Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
@@ -51,6 +51,12 @@ class FitWindows:
     def horizon(self) -> int:
         """Steps of each window."""
         return len(self.loss.weight)
+
+    @property
+    def together(self) -> tuple[str, int, float, bool]:
+        """What windows have in common that are flown side by side."""
+        flight = self.flight
+        return flight.group, self.horizon, flight.motion.period, flight.translates
 
     @cached_property
     def samples(self) -> IntArray:
@@ -278,12 +284,12 @@ def fit_parts(
     Without a part the derivatives at the fit to all are known: they are those of all less those of the part. Each step
     has to lower the loss without the part. Parameters are those of `fit`; a single part cannot be left out.
     """
-    windows = [window for part in parts for window in part]
+    windows = WindowSet(tuple(window for part in parts for window in part))
     place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     bounds = free.lows, free.highs
 
     def best(kept: BoolArray, point: FitPoint, steps: int) -> FitPoint:
-        own = [window for window, keep in zip(windows, kept, strict=True) if keep]
+        own = windows if kept.all() else WindowSet(tuple(np.array(windows.windows, dtype=object)[kept]))
 
         def evaluated(values: Array) -> FitPoint:
             return WindowSums(free, own, values).mean()
@@ -296,123 +302,153 @@ def fit_parts(
     sums = WindowSums(free, windows, best(place >= 0, start, steps).values)
     losses = sums.losses()
     whole = sums.mean(losses)
-    # The derivatives along all windows are taken here, before threads ask for parts of them.
-    hessian = whole.hessian
 
     def without(part: int) -> FittedNumbers:
         kept = place != part
         point = best(kept, sums.mean(losses, kept), 1)
         return FittedNumbers(free, point.values, point.loss)
 
-    with ThreadPoolExecutor(2) as threads:
-        found = tuple(threads.map(without, range(len(parts) if len(parts) > 1 else 0)))
-    return Fitted(free, whole.values, whole.loss, hessian), found
+    found = tuple(without(part) for part in range(len(parts) if len(parts) > 1 else 0))
+    return Fitted(free, whole.values, whole.loss, whole.hessian), found
+
+
+@dataclass(frozen=True)
+class _SideBySide:
+    """Windows of several flights of one configuration that are flown at once.
+
+    Attributes
+    ----------
+    places : array of int, shape (flight,)
+        Which of all they are.
+    windows : tuple of FitWindows
+    owner : array of int, shape (run,)
+        Which of these flights each run is of.
+    """
+
+    places: IntArray
+    windows: tuple[FitWindows, ...]
+
+    @cached_property
+    def owner(self) -> IntArray:
+        return np.repeat(np.arange(len(self.windows)), [len(each.starts) for each in self.windows])
+
+    @cached_property
+    def runs(self) -> Runs:
+        motions = [each.motion for each in self.windows]
+        joined = (np.concatenate(parts) for parts in zip(*(each[:4] for each in motions), strict=True))
+        starts = np.arange(len(self.owner), dtype=np.int64) * (self.windows[0].horizon + 1)
+        return Runs(MeasuredMotion(*joined, motions[0].period), starts, self.windows[0].flight.translates)
+
+    @cached_property
+    def loss(self) -> Loss:
+        return Loss(
+            *(np.stack(each, axis=2)[:, :, self.owner] for each in zip(*(w.loss for w in self.windows), strict=True))
+        )
+
+    def steps(self, at: VehicleAt, numbers: Iterable[str] = ()) -> Steps:
+        """Give the rotors over all steps, with derivatives by numbers of their response."""
+        return Steps(self._terms(at), terms_by={at.free.index[name]: self._terms(at, name) for name in numbers})
+
+    def _terms(self, at: VehicleAt, by: str = "") -> Array:
+        terms = np.concatenate([at.rotor_terms(each.flight, each.samples, by) for each in self.windows])
+        return terms.reshape(len(self.owner), -1, terms.shape[1])[:, :-1].swapaxes(0, 1)
+
+    def losses(self, at: VehicleAt) -> Array:
+        """Weigh the errors of each run."""
+        return losses_of_runs(at.flown, self.runs, self.steps(at), self.loss)
+
+    def sums(self, at: VehicleAt, groups: IntArray) -> tuple[Array, Array]:
+        """Sum gradient and Hessian by the numbers, by group of each run."""
+        steps = self.steps(at, at.times)
+        return sums_of_runs(at.differentiated, self.runs, steps, self.loss, groups)
+
+
+@dataclass(frozen=True)
+class WindowSet:
+    """Windows of flights, made ready to be flown again and again."""
+
+    windows: tuple[FitWindows, ...]
+
+    @cached_property
+    def _together(self) -> list[_SideBySide]:
+        alike: dict[tuple[str, int, float, bool], list[int]] = {}
+        for place, each in enumerate(self.windows):
+            alike.setdefault(each.together, []).append(place)
+        return [_SideBySide(np.array(own), tuple(self.windows[place] for place in own)) for own in alike.values()]
+
+    @cached_property
+    def counts(self) -> IntArray:
+        """Runs of each flight."""
+        return np.array([len(each.starts) for each in self.windows])
+
+    def _of_group(self, free: JointNumbers, values: Array, each: _SideBySide) -> tuple[VehicleAt, IntArray]:
+        own, places = free.of_flight(each.windows[0].flight)
+        return VehicleAt(own, values[places]), places
+
+    def errors(self, free: JointNumbers, values: Array) -> list[Array]:
+        """Weigh the errors of each run, flight by flight, shapes (run,)."""
+        found = [np.zeros(0)] * len(self.windows)
+        for each in self._together:
+            losses = each.losses(self._of_group(free, values, each)[0])
+            for own, place in enumerate(each.places.tolist()):
+                found[place] = losses[each.owner == own]
+        return found
+
+    def losses(self, free: JointNumbers, values: Array) -> Array:
+        """Sum the loss along each flight, shape (flight,)."""
+        return np.array([each.sum() for each in self.errors(free, values)])
+
+    def derivatives(self, free: JointNumbers, values: Array, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
+        """Sum gradient and Hessian by all numbers along each flight, the first axis that of the groups.
+
+        Parameters
+        ----------
+        groups : sequence of array of int, shape (run,)
+            Which sum of its flight each run is added to.
+        """
+        count = len(values)
+        sizes = [int(own.max(initial=0)) + 1 for own in groups]
+        found = [(np.zeros((size, count)), np.zeros((size, count, count))) for size in sizes]
+        for each in self._together:
+            at, places = self._of_group(free, values, each)
+            firsts = np.cumsum([0, *(sizes[place] for place in each.places)])
+            whole = np.concatenate([groups[p] + first for p, first in zip(each.places, firsts, strict=False)])
+            gradient, hessian = each.sums(at, whole)
+            for place, first, end in zip(each.places.tolist(), firsts, firsts[1:], strict=False):
+                found[place][0][:, places] = gradient[first:end]
+                found[place][1][:, places[:, None], places] = hessian[first:end]
+        return found
 
 
 @dataclass(frozen=True)
 class WindowSums:
-    """Numbers at values, and what they come to along each of several windows."""
+    """Numbers at values, and what they come to along each of several flights."""
 
     free: JointNumbers
-    windows: Sequence[FitWindows]
+    windows: WindowSet
     values: Array
 
     @cached_property
-    def _of_groups(self) -> dict[str, tuple[Evaluated, IntArray]]:
-        """Evaluate the numbers once for each vehicle that flew, and say where they stand among all."""
-        found = {}
-        for window in self.windows:
-            if window.flight.group not in found:
-                own, places = self.free.of_flight(window.flight)
-                found[window.flight.group] = Evaluated.of(own, self.values[places]), places
-        return found
-
-    def derivatives(self, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
-        """Sum gradient and Hessian by all numbers along each, shapes (group, number) and (group, number, number)."""
-
-        def of(window: FitWindows, group: IntArray) -> tuple[Array, Array]:
-            evaluated, places = self._of_groups[window.flight.group]
-            own_gradient, own_hessian = window_sums(evaluated, window, group)[1:]
-            count = len(self.values)
-            gradient, hessian = np.zeros((len(own_gradient), count)), np.zeros((len(own_gradient), count, count))
-            gradient[:, places] = own_gradient
-            hessian[:, places[:, None], places] = own_hessian
-            return gradient, hessian
-
-        with ThreadPoolExecutor(2) as threads:
-            return list(threads.map(of, self.windows, groups))
-
-    @cached_property
-    def _by_window(self) -> tuple[Array, Array]:
-        none = [np.zeros(len(window.starts), dtype=np.int64) for window in self.windows]
-        gradient, hessian = zip(*self.derivatives(none), strict=True)
+    def _by_flight(self) -> tuple[Array, Array]:
+        none = [np.zeros(count, dtype=np.int64) for count in self.windows.counts]
+        gradient, hessian = zip(*self.windows.derivatives(self.free, self.values, none), strict=True)
         return np.concatenate(gradient), np.concatenate(hessian)
 
     def losses(self) -> Array:
-        """Sum the loss along each, shape (windows,)."""
-        with ThreadPoolExecutor(2) as threads:
-            return np.array(list(threads.map(self._loss, self.windows)))
-
-    def _loss(self, window: FitWindows) -> float:
-        return window_loss(self._of_groups[window.flight.group][0], window)
+        """Sum the loss along each, shape (flight,)."""
+        return self.windows.losses(self.free, self.values)
 
     def mean(self, losses: Array | None = None, kept: BoolArray | slice = slice(None)) -> FitPoint:
-        """Take the means over the runs of some of the windows; their losses, where they are known."""
-        count = np.array([len(window.starts) for window in self.windows])[kept].sum()
+        """Take the means over the runs of some of the flights; their losses, where they are known."""
+        count = self.windows.counts[kept].sum()
 
         def derivatives() -> tuple[Array, Array]:
-            gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_window)
+            gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_flight)
             return gradient, hessian
 
         found = self.losses() if losses is None else losses
         believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
         return FitPoint(self.values, float(found[kept].sum() / count), derivatives, believed)
-
-
-def window_loss(evaluated: Evaluated, window: FitWindows) -> float:
-    """Sum the loss over the windows of a flight."""
-    flight = window.flight
-    group, none = np.zeros(len(window.starts), dtype=np.int64), np.zeros((1, 0))
-    body, used, places, moves = evaluated.body, evaluated.flown, window.places, flight.translates
-    weights = evaluated.weights(evaluated.rotor_terms(flight, window.samples), used)
-    return float(
-        sensitivities(
-            window.motion, body, used, weights, NO_PARAMETERS, window.loss, places, moves, group, none, none[:, None]
-        )
-    )
-
-
-def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
-    """Sum loss, gradient and Hessian over the windows of a flight.
-
-    Parameters
-    ----------
-    group : array of int, shape (window,)
-        Which sum each window is added to.
-
-    Returns
-    -------
-    loss : float
-    gradient : array, shape (group, number)
-    hessian : array, shape (group, number, number)
-    """
-    flight, count, groups = window.flight, len(evaluated.at.values), int(group.max(initial=0)) + 1
-    gradient, hessian = np.zeros((groups, count)), np.zeros((groups, count, count))
-    terms = evaluated.rotor_terms(flight, window.samples)
-    loss = sensitivities(
-        window.motion,
-        evaluated.body,
-        evaluated.used,
-        evaluated.weights(terms, evaluated.used),
-        evaluated.parameters(flight, window.samples, terms),
-        window.loss,
-        window.places,
-        flight.translates,
-        group,
-        gradient,
-        hessian,
-    )
-    return float(loss), gradient, np.tril(hessian) + np.tril(hessian, -1).swapaxes(1, 2)
 
 
 @dataclass(frozen=True)
@@ -458,7 +494,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     count = sum(len(window.starts) for window in windows)
     blocks = [max(2, round(BLOCKS * len(window.starts) / count)) for window in windows]
     groups = [contiguous(len(window.starts), own) for window, own in zip(windows, blocks, strict=True)]
-    sums = WindowSums(free, windows, fitted.values).derivatives(groups)
+    sums = WindowSet(tuple(windows)).derivatives(free, fitted.values, groups)
     gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
     # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
     without = fitted.hessian * count - hessian * scale[:, None] * scale
@@ -469,22 +505,9 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 
 
-def window_errors(fitted: FittedNumbers, window: FitWindows) -> Array:
-    """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
-    flight = window.flight
-    own, places = fitted.free.of_flight(flight)
-    evaluated = Evaluated.of(own, fitted.values[places])
-    errors = np.empty((len(window.starts), window.horizon, 4, 3))
-    errors_of_runs(
-        window.motion,
-        evaluated.body,
-        evaluated.flown,
-        evaluated.weights(evaluated.rotor_terms(flight, window.samples), evaluated.flown),
-        window.places,
-        flight.translates,
-        errors,
-    )
-    return weighed(window.loss, errors)
+def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[Array]:
+    """Weigh the errors of windows as the fit does, shapes (window,): about 1.1 for rates that stay."""
+    return WindowSet(tuple(windows)).errors(fitted.free, fitted.values)
 
 
 def weighed(loss: Loss, errors: Array) -> Array:

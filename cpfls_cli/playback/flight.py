@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.rotors import Hold, rotor_terms_by_step
 
 _REMEMBERED = 4

@@ -16,7 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Body
+from cpfls_cli.playback.motion import Body
 from cpfls_cli.result import about, result
 
 

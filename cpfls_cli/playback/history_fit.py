@@ -6,8 +6,9 @@ derivatives of that enter the compiled sums over runs as those of further weight
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import NamedTuple
@@ -17,14 +18,14 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.gauss_newton import minimised
-from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, weighed, windows_of
-from cpfls_cli.playback.flight import PlaybackFlight, motion_at
+from cpfls_cli.playback.evaluation import VehicleAt
+from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, windows_of
+from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.judging import block_errors, parts_of
-from cpfls_cli.playback.kernels import Parameters, errors_of_runs, sensitivities
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs, losses_of_runs, sums_of_runs
 
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""
@@ -91,7 +92,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
     past_s : float, s
         How much of the past is used.
     """
-    at = _evaluated(fitted)
+    at = _vehicle(fitted)
     begun = [_Begun.of(at, each, past_s) for each in _chunks([_between(each) for each in windows])]
     ends = tuple(np.broadcast_to(end, _FIRST.shape).ravel() for end in _BOUNDS)
     point = partial(_point, at, begun, past_s)
@@ -104,13 +105,10 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
 
 def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
     """Weigh the errors of windows as the fit does; see `window_errors`."""
-    at, found = _evaluated(fitted), []
+    at, found = _vehicle(fitted), []
     for each in _chunks([windows]):
         begun = _Begun.of(at, each, observer.past_s)
-        errors = np.empty((len(each.starts), each.horizon, 4, 3))
-        weights = begun.weights(at, begun.pushed(observer))
-        errors_of_runs(each.motion, at.body, at.flown, weights, each.places, each.flight.translates, errors)
-        found.append(weighed(each.loss, errors))
+        found.append(losses_of_runs(at.flown, begun.runs, begun.steps(begun.pushed(observer)), each.loss))
     return np.concatenate(found)
 
 
@@ -133,9 +131,9 @@ def _chunks(windows: Sequence[FitWindows]) -> Iterator[FitWindows]:
             yield FitWindows(window.flight, window.starts[first : first + _CHUNK], window.loss)
 
 
-def _evaluated(fitted: FittedNumbers) -> Evaluated:
-    """Evaluate a forecast with the constant among its terms: that is what pushes."""
-    return Evaluated.of(fitted.free.base, fitted.values[: len(fitted.free.base.numbers)])
+def _vehicle(fitted: FittedNumbers) -> VehicleAt:
+    base = fitted.free.base
+    return VehicleAt(base, fitted.values[: len(base.numbers)])
 
 
 class _Begun(NamedTuple):
@@ -143,8 +141,8 @@ class _Begun(NamedTuple):
 
     Attributes
     ----------
-    terms : array, shape (sample, 1 + 4 rotors)
-        Of the rotors, window by window.
+    terms : array, shape (step, run, 1 + 4 rotors)
+        Of the rotors.
     missed : array, shape (run, step, 6), N m and N
         By the model, of each step of the past; 0 where there is none.
     """
@@ -154,69 +152,53 @@ class _Begun(NamedTuple):
     missed: Array
 
     @classmethod
-    def of(cls, at: Evaluated, window: FitWindows, past_s: float) -> _Begun:
+    def of(cls, at: VehicleAt, window: FitWindows, past_s: float) -> _Begun:
         """Run a model along the measured samples before windows."""
         flight = window.flight
         steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
-        samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()) + 1)
-        errors = np.empty((len(samples) - 1, 1, 4, 3))
-        motion = motion_at(flight.motion, samples)
-        weights = at.weights(at.rotor_terms(flight, samples), at.flown)
-        errors_of_runs(motion, at.body, at.flown, weights, np.arange(len(errors)), flight.translates, errors)
-        missed = np.zeros((len(samples), 6))
-        missed[:-1] = missed_wrench(flight, samples[:-1], errors[:, 0], at.body)
-        terms = at.rotor_terms(flight, window.samples)
-        return cls(window, terms, missed[steps - samples[0]] * known[:, :, None])
+        samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
+        terms = at.rotor_terms(flight, samples)
+        errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
+        missed = np.zeros((len(samples) + 1, 6))
+        missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
+        own = at.rotor_terms(flight, window.starts + np.arange(window.horizon)[:, None])
+        return cls(window, own, missed[steps - samples[0]] * known[:, :, None])
+
+    @property
+    def runs(self) -> Runs:
+        return Runs(self.window.flight.motion, self.window.starts, self.window.flight.translates)
 
     def pushed(self, observer: Observer) -> Array:
-        """Give what pushes the runs, shape (sample, 6)."""
+        """Give what pushes the runs, shape (step, run, 6)."""
         period = self.window.flight.motion.period
         begun = np.einsum("rsa,sa->ra", self.missed, observer.weights(period))
-        return np.asarray(begun[:, None] * observer.fading(period, self.window.horizon + 1)).reshape(-1, 6)
+        return np.asarray(begun * observer.fading(period, self.window.horizon)[:, None])
 
-    def weights(self, at: Evaluated, pushed: Array) -> Array:
-        """Evaluate the weights of the runs with what pushes them, shape (sample, 6, active)."""
-        weights = at.weights(self.terms, at.flown)
-        weights[:, :, 0] += pushed
-        return weights
+    def steps(self, pushed: Array, by: Mapping[int, Array] | None = None) -> Steps:
+        """Give what drives the runs, with derivatives of what pushes them."""
+        return Steps(self.terms, pushed, push_by=by or {})
 
 
-def _point(at: Evaluated, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:
+def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:
     """Take the mean loss over windows, with its derivatives by the logarithms."""
     count = len(values)
-    loss, gradient, hessian = 0.0, np.zeros((1, count)), np.zeros((1, count, count))
     moved = [_observer(values + step, past_s) for step in _STEP * np.eye(count)]
-    for each in begun:
-        window, pushed = each.window, each.pushed(_observer(values, past_s))
-        loss += float(
-            sensitivities(
-                window.motion,
-                at.body,
-                at.flown,
-                each.weights(at, pushed),
-                _pushing(np.hstack([(each.pushed(observer) - pushed) / _STEP for observer in moved])),
-                window.loss,
-                window.places,
-                window.flight.translates,
-                np.zeros(len(window.starts), dtype=np.int64),
-                gradient,
-                hessian,
-            )
-        )
-    total, lower = sum(len(each.window.starts) for each in begun), hessian[0]
-    curvature = np.tril(lower) + np.tril(lower, -1).T
-    believed = Believed(_FIRST.ravel(), np.ones(count), np.full(count, _SPREAD))
-    return FitPoint(values, loss / total, lambda: (gradient[0] / total, curvature / total), believed)
-
-
-def _pushing(value: Array) -> Parameters:
-    """Arrange numbers that move torque and force alone, shape (sample, number x 6), for the compiled sums."""
-    count = value.shape[1] // 6
-    return Parameters(
-        row=np.tile(np.arange(6), count),
-        term=np.zeros(6 * count, dtype=np.int64),
-        first=6 * np.arange(count + 1),
-        value=np.ascontiguousarray(value),
-        inertia=np.zeros((count, 3, 3)),
-        moves=np.zeros(count, dtype=bool),
+    pushed = [each.pushed(_observer(values, past_s)) for each in begun]
+    total = sum(len(each.window.starts) for each in begun)
+    loss = sum(
+        losses_of_runs(at.flown, each.runs, each.steps(push), each.window.loss).sum()
+        for each, push in zip(begun, pushed, strict=True)
     )
+
+    def derivatives() -> tuple[Array, Array]:
+        gradient, hessian = np.zeros(count), np.zeros((count, count))
+        flown = replace(at.flown, inertia_by=np.zeros((count, 3, 3)))
+        for each, push in zip(begun, pushed, strict=True):
+            by = {place: (each.pushed(observer) - push) / _STEP for place, observer in enumerate(moved)}
+            group = np.zeros(len(each.window.starts), dtype=np.int64)
+            own = sums_of_runs(flown, each.runs, each.steps(push, by), each.window.loss, group)
+            gradient, hessian = gradient + own[0][0], hessian + own[1][0]
+        return gradient / total, hessian / total
+
+    believed = Believed(_FIRST.ravel(), np.ones(count), np.full(count, _SPREAD))
+    return FitPoint(values, float(loss / total), derivatives, believed)

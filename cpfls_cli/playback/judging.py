@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gauss_newton import damped_step
-from cpfls_cli.playback.fit import PRIOR, Fitted, FittedNumbers, FitWindows, WindowSums, window_errors, windows_of
+from cpfls_cli.playback.fit import PRIOR, Fitted, FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
@@ -112,9 +112,10 @@ class Outlook:
         """Evaluate runs and their derivatives once; pieces are the blocks of `block_errors`."""
         windows = [window for part in parts for window in part]
         pieces = _blocks([len(each.starts) for each in windows])
-        gradient, hessian = zip(*WindowSums(free, windows, values).derivatives(pieces), strict=True)
+        gradient, hessian = zip(*WindowSet(tuple(windows)).derivatives(free, values, pieces), strict=True)
         fitted, scale = FittedNumbers(free, values, np.nan), free.scales
-        loss = [np.bincount(own, window_errors(fitted, each)) for own, each in zip(pieces, windows, strict=True)]
+        errors = window_errors(fitted, windows)
+        loss = [np.bincount(own, each) for own, each in zip(pieces, errors, strict=True)]
         place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         return cls(
             free,

@@ -21,7 +21,6 @@ from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import WrenchTable
 from cpfls_cli.result import About
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -252,17 +251,14 @@ def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Ar
     yield from (products[number == block].sum(axis=0) for block in range(blocks))
 
 
-def wrench_during(
-    model: VehicleModel, flight: PlaybackFlight, stretch: slice, table: WrenchTable | None = None
-) -> Array:
-    """Evaluate torque and force of rotors and effects at the samples of a stretch, shape (time, 6), N m and N, body.
+def wrench_during(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:
+    """Evaluate torque and force of rotors and effects at the samples of a stretch, shape (time, 6), N m and N, body."""
+    return model.wrench(*during(model, flight, stretch))
 
-    Parameters
-    ----------
-    table : WrenchTable or None
-        A part of the model alone; None for all of it.
-    """
+
+def during(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> tuple[Array, Array, Array]:
+    """Give air velocity, body rate and terms of the rotors at the samples of a stretch."""
     motion = flight.motion
     air = np.einsum("tji,tj->ti", motion.rotation[stretch], motion.velocity[stretch] - np.array(model.wind))
     rotor = model.response.terms_at_samples(flight.speed[stretch], motion.period, flight.hold)
-    return (table or model.table).wrench(air, motion.rate[stretch], rotor)
+    return air, motion.rate[stretch], rotor

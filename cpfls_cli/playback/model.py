@@ -9,24 +9,27 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.rigid_body import positive_definite
+from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.playback.kernels import MOST_COLUMNS, Body, airflow_terms
+from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import (
     Remainder,
     WrenchTable,
     airflow_of,
-    body_of,
+    airflow_terms,
     learned_wrench,
     lever_weights,
     remainder_weights,
@@ -34,9 +37,11 @@ from cpfls_cli.playback.table import (
     with_slow,
     wrench_of_numbers,
 )
+from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
 from cpfls_cli.result import About, about, part, result
-from cpfls_cli.vehicle.motion import Acting, Acts, rotor_wrench
+from cpfls_cli.vehicle.motion import Acting, Acts, Vehicle, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import Tangent, Vector
 
 
 class ModelEffect(NamedTuple):
@@ -101,6 +106,13 @@ class ModelEffect(NamedTuple):
         found = None if self.is_filter or known.carried is not None else polynomial(known, probe, self.shape)
         return None if found is None else np.tensordot(self.linear, with_slow(found, probe), axes=1)
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it follows from what free runs know: air velocity, body rate and rotors."""
+        known = self.effect
+        elsewhere = known.carried is not None or known.rate_derivative or known.needs & {"height", "attitude"}
+        return known.acts is not None and not (self.is_filter or elsewhere)
+
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
         return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
@@ -153,16 +165,8 @@ class VehicleModel:
 
     @cached_property
     def parts(self) -> Mapping[str, Array]:
-        """Weights of each part alone: rotors, effects by name, remainder; shapes as those of the table.
-
-        Raises
-        ------
-        ComputationError
-            If the remainder has more columns than the compiled loops hold.
-        """
+        """Weights of each part alone: rotors, effects by name, remainder; shapes as those of the table."""
         learned = airflow_terms(airflow_of(self.remainder))
-        if learned > 2 * MOST_COLUMNS:
-            raise ComputationError(f"a remainder of {learned // 2} columns is too large; {MOST_COLUMNS} at most")
         parts = {"rotors": np.zeros((6, len(STATE_TERMS) + learned, 1 + 4 * self.rotors))}
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         for name, weights in self._polynomials.items():
@@ -183,8 +187,7 @@ class VehicleModel:
     @property
     def along(self) -> tuple[ModelEffect, ...]:
         """Effects that are evaluated along a measured motion, being no polynomials."""
-        held = self._polynomials
-        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.name in held))
+        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.is_simulated))
 
     @property
     def filters(self) -> tuple[ModelEffect, ...]:
@@ -283,14 +286,13 @@ class VehicleModel:
         """
         beside = self.wrench_beside(signals)
         if signals.rotor_speed is None:
-            rotor = np.zeros((len(signals), self.table.weights.shape[2]))
-            rotor[:, 0] = 1.0
+            rotor = np.zeros((len(signals), 1 + 4 * self.rotors))
             beside = beside + signals.wrench
         else:
             hold = self.hold_of(signals, "previous" if signals.commanded else "linear")
             response = self.response_to(signals)
             rotor = response.terms_at_samples(signals.rotor_speed, signals.period, hold)
-        held = self.table.wrench(self._air(signals), signals.body_rate, rotor)
+        held = self.wrench(self._air(signals), signals.body_rate, rotor)
         return np.asarray(held + beside + lever_weights(self.centre, beside.T).T)
 
     def wrench_beside(self, signals: Signals) -> Array:
@@ -311,20 +313,53 @@ class VehicleModel:
         total = np.zeros((len(signals), 6))
         for one in self.along:
             total += one.wrench(signals)
-        for one in self.effects if signals.rotor_speed is None else ():
-            weights = self._polynomials.get(one.name)
-            if weights is not None and weights[:, :, 1:].any() and not one.missing(signals):
-                held = state_terms(self._air(signals), signals.body_rate) @ weights[:, :, 0].T
-                total += one.wrench(signals) - held
+        if signals.rotor_speed is None:
+            still = np.zeros((len(signals), 1 + 4 * self.rotors))
+            held = self.wrench_by_part(self._air(signals), signals.body_rate, still)
+            for one in self.effects:
+                if one.name in held and not (one.is_lever or one.missing(signals)):
+                    total += one.wrench(signals) - held[one.name]
         return total
 
     def _air(self, signals: Signals) -> Array:
-        return signals.air_velocity if self.table.feels_air else np.zeros_like(signals.body_rate)
+        return signals.air_velocity if self.feels_air else np.zeros_like(signals.body_rate)
+
+    @cached_property
+    def flown(self) -> Flown:
+        """The vehicle as runs fly it."""
+        turning = None if self.fuzzy is None else turning_by_attitude(self.fuzzy)
+        return Flown(Vehicle(self.vehicle, acting_of(self)), self.body, turning=turning)
+
+    @cached_property
+    def feels_air(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        seen = tuple(Tangent(np.array([value]), {0: 1.0}) for value in (1.0, -2.0, 0.5))
+        speed = np.linspace(0.9, 1.1, self.rotors)[:, None] * scales.hover_speed(self.vehicle)
+        torque, force = self.flown.wrench(seen, (0.3, -0.2, 0.1), Rotors(speed, 0 * speed, speed**2))
+        return any(isinstance(each, Tangent) and np.any(each.by.get(0, 0.0)) for each in (*torque, *force))
+
+    def wrench(self, air: Array, rate: Array, rotor: Array) -> Array:
+        """Compute torque and force of all that is simulated with the state, shape (time, 6), N m and N, body frame.
+
+        Parameters
+        ----------
+        air, rate : array, shape (time, 3), m/s and rad/s, body frame
+            Velocity through the air, and body rate.
+        rotor : array, shape (time, 1 + 4 rotors)
+            See `cpfls_cli.playback.rotors`.
+        """
+        torque, force = self.flown.wrench(tuple(air.T), tuple(rate.T), Rotors.of(rotor))
+        return _rows((*torque, *force), len(air))
+
+    def wrench_by_part(self, air: Array, rate: Array, rotor: Array) -> dict[str, Array]:
+        """Compute the same of each part alone: rotors, effects by name, remainder; parameters as those of `wrench`."""
+        parts = self.flown.wrench_by_part(tuple(air.T), tuple(rate.T), Rotors.of(rotor))
+        return {name: _rows(wrench, len(air)) for name, wrench in parts.items()}
 
     @cached_property
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
-        return body_of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
+        return Body.of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
 
 
 def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
@@ -342,8 +377,8 @@ def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
         if one.name not in model.beside_table:
             acts, known = one.known.acts, one.known
             assert acts is not None, "what is held has it"
-            of_thrust = known.of_all_forces and not one.is_lever
-            parts.append(Acting(one.name, of_thrust(acts) if of_thrust else acts, one.values, one.is_lever))
+            own = of_thrust(acts) if known.of_all_forces and not one.is_lever else acts
+            parts.append(Acting(one.name, own, one.values, one.is_lever))
     if model.remainder is not None:
         parts.append(Acting("remainder", learned_wrench(model.remainder)))
     return tuple(parts)
@@ -352,3 +387,30 @@ def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
 def of_thrust(lever: Acts) -> Acts:
     """Give a lever the thrust of the rotors in place of all forces."""
     return lambda see, p: lever(replace(see, force=(0, 0, see.thrust)), p)
+
+
+def _rows(components: Vector, samples: int) -> Array:
+    out = np.zeros((6, samples))
+    for row, value in zip(out, components, strict=True):
+        row[:] = value
+    return out.T
+
+
+def turning_by_attitude(fuzzy: InertiaModel) -> Turning:
+    """Say how bodies turn whose inertia depends on the attitude."""
+
+    def inertia(rotation: Array) -> tuple[Array, Array, Array]:
+        attitude = rotations.euler_angles(np.nan_to_num(rotation.transpose(2, 0, 1)))
+        return attitude, *body_inertia(fuzzy, attitude)
+
+    def momentum(rotation: Array, rate: Array) -> Array:
+        return np.asarray(rotations.multiply(np.nan_to_num(inertia(rotation)[2]), rate.T).T)
+
+    def turned(rotation: Array, momentum: Array) -> Turned:
+        attitude, values, matrices = inertia(rotation)
+        exists = positive_definite(matrices)
+        safe = np.where(exists[:, None, None], matrices, np.eye(3))
+        rate = np.asarray(np.linalg.solve(safe, momentum.T[..., None])[..., 0], dtype=float)
+        return Turned(rate.T, momentum_form(attitude, rate, values)[1].T, exists)
+
+    return Turning(momentum, turned)

@@ -15,9 +15,10 @@ from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.kernels import Airflow, airflow_terms
 from cpfls_cli.playback.table import (
+    Airflow,
     Remainder,
+    airflow_terms,
     effect_weights,
     remainder_weights,
 )

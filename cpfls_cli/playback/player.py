@@ -9,17 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
-from cpfls_cli.dynamics.rigid_body import positive_definite
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, motion_at, playback_flight
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
-from cpfls_cli.playback.kernels import FASTEST, Body, MeasuredMotion, Terms, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.motion import Body, MeasuredMotion, State
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import WrenchTable, lever_weights
+from cpfls_cli.playback.table import lever_weights
+from cpfls_cli.playback.windows import Flown, Rotors, Steps, errors_of_runs
+from cpfls_cli.playback.windows import Runs as FlownRuns
 
 _TINY = 1e-12
 """Sine of an angle, in rad, that is rounding: the axis does not show."""
@@ -34,41 +33,43 @@ class Player:
     rotor : array, shape (time, 1 + 4 rotors)
         Terms of the rotors over each step.
     along : array, shape (time, 6), N m and N, or None
-        What acts over each step beside: stated, or evaluated along the measured motion.
-    fuzzy : InertiaModel or None
-        Stands in the place of the inertia of `body`.
+        What acts over each step on top: stated, or evaluated along the measured motion.
     wind : tuple of float, m/s, world frame
     observer : Observer or None
         What runs know of the past; None: nothing but the state that they start from. Of constant inertia alone.
     """
 
-    table: WrenchTable
+    flown: Flown
     rotor: Array
-    body: Body
     along: Array | None = None
-    fuzzy: InertiaModel | None = None
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     observer: Observer | None = None
 
-    def step_weights(self, part: slice) -> tuple[Terms, Array]:
-        """Evaluate the weights of the terms of the motion over each step of a part of the flight.
+    @property
+    def body(self) -> Body:
+        """What is moved."""
+        return self.flown.body
 
-        Returns
-        -------
-        terms : Terms
-            Those in use, the constant always.
-        weights : array, shape (time, 6, active)
+    def steps(self, samples: IntArray, push: Array | None = None) -> Steps:
+        """Take the rotors over steps that begin at samples, shape (step, run).
+
+        Parameters
+        ----------
+        push : array, shape (step, run, 6), N m and N, or None
+            On top of what is known along the flight.
         """
-        used, weights = self.table.by_step(self.rotor[part])
-        if self.along is not None:
-            weights[:, :, 0] += self.along[part]
-        return used, weights
+        along = None if self.along is None else self.along[samples]
+        both = [each for each in (along, push) if each is not None]
+        return Steps(self.rotor[samples], sum(both) if both else None)
 
     def wrench(self, flight: PlaybackFlight) -> Array:
         """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""
         motion = flight.motion
         air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
-        wrench = self.table.wrench(air, motion.rate, self.rotor)
+        torque, force = self.flown.wrench(tuple(air.T), tuple(motion.rate.T), Rotors.of(self.rotor))
+        wrench = np.zeros((len(flight), 6))
+        for row, value in enumerate((*torque, *force)):
+            wrench[:, row] = value
         return wrench if self.along is None else wrench + self.along
 
 
@@ -85,11 +86,9 @@ def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signa
     """
     response = model.response_to(parts[0]) if parts else model.response
     return Player(
-        table=model.table,
+        flown=model.flown,
         rotor=rotor_terms_along(flight, response),
-        body=model.body,
         along=_along(model, stated_along(flight, response), parts),
-        fuzzy=model.fuzzy,
         wind=model.wind,
     )
 
@@ -165,9 +164,13 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
         still = replace(model, wind=(0.0, 0.0, 0.0))
         after = one_step(still, state._replace(velocity=state.velocity - wind), rotor, period)
         return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
-    player = Player(table=model.table, rotor=rotor, body=model.body, fuzzy=model.fuzzy)
-    used, weights = player.step_weights(slice(None))
-    return _MomentumRuns(player, MeasuredMotion(*state, period), used, weights, translates=True).one_step()
+    count = len(state.rate)
+    path = FlownRuns(MeasuredMotion(*state, period), np.arange(count), translates=True).fly(
+        model.flown, Steps(rotor[None, :count])
+    )
+    ends = (path.position[-1].T, path.velocity[-1].T, path.rotation[-1].transpose(2, 0, 1), path.rate[-1].T)
+    stopped = path.diverged >= 0
+    return State(*(np.where(stopped.reshape(-1, *[1] * (end.ndim - 1)), np.nan, end) for end in ends))
 
 
 class Runs(NamedTuple):
@@ -200,43 +203,22 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     horizon : int
         Samples.
     """
-    if player.observer is not None:
-        return _runs_with_past(player, player.observer, flight, starts, horizon)
-    first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
-    motion = motion_at(in_the_air(flight, player.wind).motion, part)
-    used, weights = player.step_weights(part)
-    errors = np.empty((len(starts), horizon, 4, 3))
-    if player.fuzzy is None:
-        moved = errors_of_runs(motion, player.body, used, weights, starts - first, flight.translates, errors)
-        return Runs(errors, moved)
-    runs = _MomentumRuns(player, motion, used, weights, flight.translates)
-    return Runs(errors, runs.written(starts - first, errors))
-
-
-_BATCH = 250
-"""Runs with a past at a time: each has weights of its own, and those of so many stay in the cache."""
-
-
-def _runs_with_past(player: Player, observer: Observer, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Runs:
-    """Play a model back from samples of a flight, pushed by the disturbance that was observed before each."""
     still = in_the_air(flight, player.wind)
-    pushes = observed(player, flight, starts)
-    fading = observer.fading(still.motion.period, horizon)
-    parts = []
+    pushes = None if player.observer is None else observed(player, flight, starts)
+    found = []
     for first in range(0, len(starts), _BATCH):
         own = starts[first : first + _BATCH]
-        begin = int(own[0])
-        used, by_sample = player.step_weights(slice(begin, int(own[-1]) + horizon + 1))
-        # One window beside the other, as each is pushed by itself.
-        samples = (own[:, None] + np.arange(horizon + 1)).ravel()
-        weights = by_sample[samples - begin].reshape(len(own), horizon + 1, *by_sample.shape[1:])
-        weights[:, :-1, :, 0] += pushes[first : first + _BATCH, None] * fading
-        motion = motion_at(still.motion, samples)
-        errors = np.empty((len(own), horizon, 4, 3))
-        places = np.arange(len(own)) * (horizon + 1)
-        flat = weights.reshape(-1, *weights.shape[2:])
-        parts.append((errors, errors_of_runs(motion, player.body, used, flat, places, flight.translates, errors)))
-    return Runs(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        push = None
+        if pushes is not None and player.observer is not None:
+            fading = player.observer.fading(still.motion.period, horizon)
+            push = pushes[first : first + _BATCH] * fading[:, None]
+        runs = FlownRuns(still.motion, own, flight.translates)
+        found.append(errors_of_runs(player.flown, runs, player.steps(own + np.arange(horizon)[:, None], push)))
+    return Runs(*(np.concatenate(each) for each in zip(*found, strict=True)))
+
+
+_BATCH = 1_200
+"""Runs at a time: what drives each of them is laid out step by step."""
 
 
 def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
@@ -340,121 +322,3 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     # Half a turn: the axis does not show in the skew part, its length is all that is used.
     half_turn = np.asarray((sine <= _TINY) & (cosine < 0.0), dtype=bool)
     return np.asarray(np.where(np.expand_dims(half_turn, -1), [np.pi, 0.0, 0.0], vector))
-
-
-class _Turned(NamedTuple):
-    """How bodies turn at the attitudes of the runs.
-
-    Attributes
-    ----------
-    rate : array, shape (run, 3), rad/s
-        That has the momentum.
-    direct : array, shape (run, 3), N m
-        Torque that the motion takes beside the change of momentum.
-    exists : array of bool, shape (run,)
-        False where no body has the inertia.
-    """
-
-    rate: Array
-    direct: Array
-    exists: BoolArray
-
-
-class _State(NamedTuple):
-    """Free runs in momentum form: no inertia that depends on the attitude has to be differentiated in time."""
-
-    position: Array
-    velocity: Array
-    rotation: Array
-    momentum: Array
-
-
-@dataclass(frozen=True)
-class _MomentumRuns:
-    """Free runs under any inertia, one that depends on the attitude too, all at once, by the rule of the compiled ones.
-
-    The compiled loops know a constant inertia alone, and are what thousands of runs are played by.
-    """
-
-    player: Player
-    motion: MeasuredMotion
-    used: Terms
-    weights: Array
-    translates: bool
-
-    def written(self, starts: IntArray, errors: Array) -> IntArray:
-        """Simulate, write the errors, and give the steps at which runs diverged."""
-        motion, diverged = self.motion, np.full(len(starts), -1)
-        state, rate, now = self._begun(starts)
-        for step in range(errors.shape[1]):
-            with np.errstate(all="ignore"):
-                moved, after = self._step(state, rate, now, self.weights[starts + step])
-            fastest = np.maximum(np.abs(after.rate).max(axis=1), np.abs(moved.velocity).max(axis=1))
-            good = (diverged < 0) & after.exists & (fastest < FASTEST)
-            # A run that no body flies stands still from there on, as that of a rigid body does.
-            diverged[(diverged < 0) & ~good] = step
-            state = _State(*(_kept(good, new, old) for new, old in zip(moved, state, strict=True)))
-            rate, now = _kept(good, after.rate, rate), after
-            reached = State(state.position, state.velocity, state.rotation, rate)
-            errors[:, step] = less_measured(reached, motion, starts + step + 1)
-        return diverged
-
-    def one_step(self) -> State:
-        """Take one step from each sample; not a number where it meets an attitude at which no body has the inertia."""
-        state, rate, now = self._begun(np.arange(len(self.motion.rate)))
-        with np.errstate(all="ignore"):
-            moved, after = self._step(state, rate, now, self.weights)
-        parts = (moved.position, moved.velocity, moved.rotation, after.rate)
-        return State(*(_kept(after.exists, part, np.full_like(part, np.nan)) for part in parts))
-
-    def _begun(self, starts: IntArray) -> tuple[_State, Array, _Turned]:
-        motion, fuzzy = self.motion, self.player.fuzzy
-        rate, rotation = motion.rate[starts], motion.rotation[starts]
-        if fuzzy is None:
-            momentum = rate @ self.player.body.inertia
-        else:
-            momentum = rotations.multiply(np.nan_to_num(body_inertia(fuzzy, _finite_attitude(rotation))[1]), rate)
-        state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
-        return state, rate, self._turned(rotation, momentum)
-
-    def _step(self, state: _State, rate: Array, now: _Turned, weights: Array) -> tuple[_State, _Turned]:
-        period = self.motion.period
-        middle = self._moved(state, state, rate, now.direct, weights, 0.5 * period)
-        there = self._turned(middle.rotation, middle.momentum)
-        end = self._moved(state, middle, there.rate, there.direct, weights, period)
-        after = self._turned(end.rotation, end.momentum)
-        return end, after._replace(exists=now.exists & there.exists & after.exists)
-
-    def _moved(self, start: _State, at: _State, rate: Array, direct: Array, weights: Array, interval: float) -> _State:
-        """Move a state for an interval with the derivatives at another one."""
-        air = np.einsum("nji,nj->ni", at.rotation, at.velocity)
-        terms = self.player.table.terms(air, rate)[:, self.used.active]
-        wrench = np.einsum("nka,na->nk", weights, terms)
-        momentum = start.momentum + interval * (wrench[:, :3] - direct)
-        rotation = start.rotation @ rotations.turns(interval * rate)
-        if not self.translates:
-            return _State(start.position, start.velocity, rotation, momentum)
-        acceleration = rotations.multiply(at.rotation, wrench[:, 3:]) / self.player.body.mass
-        acceleration[:, 2] -= self.player.body.gravity
-        position = start.position + interval * at.velocity
-        return _State(position, start.velocity + interval * acceleration, rotation, momentum)
-
-    def _turned(self, rotation: Array, momentum: Array) -> _Turned:
-        fuzzy = self.player.fuzzy
-        if fuzzy is None:
-            rate = np.asarray(momentum @ self.player.body.inverse)
-            return _Turned(rate, np.cross(rate, momentum), np.ones(len(rate), dtype=bool))
-        attitude = _finite_attitude(rotation)
-        values, matrices = body_inertia(fuzzy, attitude)
-        exists = positive_definite(matrices)
-        safe = np.where(exists[:, None, None], matrices, np.eye(3))
-        rate = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
-        return _Turned(rate, momentum_form(attitude, rate, values)[1], exists)
-
-
-def _finite_attitude(rotation: Array) -> Array:
-    return rotations.euler_angles(np.nan_to_num(rotation))
-
-
-def _kept(good: BoolArray, new: Array, old: Array) -> Array:
-    return np.where(good.reshape(-1, *[1] * (new.ndim - 1)), new, old)

@@ -29,9 +29,9 @@ from cpfls_cli.playback.fit import (
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
-from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -292,9 +292,8 @@ class _Bench:
         return Outlook.of(union, values, self.parts)
 
     def _judged(self, structure: Structure, whole: Fitted, without: tuple[FittedNumbers, ...]) -> Judged:
-        errors = [
-            window_errors(fitted, windows) for fitted, kept in zip(without, self.parts, strict=True) for windows in kept
-        ]
+        pairs = zip(without, self.parts, strict=True)
+        errors = [each for fitted, kept in pairs for each in window_errors(fitted, kept)]
         by_block, joined = block_errors(errors), np.concatenate(errors)
         condition = whole.condition_number
         return Judged(structure, float(joined.mean()), by_block, len(whole.values), condition, whole, without)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,35 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
-from cpfls_cli.playback.kernels import Airflow, Body, Terms, airflow_terms
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Functions, Value, dot, minus, plus, times
+
+
+class Airflow(NamedTuple):
+    """Terms of a learned remainder over the direction of the airflow; empty without rules.
+
+    Attributes
+    ----------
+    breakpoints : array, shape (rules + 1,)
+        Peaks of the membership functions, share of a turn; empty for none.
+    order : int
+        Of the harmonics in each consequent; 0 for the seesaw.
+    """
+
+    breakpoints: Array
+    order: int
+
+
+def airflow_terms(airflow: Airflow) -> int:
+    """Count the terms of a remainder: each column of the system times the speed, and times its square."""
+    if len(airflow.breakpoints) == 0:
+        return 0
+    features = 1 + (2 * airflow.order if airflow.order else 1)
+    return max(len(airflow.breakpoints) - 1, 1) * features * 2
 
 
 @result
@@ -152,46 +174,11 @@ class WrenchTable:
         """
         return wrench_of(self.weights, self.terms(velocity, rate), rotor)
 
-    def by_step(self, rotor: Array) -> tuple[Terms, Array]:
-        """Evaluate the weights of the terms of the motion over each step.
-
-        Parameters
-        ----------
-        rotor : array, shape (time, 1 + 4 rotors)
-            See `RotorResponse.terms_by_step`.
-
-        Returns
-        -------
-        terms : Terms
-            Those in use.
-        weights : array, shape (time, 6, active)
-        """
-        used = used_terms(self.weights, self.airflow)
-        return used, weights_by_step(self.weights, used, rotor)
-
 
 def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
     """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
     # Of all three at once NumPy takes the products one by one, eight times as long over a flight of minutes.
     return np.stack([np.einsum("tu,tu->t", terms @ own, rotor) for own in weights], axis=1)
-
-
-def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
-    """Arrange mass and inertia for the compiled loops."""
-    return Body(vehicle.mass_kg, vehicle.gravity_m_s2, inertia, np.asarray(np.linalg.inv(inertia), dtype=float))
-
-
-def used_terms(table: Array, airflow: Airflow) -> Terms:
-    """List the terms of the motion that have weights, the constant among them always."""
-    active = np.any(table, axis=(0, 2))
-    active[0] = True
-    return Terms(airflow, np.flatnonzero(active).astype(np.int64), table.shape[1])
-
-
-def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:
-    """Multiply a table with the terms of the rotors, shape (time, 6, active)."""
-    flat = table[:, used.active].reshape(-1, table.shape[2])
-    return np.ascontiguousarray((rotor @ flat.T).reshape(len(rotor), 6, -1))
 
 
 def airflow_of(remainder: Remainder | None) -> Airflow:
@@ -270,7 +257,7 @@ def wrench_of_numbers() -> Effect:
         # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
         return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
 
-    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns)
+    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns, rate_derivative=False)
 
 
 def remainder_weights(remainder: Remainder, rotors: int) -> Array:

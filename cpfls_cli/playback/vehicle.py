@@ -26,7 +26,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, TriedStructure, choose, fitted_to_all
-from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -265,17 +264,16 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
     """Evaluate the parts of a model along the measured motion, and the speed in the rotor plane."""
-    parts = model.parts
-    squares, speeds, samples = {name: np.zeros(6) for name in parts}, [], 0
+    squares: dict[str, Array] = {}
+    speeds, samples = [], 0
     for flight in flights:
         velocity = np.einsum("tji,tj->ti", flight.motion.rotation, flight.motion.velocity)
-        terms = model.table.terms(velocity, flight.motion.rate)
         speeds.append(np.hypot(velocity[:, 0], velocity[:, 1]))
         for stretch in flight.stretches:
             rotor = model.response.terms_by_step(flight.speed[stretch], flight.motion.period, flight.hold)
             samples += len(rotor)
-            for name, weights in parts.items():
-                squares[name] += (wrench_of(weights, terms[stretch], rotor) ** 2).sum(axis=0)
+            for name, own in model.wrench_by_part(velocity[stretch], flight.motion.rate[stretch], rotor).items():
+                squares[name] = squares.get(name, 0.0) + (own**2).sum(axis=0)
     shares = tuple(Share(name, np.sqrt(square / samples)) for name, square in squares.items())
     return shares, float(np.quantile(np.concatenate(speeds), 0.95))
 

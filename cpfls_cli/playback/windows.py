@@ -107,17 +107,22 @@ class Flown:
 
     def wrench(self, air: Vector, rate: Vector, rotors: Rotors) -> tuple[Vector, Vector]:
         """Compute torque and force, N m and N, body frame, without weight."""
-        slow = rotors.slow_square
-        at = self._at_rest.moved(
+        torque, force = self.vehicle.wrench(self._instant(air, rate, rotors))
+        push = rotors.push
+        return (torque, force) if push is None else (add(torque, push[:3]), add(force, push[3:]))
+
+    def wrench_by_part(self, air: Vector, rate: Vector, rotors: Rotors) -> dict[str, Vector]:
+        """Compute torque and force of each part alone, six components by name."""
+        return self.vehicle.wrench_by_part(self._instant(air, rate, rotors))
+
+    def _instant(self, air: Vector, rate: Vector, rotors: Rotors) -> Instant:
+        return self._at_rest.moved(
             rotor_speed=rotors.speed,
             rotor_acceleration=rotors.acceleration,
-            slow_square=slow,
+            slow_square=rotors.slow_square,
             air_velocity=air,
             body_rate=rate,
         )
-        torque, force = self.vehicle.wrench(at)
-        push = rotors.push
-        return (torque, force) if push is None else (add(torque, push[:3]), add(force, push[3:]))
 
 
 class Rotors(NamedTuple):
@@ -135,6 +140,11 @@ class Rotors(NamedTuple):
     acceleration: Value
     slow_square: Value
     push: Vector | None = None
+
+    @classmethod
+    def of(cls, terms: Array) -> Rotors:
+        """Take what drives vehicles from terms of the rotors, shape (time, 1 + 4 rotors)."""
+        return cls(*(each.T for each in _rotor_motion(terms)))
 
 
 class Steps(NamedTuple):
@@ -238,8 +248,13 @@ class _Path(NamedTuple):
     velocity: Array
     rotation: Array
     rate: Array
-    stages: tuple[Array, Array, Array] | None
+    stages: tuple[Array, ...]
     diverged: IntArray
+
+    def of_runs(self, part: slice) -> _Path:
+        """Take some of the runs."""
+        *states, stages, diverged = self
+        return _Path(*(each[..., part] for each in states), tuple(each[..., part] for each in stages), diverged[part])
 
 
 def exponential(turn: Array) -> tuple[Array, Array]:
@@ -364,7 +379,7 @@ def _run(flown: Flown, start: _State, steps: Steps, period: float, translates: b
                 state.rotation,
                 now.rate,
             )
-    return _Path(position, velocity, rotation, rate, passed if stages else None, diverged)
+    return _Path(position, velocity, rotation, rate, passed if stages else (), diverged)
 
 
 def _begun(flown: Flown, motion: MeasuredMotion, starts: IntArray) -> _State:
@@ -411,7 +426,7 @@ class Loss(NamedTuple):
 
     Attributes
     ----------
-    weight, delta : array, shape (horizon, 4)
+    weight, delta : array, shape (horizon, 4) or (horizon, 4, run)
         For position, velocity, attitude, rate; position is not weighed.
     """
 
@@ -419,9 +434,13 @@ class Loss(NamedTuple):
     delta: Array
 
     def of(self, squares: Array) -> Array:
-        """Weigh squared errors, shape (horizon, 4, ...)."""
-        weight, delta = (each.reshape(*each.shape, *[1] * (squares.ndim - 2)) for each in self)
+        """Weigh squared errors, shape (horizon, 4, run)."""
+        weight, delta = self.of_runs()
         return np.asarray(weight * delta**2 * (np.sqrt(1.0 + squares / delta**2) - 1.0))
+
+    def of_runs(self, part: slice = slice(None)) -> Loss:
+        """Give the weights of some runs, shapes (horizon, 4, run)."""
+        return Loss(*(each[:, :, None] if each.ndim == 2 else each[..., part] for each in self))
 
 
 @dataclass(frozen=True)
@@ -442,8 +461,7 @@ class Runs:
 
     def blocks(self, steps: Steps, most: int) -> Iterator[tuple[slice, Runs, Steps]]:
         """Take some runs at a time."""
-        for first in range(0, len(self.starts), most):
-            part = slice(first, first + most)
+        for part in _slices(len(self.starts), most):
             yield part, Runs(self.motion, self.starts[part], self.translates), steps.of_runs(part)
 
     def fly(self, flown: Flown, steps: Steps, *, stages: bool = False) -> _Path:
@@ -479,9 +497,9 @@ def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntAr
 def losses_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss) -> Array:
     """Weigh the errors of runs, shape (run,)."""
     found = []
-    for _, own, part in runs.blocks(steps, _RUNS):
-        path = own.fly(flown, part)
-        found.append(_lost(path.diverged, loss, loss.of(_squares(own.errors(path)))).sum(axis=(0, 1)))
+    for some, own, part in runs.blocks(steps, _RUNS):
+        path, weighed = own.fly(flown, part), loss.of_runs(some)
+        found.append(_lost(path.diverged, weighed, weighed.of(_squares(own.errors(path)))).sum(axis=(0, 1)))
     return np.concatenate(found)
 
 
@@ -495,7 +513,7 @@ def _lost(diverged: IntArray, loss: Loss, found: Array) -> Array:
     if (diverged < 0).all():
         return found
     gone = _gone(diverged, len(found))
-    return np.where(gone[:, None], (loss.weight * loss.delta * FASTEST)[:, :, None], found)
+    return np.where(gone[:, None], loss.weight * loss.delta * FASTEST, found)
 
 
 def _gone(diverged: IntArray, horizon: int) -> BoolArray:
@@ -520,42 +538,47 @@ def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntA
     """
     numbers, groups, horizon = len(flown.inertia_by), int(group.max(initial=0)) + 1, len(loss.weight)
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
-    for part, own, of_steps in runs.blocks(steps, max(1, _SAMPLES // (2 * horizon))):
+    for part, own, of_steps in runs.blocks(steps, _RUNS):
         path = own.fly(flown, of_steps, stages=True)
         errors = own.errors(path)[1:]
-        weight, delta = loss.weight[:, 1:, None], loss.delta[:, 1:, None]
+        weight, delta = (each[:, 1:] for each in loss.of_runs(part))
         share = np.sqrt(weight / np.sqrt(1.0 + _squares(errors) / delta**2))
         share[np.broadcast_to(_gone(path.diverged, horizon)[:, None], share.shape)] = 0.0
-        changes = _tangents(flown, path, of_steps, own.motion.period, own.translates)
-        # Rows of a Jacobian by step, run and component, with what they come to.
-        shares = np.repeat(share.transpose(0, 2, 1), 3, axis=2)
-        rows = changes * shares[..., None]
-        residual = shares * errors.transpose(1, 3, 0, 2).reshape(horizon, -1, STATES)
-        for place in np.unique(group[part]):
-            kept = group[part] == place
-            jacobian = rows[:, kept].reshape(-1, numbers)
-            gradient[place] += residual[:, kept].reshape(-1) @ jacobian
-            hessian[place] += jacobian.T @ jacobian
+        # By run, step and component.
+        shares = np.repeat(share.transpose(2, 0, 1), 3, axis=2)
+        residual = shares * errors.transpose(3, 1, 0, 2).reshape(-1, horizon, STATES)
+        for some in _slices(len(own.starts), max(1, _SAMPLES // (2 * horizon))):
+            rows = _tangents(flown, path.of_runs(some), of_steps.of_runs(some), own.motion.period, own.translates)
+            rows *= shares[some, :, :, None]
+            owners = group[part][some]
+            ends = [0, *(np.flatnonzero(np.diff(owners)) + 1).tolist(), len(owners)]
+            for kept in map(slice, ends[:-1], ends[1:]):
+                jacobian, place = rows[kept].reshape(-1, numbers), owners[kept.start]
+                gradient[place] += residual[some][kept].reshape(-1) @ jacobian
+                hessian[place] += jacobian.T @ jacobian
     return gradient, hessian
 
 
+def _slices(count: int, most: int) -> Iterator[slice]:
+    for first in range(0, count, most):
+        yield slice(first, min(first + most, count))
+
+
 def _tangents(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
-    """Compose the derivatives of the states by the numbers, shape (step, run, STATES, number)."""
+    """Compose the derivatives of the states by the numbers, shape (run, step, STATES, number)."""
     moved = _steps_by(flown, path, steps, period, translates)
     horizon, count, _, width = moved.shape
-    changes, change = np.empty((horizon, count, STATES, width - STATES)), np.zeros((count, STATES, width - STATES))
+    changes, change = np.empty((count, horizon, STATES, width - STATES)), np.zeros((count, STATES, width - STATES))
     with np.errstate(all="ignore"):
         for step in range(horizon):
             change = moved[step, ..., :STATES] @ change + moved[step, ..., STATES:]
-            changes[step] = change
-    gone = _gone(path.diverged, horizon)
-    changes[gone] = 0.0
+            changes[:, step] = change
+    changes[_gone(path.diverged, horizon).T] = 0.0
     return changes
 
 
 def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
     """Differentiate steps by the state at their begin and by numbers, shape (step, run, STATES, STATES + number)."""
-    assert path.stages is not None
     _, horizon, _, count = path.stages[0].shape
     numbers, samples = len(flown.inertia_by), horizon * count
     parts = (np.moveaxis(each, (0, 1), (-3, -2)) for each in path.stages)

@@ -213,7 +213,7 @@ def _speeds(model: VehicleModel, command: Array, period: float) -> Array | None:
 
 def _in_air(model: VehicleModel, signals: Signals) -> Signals:
     """Take the air for still where a model depends on it and the flight does not know it."""
-    if not model.table.feels_air or {"velocity", "attitude"} <= signals.available:
+    if not model.feels_air or {"velocity", "attitude"} <= signals.available:
         return signals
     none = np.zeros((len(signals), 3))
     return replace(signals, velocity=none, attitude=none if signals.attitude is None else signals.attitude)

@@ -57,7 +57,6 @@ from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.playback.vehicle import FoundVehicle, Share, find_vehicle
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, line, style_of
 from cpfls_cli.report.numbers import percent
@@ -247,10 +246,9 @@ def remainder_curves(r: Vehicle) -> tuple[Array, Array, Array]:
     rotor = np.zeros((len(angle), 1 + 4 * model.rotors))
     rotor[:, 0] = 1.0
     rotor[:, 1 : 1 + model.rotors] = hover_speed(model.vehicle)
-    parts, terms = model.parts, model.table.terms(velocity, np.zeros_like(velocity))
-    learned, others = parts[_REMAINDER], (name for name in parts if name not in (_ROTORS, _REMAINDER))
-    named = np.sum([parts[name] for name in others], axis=0) + np.zeros_like(learned)
-    return direction, wrench_of(learned, terms, rotor), wrench_of(named, terms, rotor)
+    parts = model.wrench_by_part(velocity, np.zeros_like(velocity), rotor)
+    named = sum((own for name, own in parts.items() if name not in (_ROTORS, _REMAINDER)), np.zeros((len(angle), 6)))
+    return direction, parts[_REMAINDER], named
 
 
 @stage(

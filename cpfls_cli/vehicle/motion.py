@@ -334,9 +334,17 @@ class Vehicle:
     def wrench(self, instant: Instant) -> tuple[Vector, Vector]:
         """Sum torque and force of all that acts, N m and N, body frame, without weight."""
         torque, force = total_wrench(self.acting, instant)
-        # The momentum of rotors changes with their accelerations, that of the body adds to the inertia.
-        spun = instant.moved(rotor_speed=instant.rotor_acceleration, air_velocity=ZERO, body_rate=ZERO)
-        return add(torque, self._momentum(spun)), force
+        return add(torque, self._momentum(_spun(instant))), force
+
+    def wrench_by_part(self, instant: Instant) -> dict[str, Vector]:
+        """Give torque and force of each effect alone, N m and N, body frame, by name."""
+        spun = _spun(instant)
+        found = {name: (*torque, *force) for name, (torque, force) in wrench_by_part(self.acting, instant).items()}
+        for one in self.acting:
+            if one.name in self._with_momentum:
+                torque = add(found[one.name][:3], one.wrench(spun).momentum)
+                found[one.name] = (*torque, *found[one.name][3:])
+        return found
 
     def derivative(self, instant: Instant, state: Vector, push: Vector | None, turning: Turning | None) -> Vector:
         """Differentiate the state.
@@ -370,6 +378,11 @@ class Vehicle:
             first += len(own)
         turn = attitude_rate(instant.attitude, rate, instant.functions)
         return (*state[VELOCITY], *acceleration, *turn, *turned, *changes)
+
+
+def _spun(instant: Instant) -> Instant:
+    """Turn rotors by their accelerations, with which their momentum changes; that of the body is inertia."""
+    return instant.moved(rotor_speed=instant.rotor_acceleration, air_velocity=ZERO, body_rate=ZERO)
 
 
 def total_wrench(acting: Iterable[Acting], instant: Instant) -> tuple[Vector, Vector]:

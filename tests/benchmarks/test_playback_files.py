@@ -18,7 +18,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.motion import MeasuredMotion
 
 PERIOD, SAMPLES, LEAD_IN, SPIKE = 0.01, 900, 120, 400
 ERPM_OF_RAD_S = 6 * 60 / (2 * np.pi)

@@ -28,7 +28,8 @@ def regressor():
 
 def playback():
     """Run a vehicle for one step."""
-    from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
+    from cpfls_cli.playback.kernels import errors_of_runs
+    from cpfls_cli.playback.motion import MeasuredMotion
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -14,7 +14,7 @@ from cpfls_cli.config.unknown import with_guesses
 from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import Remainder, remainder_terms

@@ -11,7 +11,8 @@ from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points, reference_run, term_sizes
 from cpfls_cli.export.source import c_source
-from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
+from cpfls_cli.playback.kernels import errors_of_runs
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step

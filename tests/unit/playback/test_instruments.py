@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import instruments
-from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.motion import MeasuredMotion
 
 PERIOD = 0.01
 

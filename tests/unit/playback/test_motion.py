@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects import scales
-from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
+from cpfls_cli.playback.kernels import errors_of_runs
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step

@@ -18,7 +18,8 @@ from cpfls_cli.playback.fit import (
     window_sums,
 )
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import Airflow, errors_of_runs
+from cpfls_cli.playback.kernels import errors_of_runs
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth

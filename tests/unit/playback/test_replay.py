@@ -11,7 +11,7 @@ from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.errors import MODEL, NOTHING_MOVES, RATE_FADES, RATE_STAYS, STATED
-from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
 from cpfls_cli.playback.replay import SIGNALS, Played, fading, replay, where_better

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
-from cpfls_cli.playback.kernels import Airflow
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, Estimates, drawn, model_at
