@@ -88,6 +88,10 @@ class Prior(NamedTuple):
         """Inverse variance, shape (number,)."""
         return np.asarray(self.spread**-2.0)
 
+    def pull(self, values: Array) -> Array:
+        """Give the score of the prior at values, shape (number,)."""
+        return np.where(self.precision > 0, self.mean - values, 0.0) * self.precision
+
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
@@ -147,12 +151,15 @@ def solve(
     bounds: Bounds | None = None,
     leave_out: int | None = None,
     steps: int = _STEPS,
+    settled: float = _SETTLED,
 ) -> Solved:
     """Solve equations by Gauss-Newton steps, all blocks or all but one.
 
     Parameters
     ----------
     start : array, shape (number,)
+    settled : float
+        Length of a step that is none any more.
     """
     values, share, before = np.asarray(start, dtype=float), 1.0, np.zeros(len(start))
     for _ in range(steps):
@@ -161,14 +168,13 @@ def solve(
         if leave_out is not None:
             information = information - normal.information[leave_out]
             score = score - normal.score[leave_out]
-        known = np.where(prior.precision > 0, prior.mean - values, 0.0) * prior.precision
-        step = np.linalg.solve(information + np.diag(prior.precision + _RIDGE), score + known)
+        step = np.linalg.solve(information + np.diag(prior.precision + _RIDGE), score + prior.pull(values))
         # One that turns back has gone too far.
         share = max(share / 2, _LEAST_SHARE) if step @ before < 0 else min(1.5 * share, 1.0)
         before, moved = step, values + step * min(share, _FARTHEST / max(float(np.abs(step).max()), _TINY))
         moved = moved if bounds is None else np.clip(moved, *bounds)
         step, values = moved - values, moved
-        if np.abs(step).max() < _SETTLED:
+        if np.abs(step).max() < settled:
             break
     return Solved(values, normal, bool(np.abs(step).max() < _NEARLY))
 
@@ -200,6 +206,13 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         inverse=inverse,
         settled=settled,
     )
+
+
+def without_each(normal: Normal, prior: Prior, values: Array) -> Array:
+    """Give the numbers without each block by one step from the values of all, shape (block, number)."""
+    information = normal.information.sum(axis=0) - normal.information + np.diag(prior.precision + _RIDGE)
+    score = normal.score.sum(axis=0) - normal.score + prior.pull(values)
+    return np.asarray(values + np.linalg.solve(information, score[..., None])[..., 0])
 
 
 def conditional_strength(normal: Normal, prior: Prior) -> Array:

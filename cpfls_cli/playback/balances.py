@@ -37,24 +37,23 @@ _NEAR = 1e-4
 
 
 class Sums(NamedTuple):
-    """Products of balances with those of other runs, by block of the path, band and axis.
+    """Products of balances X and of what instruments know of them Z, by block of the path, band and axis.
 
     Attributes
     ----------
-    crossed, own, others : array, shape (block, band, 3, column, column)
-        With other runs, with itself, and of other runs.
+    ztx, xtx, ztz : array, shape (block, band, 3, column, column)
     windows : array, shape (block, band)
     """
 
-    crossed: Array
-    own: Array
-    others: Array
+    ztx: Array
+    xtx: Array
+    ztz: Array
     windows: Array
 
     def combined(self, columns: Array) -> Sums:
         """Combine columns, shape (axis, column, combination)."""
-        crossed, own, others = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
-        return Sums(crossed, own, others, self.windows)
+        ztx, xtx, ztz = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
+        return Sums(ztx, xtx, ztz, self.windows)
 
 
 class _Factors(NamedTuple):
@@ -284,9 +283,9 @@ class Balances:
         beside = self._beside(signals)
         return [self.of_band(self._rows(band, signals, beside, laid)) for band in bands]
 
-    def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], _Products]:
+    def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], tuple[Array, int]]:
         """Sum products of rows of a band."""
-        found: dict[tuple[int, int], _Products] = {}
+        found: dict[tuple[int, int], tuple[Array, int]] = {}
         for number, own, known, middles in rows:
             first, path = self.path[number]
             place = path[middles]
@@ -294,9 +293,9 @@ class Balances:
             block = np.where(there, place * self.flights[number].motion.period // self.block_s, -1)
             for each in np.unique(block[there]):
                 mine, theirs = (taken(values, block == each) for values in (own, known))
-                sums = _Products(_product(theirs, mine), _product(mine, mine), _product(theirs, theirs), len(mine))
-                before = found.get((first, int(each)))
-                found[first, int(each)] = sums if before is None else before.plus(sums)
+                before, count = found.get((first, int(each)), (0.0, 0))
+                sums = np.stack([_product(theirs, mine), _product(mine, mine), _product(theirs, theirs)])
+                found[first, int(each)] = before + sums, count + len(mine)
         return found
 
     def _beside(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
@@ -332,40 +331,20 @@ class Balances:
         return foretold_by_run(asked, own)
 
 
-class _Products(NamedTuple):
-    """Products of columns by axis, shape (axis, column, column), as in `Sums`, and how many windows."""
-
-    crossed: Array
-    own: Array
-    others: Array
-    windows: int
-
-    def plus(self, other: _Products) -> _Products:
-        """Add others."""
-        return _Products(
-            self.crossed + other.crossed,
-            self.own + other.own,
-            self.others + other.others,
-            self.windows + other.windows,
-        )
-
-
-ByBand = Sequence[Mapping[tuple[int, int], _Products]]
-"""By band: products by path and block."""
+ByBand = Sequence[Mapping[tuple[int, int], tuple[Array, int]]]
+"""By band: ZtX, XtX and ZtZ by path and block, shape (3, axis, column, column), and how many windows."""
 
 
 def _arranged(axes: Sequence[ByBand], names: Sequence[tuple[int, int]], size: int) -> Sums:
     """Arrange products of all axes at once, or of one after the other; 0 where there are none."""
     bands = len(axes[0]) if axes else 0
-    crossed, own, others = (np.zeros((len(names), bands, 3, size, size)) for _ in range(3))
-    counts = np.zeros((len(names), bands))
+    sums, counts = np.zeros((3, len(names), bands, 3, size, size)), np.zeros((len(names), bands))
     for axis, by_band in enumerate(axes):
         rows = slice(None) if len(axes) == 1 else slice(axis, axis + 1)
         for (band, found), (place, name) in product(enumerate(by_band), enumerate(names)):
             if name in found:
-                crossed[place, band, rows], own[place, band, rows], others[place, band, rows], count = found[name]
-                counts[place, band] = count
-    return Sums(crossed, own, others, counts)
+                sums[:, place, band, rows], counts[place, band] = found[name]
+    return Sums(sums[0], sums[1], sums[2], counts)
 
 
 def block_length(seconds: float) -> float:
