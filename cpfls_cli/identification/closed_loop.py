@@ -19,6 +19,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
 from cpfls_cli.blocks import half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.estimation.first_stage import FOLDS, first_stage_fit_by_run
 from cpfls_cli.identification.data import (
     Flights,
     OtherTorque,
@@ -32,7 +33,7 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.constants import constants_of_past
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy, foretold_by_run, instruments, late, late_by
+from cpfls_cli.playback.instruments import Instruments, ToldBy, instruments, past_setpoints
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
@@ -345,10 +346,10 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     if given.kind == "repeats":
         repeated = sorted(number for path in given.repeats.paths() for number in path)
         return {number: given.repeats.others(number, values) for number in repeated}
-    lags, asked, known = late_by(period, max(1, round(_APART_S / period))), [], {}
+    apart, asked, known = max(1, round(_APART_S / period)), [], {}
     for number, setpoint in enumerate(given.setpoints):
         if setpoint is not None:
-            columns = np.hstack([late(setpoint, lag) for lag in lags])
+            columns = past_setpoints(setpoint, period, apart)
             asked.append(_fast(columns, period) if fast else columns)
             own = values[number].reshape(len(setpoint), -1)
             known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
@@ -357,7 +358,7 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     if told <= FOLDS * width or every * width > _MOST:
         return {}
     there_asked = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
-    predicted = foretold_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
+    predicted = first_stage_fit_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
     found = {number: np.full_like(values[number], np.nan) for number in known}
     for number, there in known.items():
         found[number][there] = predicted[number]

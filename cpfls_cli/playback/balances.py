@@ -12,10 +12,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments, foretold_by_run, late, late_by
+from cpfls_cli.playback.instruments import Instruments, past_setpoints
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
@@ -322,13 +323,13 @@ class Balances:
             yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
-        """Predict balances from what was asked for; see `foretold`."""
-        lags = late_by(band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
+        """Predict balances from what was asked for."""
+        apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
         asked = {
-            number: averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
+            number: averaged(band, self.flights[number], past_setpoints(self.asked[number], band.period, apart))
             for number in own
         }
-        return foretold_by_run(asked, own)
+        return first_stage_fit_by_run(asked, own)
 
 
 ByBand = Sequence[Mapping[tuple[int, int], tuple[Array, int]]]

@@ -18,12 +18,13 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, solve, without_each
+from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_bands
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.instruments import FOLDS, Instruments
+from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.past import PastBalances

@@ -20,6 +20,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
@@ -50,8 +51,8 @@ _FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
 shorter than the last, which is what a piece mostly sees."""
 _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
-_LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
-"""What was asked for is answered within half a second; parts that are predicted by the others."""
+_LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
+"""What was asked for is answered within half a second."""
 _NEW_S, _RARE = 0.4, 0.01
 """Windows in which what was before is asked, and how surely what is new may grow with it."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
@@ -409,19 +410,18 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     told = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
     told = told / np.maximum(np.sqrt((np.abs(told) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
     own = np.concatenate([left[number] for number in numbers])
-    expected, parts = np.zeros_like(own), contiguous(len(own), _FOLDS)
+    expected, part = np.zeros_like(own), contiguous(len(own), FOLDS)
+    parts = [part == fold for fold in range(FOLDS)]
     for axis in range(own.shape[1]):
         power = (np.abs(own[:, axis]) ** 2).mean(axis=0)
         # Of an axis that a flight does not know all is 0, and so is what is expected.
-        weight = 1 / np.where(power > 0, power, 1.0)
-        by_piece = np.einsum("pfc,f,pfd->pcd", np.conj(told), weight, told, optimize=True).real
-        right = np.einsum("pfc,f,pf->pc", np.conj(told), weight, own[:, axis], optimize=True).real
-        for fold in range(_FOLDS):
-            square = by_piece[parts != fold].sum(axis=0)
-            square += _RIDGE * np.trace(square) / len(square) * np.eye(len(square))
-            expected[parts == fold, axis] = told[parts == fold] @ np.linalg.solve(
-                square, right[parts != fold].sum(axis=0)
-            )
+        weighed = np.conj(told) / np.where(power > 0, power, 1.0)[:, None]
+        ztz = np.array([np.einsum("pfc,pfd->cd", weighed[at], told[at], optimize=True).real for at in parts])
+        ztx = np.array([np.einsum("pfc,pf->c", weighed[at], own[at, axis]).real for at in parts])[..., None]
+        size = np.trace(ztz, axis1=1, axis2=2)
+        ridge = _RIDGE * (size.sum() - size) / ztz.shape[1]
+        for at, fit in zip(parts, fits_of_others(ztz, ztx, ridge[:, None, None]), strict=True):
+            expected[at, axis] = told[at] @ fit[:, 0]
     ends = np.cumsum([len(left[number]) for number in numbers])[:-1]
     found = dict(zip(numbers, np.split(expected, ends), strict=True))
     return [found.get(number, np.nan * own) for number, own in enumerate(left)]

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import contiguous
+from cpfls_cli.lag import delayed
 from cpfls_cli.playback.flight import PlaybackFlight
 
 _ALIKE = 0.7
@@ -38,16 +38,10 @@ Told = Literal["repeats", "setpoints", "none"]
 ToldBy = Literal[Told, "past"]
 """Where nothing moves a vehicle but its loop, what was before may tell."""
 
-FOLDS = 5
-"""Parts of the flights that are kept aside in turn."""
 _ANSWERED_S = 0.5
 """What was asked for is answered within this time."""
 _HELD_M = 1.0
 """How far a vehicle that holds its place may be blown; where the setpoint is left over from before, it flies on."""
-_RIDGE = 1e-6
-"""Of predictions, so that setpoints that hardly differ from each other do no harm."""
-OF_MANY = 1e-3
-"""The same where many signals predict that go together, in flights that differ."""
 
 
 class Run(NamedTuple):
@@ -162,52 +156,10 @@ def held(flight: PlaybackFlight) -> bool:
     )
 
 
-def late_by(period: float, apart: int) -> range:
-    """List by how many samples setpoints are held back that predict what answers them, so many of them apart."""
-    return range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
-
-
-def late(values: Array, samples: int) -> Array:
-    """Hold signals back by whole samples, shape (time, column)."""
-    samples = min(samples, len(values))
-    return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
-
-
-def foretold(asked: Array, values: Array, ridge: float = _RIDGE) -> Array:
-    """Predict values from what was asked for, each part as the other parts tell.
-
-    What a part itself would tell of its gusts is thereby left out, however many numbers predict.
-
-    Parameters
-    ----------
-    asked : array, shape (time, column)
-    values : array, shape (time, ...)
-    ridge : float
-        Prior precision of the prediction, for columns as large as 1.
-
-    Returns
-    -------
-    array, shape (time, ...)
-    """
-    size = asked.std(axis=0)
-    asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
-    flat, parts = values.reshape(len(values), -1), contiguous(len(values), FOLDS)
-    found = np.empty_like(flat)
-    for fold in range(FOLDS):
-        rest, aside = asked[parts != fold], parts == fold
-        square = rest.T @ rest + ridge * len(rest) * np.eye(asked.shape[1])
-        found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
-    return found.reshape(values.shape)
-
-
-def foretold_by_run(
-    asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = _RIDGE
-) -> dict[int, Array]:
-    """Predict values of runs by their numbers, all runs together, from what was asked for; see `foretold`."""
-    if not asked:
-        return {}
-    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]), ridge)
-    return dict(zip(asked, np.split(told, np.cumsum([len(own) for own in asked.values()])[:-1]), strict=True))
+def past_setpoints(asked: Array, period: float, apart: int) -> Array:
+    """Put setpoints beside themselves as they were before, so many samples apart, shape (time, column)."""
+    lags = range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
+    return np.hstack([delayed(asked, lag, "previous") for lag in lags])
 
 
 def _runs(flight: PlaybackFlight) -> list[slice]:

@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.estimation.first_stage import OF_MANY, first_stage_fit_by_run
 from cpfls_cli.playback.balances import (
     OVERLAP,
     Balances,
@@ -26,7 +27,6 @@ from cpfls_cli.playback.balances import (
     middles_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import OF_MANY, foretold_by_run
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 
 _WINDOW_S, _SLOW_S = 0.08, 0.25
@@ -109,7 +109,7 @@ def what_is_new(
     past = [np.concatenate(each, axis=-1) for each in zip(*(later(told, -lag) for lag in before), strict=True)]
     flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(past) if len(own)}
     values = {number: new[number].reshape(len(own), -1) for number, own in flat.items()}
-    known = foretold_by_run(flat, values, OF_MANY) if many else foretold_by_run(flat, values)
+    known = first_stage_fit_by_run(flat, values, *([OF_MANY] if many else []))
     foretold = [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
     return News(new, foretold, lasts)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, runs
+from cpfls_cli.estimation.first_stage import fits_of_others
 from cpfls_cli.response.mismatch import clearness
 from cpfls_cli.result import about, result
 
@@ -302,9 +303,7 @@ def _instrument(stretches: Sequence[Stretch], analysis: _Analysis, u: Array) -> 
     blocks = int(number.max()) + 1
     power = np.array([np.einsum("nfk,nfl->fkl", z[number == b].conj(), z[number == b]) for b in range(blocks)])
     cross = np.array([np.einsum("nfk,nf->fk", z[number == b].conj(), u[number == b]) for b in range(blocks)])
-    apart = np.abs(np.subtract.outer(np.arange(blocks), np.arange(blocks))) > _BLOCKS_BESIDE
-    others = np.tensordot(apart.astype(float), power, 1) + _RIDGE * len(z) * np.eye(z.shape[2])
-    weights = np.linalg.solve(others, np.tensordot(apart.astype(float), cross, 1)[..., None])[..., 0]
+    weights = fits_of_others(power, cross[..., None], _RIDGE * len(z), _BLOCKS_BESIDE)[..., 0]
     return np.asarray(np.einsum("nfk,nfk->nf", z, weights[number]))
 
 

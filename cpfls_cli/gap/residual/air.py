@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
@@ -21,11 +22,9 @@ from cpfls_cli.playback.instruments import (
     Repeats,
     Told,
     ToldBy,
-    foretold_by_run,
     held,
     instruments,
-    late,
-    late_by,
+    past_setpoints,
 )
 from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, blows, newly_left, ranks
 from cpfls_cli.weak_form.resampling import about_flight_mean
@@ -257,14 +256,16 @@ def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) 
 
     `rows`, each shape (window, ...): of each run.
     """
-    lags = late_by(windows.period, max(1, windows.hop // 2))
+    apart = max(1, windows.hop // 2)
     asked = {
         # What drifts, such as the charge of a battery, goes with the time, which knows nothing of gusts either.
-        number: windows.average(np.hstack([*(late(setpoint, lag) for lag in lags), np.c_[np.arange(len(setpoint))]]))
+        number: windows.average(
+            np.hstack([past_setpoints(setpoint, windows.period, apart), np.c_[np.arange(len(setpoint))]])
+        )
         for number, setpoint in enumerate(given.setpoints)
         if setpoint is not None and len(rows[number])
     }
-    found = foretold_by_run(asked, rows)
+    found = first_stage_fit_by_run(asked, rows)
     return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
 
 
