@@ -8,7 +8,7 @@ grow with frequency, and that of the rotor speeds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -21,11 +21,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
+from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, ToldBy
-from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
+from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
@@ -438,19 +439,16 @@ class _Axis:
     """What does not come again about one axis, and the process that has this power."""
 
     def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
-        weight, period = band.pieces.weight, band.pieces.period
-        self._period = period
+        self._period = band.pieces.period
         self._power, self._count = power, count
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
         self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
-        self._lags = np.asarray(period * np.arange(len(weight)), dtype=float)
-        alike = np.correlate(weight, weight, "full")[len(weight) - 1 :]
-        self._alike = np.cos(np.outer(band.turns, self._lags)) * alike * np.where(self._lags == 0, 1.0, 2.0)
+        self._process = GaussMarkov.seen_by(band.pieces.weight, self._period, band.turns)
 
     def bound(self) -> Array:
         """Give the size of all that is left, as columns of `FoundGusts`."""
-        scale = len(self._lags) * self._noise[0, 0]
+        scale = len(self._process.lags) * self._noise[0, 0]
         blocks = (self._power[:, 0] + 2 * self._power[:, 1:].sum(axis=1)) / self._count / scale
         largest = blocks.mean() + half_width(mean_error(blocks), len(blocks))
         return np.array([np.nan, 0.0, np.sqrt(max(largest, 0.0)), *[np.nan] * 5])
@@ -484,48 +482,31 @@ class _Axis:
         """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
         known = self._expected(self._fit.numbers)[0]
         both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
-        squares = np.abs(parts) ** 2 @ both / (len(self._lags) * self._noise[0, 0])
-        return lack_of(power, squares, known, Rest(self._alike, self._lags, _MEMORY_S))
+        squares = np.abs(parts) ** 2 @ both / (len(self._process.lags) * self._noise[0, 0])
+        return lack_of(power, squares, known, self._process, _MEMORY_S)
 
     @cached_property
     def _fit(self) -> _Fit:
         """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
-        from scipy.optimize import minimize
-
-        powers = self._mean.max() / self._alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
+        powers = self._mean.max() / self._process.alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
         begin = np.log(np.maximum(powers, np.finfo(float).tiny))
         low = np.array([begin[0] - _FAR, np.log(_MEMORY_S[0]), *(begin[1:] - _FAR)])
         high = np.array([begin[0] + _FAR, np.log(_MEMORY_S[1]), *(begin[1:] + _NOISE)])
 
-        def unlikely(numbers: Array) -> tuple[float, Array]:
+        def spectrum(numbers: Array) -> tuple[Array, Callable[[Array], Array]]:
             expected, slopes = self._expected(numbers)
-            short = 1 - self._mean / expected
-            return float((self._mean / expected + np.log(expected)).sum()), (slopes / expected * short).sum(axis=1)
+            return expected, lambda slope: slopes @ slope[0]
 
-        found = [
-            minimize(
-                unlikely,
-                np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]),
-                jac=True,
-                bounds=list(zip(low, high, strict=True)),
-                method="L-BFGS-B",
-            )
-            for memory in _BEGIN_S
-        ]
-        best = min(found, key=lambda each: float(each.fun))
-        return _Fit(best.x, (best.x > low + _AT_END) & (best.x < high - _AT_END))
+        starts = [np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]) for memory in _BEGIN_S]
+        best = most_likely(spectrum, self._mean[None], starts, list(zip(low, high, strict=True)))
+        return _Fit(best, (best > low + _AT_END) & (best < high - _AT_END))
 
     def _expected(self, numbers: Array) -> tuple[Array, Array]:
         """Give the power by frequency, shape (frequency,), and its derivatives by the numbers, shape (4, frequency)."""
         size, memory, *noises = np.exp(numbers)
-        falls = np.exp(-self._lags / memory)
-        parts = np.array(
-            [
-                size * (self._alike @ falls),
-                size * (self._alike @ (falls * self._lags / memory)),
-                *(noise * shape for noise, shape in zip(noises, self._noise, strict=True)),
-            ]
-        )
+        shape, longer = self._process.power(memory)
+        white = (noise * each for noise, each in zip(noises, self._noise, strict=True))
+        parts = np.array([size * shape, size * longer, *white])
         return parts[[0, 2, 3]].sum(axis=0), parts
 
     def _errors(self, numbers: Array, free: BoolArray) -> Array:
