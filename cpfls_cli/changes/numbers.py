@@ -15,7 +15,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.lag import delayed
+from cpfls_cli.lag import best_delay, delayed
 from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
 
@@ -465,14 +465,9 @@ def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     cross = products[:, :drives, drives:] / size.transpose(0, 2, 1)
     found = np.linalg.solve(among + _COLLINEAR * np.eye(drives), cross)
     left = np.maximum(squares[:, drives:] - (cross * found).sum(axis=1), 0.0)
-    best = np.argmin(left, axis=0)
-    axis = np.arange(left.shape[1])
-    inner = np.clip(best, 1, len(left) - 2)
-    before, there, after = (left[inner + step, axis] for step in (-1, 0, 1))
-    bend = before - 2 * there + after
-    step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
+    best, axis = np.argmin(left, axis=0), np.arange(columns)
     gain = found[best, axis, axis] / size[best, 0, axis]
-    late = np.where(best < len(left) - 1, best + step, np.nan)
+    late = np.where(best < len(left) - 1, best_delay(np.arange(len(left), dtype=float), left)[0], np.nan)
     return np.array([gain, late, np.sqrt(left[best, axis] / count)])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.lag import delayed
+from cpfls_cli.lag import best_delay, delayed
 from cpfls_cli.playback.flight import PlaybackFlight
 
 _ALIKE = 0.7
@@ -423,13 +423,11 @@ def _aligned(one: PlaybackFlight, other: PlaybackFlight, shift: float) -> Array:
             continue
         piece, around = mine[first : first + length], yours[begin : begin + length + 2 * far]
         products = np.array([np.sum(piece * around[late : late + length]) for late in range(2 * far + 1)])
-        best = int(np.argmax(products))
-        if products[best] <= 0 or not 0 < best < 2 * far:
-            continue
-        before, at, after = products[best - 1 : best + 2]
-        middles.append(first + length / 2)
-        shifts.append(int(shift) - far + best + 0.5 * (before - after) / (before - 2 * at + after))
-        weights.append(np.sqrt(at))
+        at, inside = best_delay(int(shift) - far + np.arange(2 * far + 1.0), -products)
+        if inside and products.max() > 0:
+            middles.append(first + length / 2)
+            shifts.append(float(at))
+            weights.append(np.sqrt(products.max()))
     samples = np.arange(len(mine))
     line = np.full(len(mine), shift)
     if len(middles) > 2:
