@@ -58,7 +58,7 @@ _NOTHING: Final = "it lacks logged commands to compare with, what they are mixed
 _FEWEST: Final = 30  # Logged samples in flight that are compared.
 _FLIES: Final = 0.35  # Share of the usual mean command from which on the vehicle flies.
 _LEAST_COMMAND: Final = 0.03
-_SHIFTS_S: Final[Array] = np.arange(-30, 31) * 2e-3
+_SHIFTS_S: Final = np.arange(-30.0, 31.0) * 2e-3
 # Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m.
 _DENSITY_AT_SEA, _GAS, _KELVIN, _LAPSE = 1.225, 287.26, 273.15, 0.0065
 
