@@ -489,7 +489,8 @@ class _Axis:
     def _fit(self) -> _Fit:
         """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
         powers = self._mean.max() / self._process.alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
-        begin = np.log(np.maximum(powers, np.finfo(float).tiny))
+        # Of an axis that a flight does not know all is 0.
+        begin = np.log(np.maximum(powers, np.sqrt(np.finfo(float).tiny)))
         low = np.array([begin[0] - _FAR, np.log(_MEMORY_S[0]), *(begin[1:] - _FAR)])
         high = np.array([begin[0] + _FAR, np.log(_MEMORY_S[1]), *(begin[1:] + _NOISE)])
 
