@@ -16,7 +16,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
-from cpfls_cli.blocks import half_width, jackknife_covariance
+from cpfls_cli.blocks import block_length, half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.first_stage import FOLDS, first_stage_fit_by_run
@@ -30,7 +30,6 @@ from cpfls_cli.identification.data import (
     sample_times,
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
-from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.constants import constants_of_past
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments, ToldBy, instruments, past_setpoints

@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import block_length
 from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
@@ -29,8 +30,6 @@ OVERLAP = 0.75
 """Share that neighbouring windows have in common."""
 _OF_FORCE = (*BANDS[2:4], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
-_BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
-"""Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
 _OF_WINDOW = 0.25
 """What was asked for is looked at every so often, share of a window."""
 _NEAR = 1e-4
@@ -346,11 +345,6 @@ def _arranged(axes: Sequence[ByBand], names: Sequence[tuple[int, int]], size: in
             if name in found:
                 sums[:, place, band, rows], counts[place, band] = found[name]
     return Sums(sums[0], sums[1], sums[2], counts)
-
-
-def block_length(seconds: float) -> float:
-    """Choose how long the blocks of paths of so many seconds are, s."""
-    return min(_BLOCK_S, max(seconds / _BLOCKS, _LEAST_BLOCK_S))
 
 
 def fitting_bands(period: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:

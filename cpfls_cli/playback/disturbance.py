@@ -19,7 +19,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.blocks import block_length, contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -351,7 +351,7 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
         beside = [np.zeros_like(own) for own in left]
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
-    block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
+    block_s = block_length(seen, _PIECE_S, _LEAST_BLOCK_S, _BLOCKS)
     power, whole, count, each_left = [], [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import BLOCK_S
 from cpfls_cli.playback.past import LATER, News, what_is_new
 from cpfls_cli.rounding import levelled
-from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
+from cpfls_cli.weak_form.resampling import blocks_of
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 
 PER_WINDOW = FEWEST_SAMPLES
