@@ -17,7 +17,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
-from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, solve, without_each
+from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_bands
@@ -184,7 +184,7 @@ class _Problem:
     def _steps(self, places: IntArray, weighed: Array | None = None) -> Array:
         steps = np.zeros((len(self.weighed if weighed is None else weighed), len(self.values)))
         at = (self.values / self.free.scales)[places]
-        steps[:, places] = without_each(self.normal(places, weighed), self.prior(places), at) - at
+        steps[:, places] = one_step(self.normal(places, weighed), self.prior(places), at)[1] - at
         return steps
 
     @property
