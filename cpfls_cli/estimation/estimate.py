@@ -201,7 +201,7 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         [solve(equations, values, prior, bounds, block, _STEPS_LEFT_OUT).values for block in range(len(normal.score))]
     )
     total = normal.information.sum(axis=0)
-    inverse = np.linalg.inv(_invertible(total + np.diag(prior.precision)))
+    inverse = np.asarray(np.linalg.inv(_invertible(total + np.diag(prior.precision))), dtype=float)
     held = inverse @ np.diag(prior.precision) @ inverse.T
     return Fit(
         values=values,

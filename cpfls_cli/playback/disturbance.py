@@ -23,13 +23,14 @@ from cpfls_cli.blocks import block_length, contiguous, half_width, jackknife_err
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.balances import middles_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
 from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
 from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
@@ -161,12 +162,6 @@ class _Band(NamedTuple):
         """Take what both sides of a balance differ by, shape (time, 2, axis) to (piece, axis, frequency)."""
         return -self.laid(flight, sides[:, 0], self.slope) - self.laid(flight, sides[:, 1], self.weight)
 
-    def starts(self, flight: PlaybackFlight) -> IntArray:
-        """Give the first sample of each piece."""
-        hop, counts = self.pieces.hop, [self.pieces.count(part.stop - part.start) for part in flight.stretches]
-        found = [part.start + np.arange(count) * hop for part, count in zip(flight.stretches, counts, strict=True)]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
-
 
 def find_gusts(
     model: VehicleModel,
@@ -245,10 +240,10 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     if not left:
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
-    newly = newly_left(seen, left, told, moving, found.noise)
-    foretold, without = newly.shares
-    foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
-    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_RARE)
+    new = residual_innovations(seen, left, told, moving, found.noise)
+    foretold, without = new.shares
+    little = foretold + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
+    gusty = np.isfinite(found.size) & little & ~new.grows(_RARE)
     if not blows(gusty, np.ones_like(gusty)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -356,7 +351,7 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
-        block = band.starts(flight)[there] * period // block_s
+        block = (middles_of(band.pieces, flight)[there] - len(band.weight) // 2) * period // block_s
         each_left.append(squares)
         for each in np.unique(block):
             power.append(products[block == each].sum(axis=0))

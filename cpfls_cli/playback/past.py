@@ -1,7 +1,7 @@
-"""What was before as an instrument: it tells the vehicle from its loop where nothing comes again and nothing was asked.
+"""The past as an instrument: it separates the vehicle from its loop where nothing is repeatable and nothing was asked.
 
-What lasts of a gust, as long as its memory is, shows in what is left of a balance; what is new in it nobody knew
-before, nor any loop.
+What lasts of a gust, as long as its memory is, shows in the residual of a balance; its innovations nobody knew before,
+nor any loop.
 """
 
 from __future__ import annotations
@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.estimation.first_stage import OF_MANY, first_stage_fit_by_run
 from cpfls_cli.playback.balances import (
     OVERLAP,
     Balances,
@@ -27,95 +26,22 @@ from cpfls_cli.playback.balances import (
     middles_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.innovations import innovations
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 
 _WINDOW_S, _SLOW_S = 0.08, 0.25
-"""Windows, as short as samples allow: nothing within one is known when it begins. What was foretold is averaged over
-the second, which leaves what is slow of it: most effects that a model lacks are in it."""
+"""Windows, as short as samples allow: nothing within one is known when it begins. Predictions are averaged over the
+second, which leaves what is slow of them: most effects that a model lacks are in it."""
 _PARTED_HZ = 2.0
-"""Above what was foretold is fast, about."""
+"""Above predictions are fast, about."""
 _PER_WINDOW = round(1 / (1 - OVERLAP))
-LATER = 0.25
-"""What is new comes so much later, share of a window."""
 _BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
 """What was before ended a whole window before another begins: gusts that remember in more ways than one forget all but
 one of them, and logs that were filtered forward and backward what they know of what comes."""
 
 
-class News(NamedTuple):
-    """What comes newly after windows of runs.
-
-    Attributes
-    ----------
-    rows, foretold : list of array, shape (window, axis, column)
-        What is new, and what of that was foretold; of each run the last windows.
-    lasts : array, shape (axis, 1)
-        Share of what is left that lasts until then.
-    """
-
-    rows: list[Array]
-    foretold: list[Array]
-    lasts: Array
-
-
-def what_is_new(
-    rows: Sequence[Array],
-    left: Sequence[Array],
-    told: Sequence[Array],
-    ahead: int,
-    before: Sequence[int],
-    *,
-    many: bool = False,
-) -> News:
-    """Give what comes newly after each window, and what windows that ended before it tell of that.
-
-    With r what is left, a moment later and now, and a the share of it that lasts so long, ``r' - a r`` has of a gust
-    only what has come since the window began. Whatever ended before that knows nothing of it, the loop's answers to
-    older gusts and noise included. a is seen in what is left, by what it was before.
-
-    Parameters
-    ----------
-    rows : sequence of array, shape (window, axis, column)
-        Of each run, linear in what acts.
-    left : sequence of array, shape (window, axis)
-        What is left of the balances.
-    told : sequence of array, shape (window, signal) or (window, axis, signal)
-        What is known of each window when it has ended; of each axis by itself, where all are foretold alike.
-    ahead : int
-        By how many windows later is later.
-    before : sequence of int
-        How many windows ago what is known ended, the longest last; the first of them no longer overlap.
-    many : bool
-        Whether many signals are known that go together.
-
-    References
-    ----------
-    Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument); Söderström and Stoica 2002.
-    """
-    first = before[-1]
-
-    def later(values: Sequence[Array], by: int) -> list[Array]:
-        return [own[first + by :][: max(0, len(own) - first - ahead)] for own in values]
-
-    # What a run is off by throughout is no gust.
-    off = [own - own.mean(axis=0) if len(own) else own for own in left]
-    was = [np.sum(each, axis=0) for each in zip(*(later(off, -lag) for lag in before), strict=True)]
-    # By what was before both, which the noise of neither has a part in.
-    kept, now = (
-        sum((each * own).sum(axis=0) for each, own in zip(later(off, by), was, strict=True)) for by in (ahead, 0)
-    )
-    lasts = np.clip(kept / np.where(now > 0, now, np.inf), 0.0, 1.0)[:, None]
-    new = [then - lasts * own for then, own in zip(later(rows, ahead), later(rows, 0), strict=True)]
-    past = [np.concatenate(each, axis=-1) for each in zip(*(later(told, -lag) for lag in before), strict=True)]
-    flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(past) if len(own)}
-    values = {number: new[number].reshape(len(own), -1) for number, own in flat.items()}
-    known = first_stage_fit_by_run(flat, values, *([OF_MANY] if many else []))
-    foretold = [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
-    return News(new, foretold, lasts)
-
-
 class PastBalances(Balances):
-    """Balances of what is new along flights, and what of them was foretold by what was before."""
+    """Balances of innovations along flights, and what the past predicts of them."""
 
     of_past: ClassVar[bool] = True
 
@@ -138,7 +64,7 @@ class PastBalances(Balances):
         return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
 
     def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], laid: Laid) -> ByBand:
-        """Sum products of what is new with what of it was foretold fast, and slowly."""
+        """Sum products of innovations with their predictions, fast ones and slow ones."""
         band = bands[0]
         rows = list(self._new(band, signals, laid))
         count = max(1, round(_SLOW_S / (band.hop * band.period)))
@@ -156,12 +82,12 @@ class PastBalances(Balances):
             for part in self.flights[number].stretches
         ]
         rows = [laid(band, flight, signals[number]) for number, flight in parts]
-        left = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
-        told = [averaged(band, flight, _seen(flight)) for _, flight in parts]
-        new, known, _ = what_is_new(rows, left, told, round(LATER * _PER_WINDOW), _BEFORE)
-        for (number, flight), own, foretold in zip(parts, new, known, strict=True):
+        residual = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
+        seen = [averaged(band, flight, _seen(flight)) for _, flight in parts]
+        new, known, _ = innovations(rows, residual, seen, _PER_WINDOW, _BEFORE)
+        for (number, flight), own, predicted in zip(parts, new, known, strict=True):
             middles = middles_of(band, flight)
-            yield Rows(number, own, foretold, middles[len(middles) - len(own) :])
+            yield Rows(number, own, predicted, middles[len(middles) - len(own) :])
 
 
 def _seen(flight: PlaybackFlight) -> Array:

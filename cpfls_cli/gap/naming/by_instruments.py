@@ -21,8 +21,8 @@ from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import predicted_rows
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
+from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.newness import PER_WINDOW, news
 
 _Numbers = tuple[Estimate, ...]
 
@@ -259,7 +259,7 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
         of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
     known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
-    new, predicted, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
+    new, predicted, _ = innovations(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
     return _predicted(own, known, of_path), _predicted(new, predicted, of_run)
 
 
