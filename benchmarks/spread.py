@@ -81,7 +81,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     given = instruments(flights)
     constants = find_constants(vehicle, flights, given, PlaybackSettings().leave_out)
     assert constants is not None
-    assert constants.tells, "instruments tell the body of these flights"
+    assert constants.identified, "instruments identify the body of these flights"
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)

@@ -31,7 +31,7 @@ from cpfls_cli.identification.data import (
     sample_times,
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
-from cpfls_cli.playback.constants import constants_of_past
+from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments, ToldBy, instruments, past_setpoints
 from cpfls_cli.playback.kernels import MeasuredMotion
@@ -123,7 +123,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
     Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
-    not about yaw (`constants_of_past`). The torque becomes what it was, and what that body takes more than the other.
+    not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the other.
 
     Parameters
     ----------
@@ -210,8 +210,8 @@ def _by_past(
     # Of effects those that take no rotors: these are nobody's.
     tried = (INERTIA, PRODUCTS, *(name for name, effect in CATALOGUE.items() if not effect.needs))
     others = [block for block in blocks_of(vehicle) if block not in tried]
-    found = constants_of_past(vehicle, flights, replace(given, flown=flights), others)
-    if found is None or not found.tells:
+    found = find_constants(vehicle, flights, replace(given, flown=flights), others, past=True)
+    if found is None or not found.identified:
         return None
     inertia, yaw = found.fitted.model.body.inertia, list(_OF_YAW)
     rigid_body = np.array([inertia[entry] for entry in INERTIA_ENTRIES])
