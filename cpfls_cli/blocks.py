@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 FEWEST_BLOCKS = 4
-"""That tell an error, if a wide one: Student's t of three is 4.3."""
+"""That give an error, if a wide one: Student's t of three is 4.3."""
 
 _CONFIDENCE = 0.975
 """Two-sided 95 %."""
@@ -69,7 +69,7 @@ def mean_error(values: Array) -> Array:
 
 
 def half_width(error: Array, blocks: int | IntArray, confidence: float = _CONFIDENCE) -> Array:
-    """Compute half of an interval, 95 % two-sided, from a standard error that so many blocks tell, by Student's t.
+    """Compute half of an interval, 95 % two-sided, from a standard error of so many blocks, by Student's t.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Balances of torque and force in bands of frequency, with derivatives by each number, beside those of other runs."""
+"""Balances of torque and force in bands of frequency, with derivatives by each number, and their instruments."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class _Factors(NamedTuple):
         return {*other.torque} <= {*self.torque} and {*other.force} <= {*self.force}
 
     def columns(self, evaluated: Evaluated) -> tuple[Array, Array]:
-        """Give what is left of the balances of torque and force, its derivatives, and what the motion takes.
+        """Give the residual of the balances of torque and force, its derivatives, and what the motion takes.
 
         Returns
         -------
@@ -130,7 +130,7 @@ class Laid(NamedTuple):
     arranged : callable
         From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column).
     left : array, shape (axis, column)
-        Weights of columns that give what is left.
+        Weights of columns that give the residual.
     """
 
     arranged: Callable[[Array, Array], Array]
@@ -239,7 +239,7 @@ class Balances:
         Returns
         -------
         Sums
-            First column: what is left; then derivatives by each number; last what the motion takes.
+            First column: the residual; then derivatives by each number; last what the motion takes.
         """
         evaluated = Evaluated.of(free, values)
         wanted, response = _Factors.of(evaluated), evaluated.at.response
@@ -299,7 +299,7 @@ class Balances:
         return found
 
     def _beside(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
-        """Average what the other runs of its path have beside each flight."""
+        """Average what the other runs of its path have at the places of each flight."""
         whole = [
             np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
             for number, flight in enumerate(self.flights)

@@ -32,9 +32,9 @@ from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 ENOUGH_BLOCKS = 8
-"""Whose scatter tells an error by instruments."""
+"""Whose scatter gives an error by instruments."""
 _LONGEST_S = 8.0
-"""Length from which on a run tells something in all bands."""
+"""Length from which on a run identifies something in all bands."""
 _FLAT = 0.85
 """Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
@@ -42,13 +42,13 @@ _NOT_TRIED = "slow_actuation"
 _STEPS, _SETTLED = 12, 1e-3
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
-"""Of the power of a band that is never taken for what comes again."""
+"""Share of the power of a band that is never taken for repeatable."""
 STRONG = 10.0
 """F statistic of an instrument below which it is weak, and its interval no interval."""
 _APART = 3.0
 """Standard errors by which bands may differ on a moment of inertia."""
 _WORTH = 3.0
-"""Standard errors by which a block has to lower what is left of balances kept aside."""
+"""Standard errors by which a block has to lower the residual of balances kept aside."""
 
 
 class Repeat(NamedTuple):

@@ -34,9 +34,9 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 
 
 Told = Literal["repeats", "setpoints", "none"]
-"""What tells gusts and what a model lacks apart."""
+"""What separates gusts from what a model lacks."""
 ToldBy = Literal[Told, "past"]
-"""Where nothing moves a vehicle but its loop, what was before may tell."""
+"""Where nothing moves a vehicle but its loop, the past may separate them."""
 
 _ANSWERED_S = 0.5
 """What was asked for is answered within this time."""
@@ -61,7 +61,7 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Instruments:
-    """What tells of each run how it was moved, apart from its gusts.
+    """What shows how each run was moved, apart from its gusts.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Instruments:
 
     @property
     def kind(self) -> Told:
-        """What most can be told from: runs of a path tell more than what was asked for."""
+        """What identifies most: runs of a path show more than what was asked for."""
         if self.repeats.likeness:
             return "repeats"
         return "setpoints" if self.names else "none"
@@ -157,7 +157,7 @@ def held(flight: PlaybackFlight) -> bool:
 
 
 def past_setpoints(asked: Array, period: float, apart: int) -> Array:
-    """Put setpoints beside themselves as they were before, so many samples apart, shape (time, column)."""
+    """Stack setpoints and their past, so many samples apart, shape (time, column)."""
     lags = range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
     return np.hstack([delayed(asked, lag, "previous") for lag in lags])
 
@@ -223,7 +223,7 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
 
 
 def _of_one_kind(flights: Sequence[PlaybackFlight], repeated: Collection[int]) -> list[tuple[str, ...]]:
-    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is foretold of all."""
+    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is predicted for all."""
     held = [{(name, flight.setpoints[name].shape[1]) for name in _outside(flight)} for flight in flights]
     voting = [number for number in range(len(flights)) if number not in repeated] or range(len(flights))
 

@@ -31,7 +31,7 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES
 _BANDS = BANDS[1:4]
 """Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth."""
 _FASTER = (0.05, 0.15)
-"""Of the same kind, about 6 to 20 Hz: shown beside the others, and in no bound, for rotors and frames answer there."""
+"""Of the same kind, about 6 to 20 Hz: shown with the others, and in no bound, for rotors and frames answer there."""
 _LAGS = (0.0, 0.01, 0.02, 0.05, 0.1)
 """Lags of rotors that are tried where none is known, s."""
 ANY = 10.0
@@ -40,7 +40,7 @@ _TINY = np.finfo(float).tiny
 _LEAVES_LESS = 0.5
 """Of what a model leaves unexplained: one without its effects that leaves less shows that it is wrong."""
 _MOST_NOISE = 0.1
-"""Of the power of a band that may be noise of the sensors: with more, what is left is the noise's error."""
+"""Of the power of a band that may be noise of the sensors: with more, the residual is the noise's error."""
 
 
 _BODY = "body (FLU)"
@@ -91,7 +91,7 @@ class LoopBounds(NamedTuple):
 
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
-    """Bound the moments of inertia that the flights of a closed loop allow, beside those of a model.
+    """Bound the moments of inertia that the flights of a closed loop allow, in those of a model.
 
     With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band,
     ``<t, h> / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want
@@ -146,7 +146,7 @@ def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight
     Parameters
     ----------
     told_hz : float, Hz
-        How often the logs tell the rotors.
+        How often the logs hold the rotors.
     """
     if told_hz >= SLOW_HZ:
         return False
