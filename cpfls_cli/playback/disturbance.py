@@ -333,13 +333,10 @@ def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
 
 
 def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: ToldBy) -> _Powers:
-    """Take the power of what does not come again, by block of a run."""
+    """Take the power of the non-repeatable residual, by block of a run."""
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if told_by == "repeats":
-        beside = [
-            band.left(flight, given.repeats.others(number, sides)) if given.repeats.beside[number] else np.nan * own
-            for number, (flight, own) in enumerate(zip(given.flown, left, strict=True))
-        ]
+        beside = [band.left(flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
     elif told_by == "setpoints":
         beside = _expected(given, left, band)
     else:
@@ -347,28 +344,25 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
     block_s = block_length(seen, _PIECE_S, _LEAST_BLOCK_S, _BLOCKS)
-    power, whole, count, each_left = [], [], [], []
+    sums, count, each_left = [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
-        products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
+        both = np.stack([(own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2], axis=1)
         block = (middles_of(band.pieces, flight)[there] - len(band.weight) // 2) * period // block_s
-        each_left.append(squares)
-        for each in np.unique(block):
-            power.append(products[block == each].sum(axis=0))
-            whole.append(squares[block == each].sum(axis=0))
-            count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
+        each_left.append(both[:, 1])
+        numbers, windows = np.unique(block, return_counts=True)
+        sums += [both[block == each].sum(axis=0) for each in numbers]
+        count += windows.tolist()
+    power, whole = np.reshape(sums, (len(count), 2, *left[0].shape[1:])).swapaxes(0, 1)
+    return _Powers(power, whole, np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
 def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: ToldBy) -> _Complex:
-    """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
+    """Give parts of a model as instruments predict them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]
     if told_by == "repeats":
-        flat = [
-            given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own
-            for number, own in enumerate(flat)
-        ]
+        flat = [given.repeats.others(number, flat) for number in range(len(flat))]
     laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
     if told_by == "setpoints":
         laid = _expected(given, laid, band)
