@@ -377,7 +377,7 @@ def law_of(model: VehicleModel, given: Instruments) -> Law:
     """
     before, after = [], []
     for number, run in enumerate(given.flown):
-        for other, place in given.repeats.beside[number].items():
+        for other, place in given.repeats.places[number].items():
             known = np.isfinite(place)
             there = known[1:] & known[:-1]
             rows = np.hstack([answers(model, run.speed), states(run)]) - given.repeats.at(

@@ -122,19 +122,19 @@ class Signals(NamedTuple):
     acting: Array
 
 
-class Laid(NamedTuple):
-    """How columns are laid.
+class WindowedColumns(NamedTuple):
+    """Columns of balances, made of averages over windows.
 
     Attributes
     ----------
     arranged : callable
         From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column).
-    left : array, shape (axis, column)
+    residual : array, shape (axis, column)
         Weights of columns that give the residual.
     """
 
     arranged: Callable[[Array, Array], Array]
-    left: Array
+    residual: Array
 
     def __call__(self, band: Windows, flight: PlaybackFlight, signals: Signals) -> Array:
         """Lay windows over what is balanced, shape (window, axis, column)."""
@@ -217,7 +217,7 @@ class Balances:
         return {
             number: asked
             for number, asked in enumerate(self.given.setpoints)
-            if asked is not None and not self.given.repeats.beside[number]
+            if asked is not None and not self.given.repeats.places[number]
         }
 
     @property
@@ -254,7 +254,7 @@ class Balances:
     def _summed(self, evaluated: Evaluated, factors: _Factors) -> tuple[Sums, Sums]:
         """Sum products of all columns of torque, and of force."""
         rotors = {number: _rotor_terms_by(evaluated, self.flights[number]) for number in self.path}
-        left_of_torque, left_of_force = (columns[..., 0] for columns in factors.columns(evaluated))
+        residual_torque, residual_force = (columns[..., 0] for columns in factors.columns(evaluated))
 
         def along(number: int, listed: Sequence[tuple[str, int, int]]) -> Array:
             terms = self.terms[number]
@@ -263,7 +263,7 @@ class Balances:
         turning = self.products(
             self.bands[: len(self.bands_hz)],
             {number: _of_torque(self.flights[number], along(number, factors.torque)) for number in self.path},
-            Laid(_turned, left_of_torque),
+            WindowedColumns(_turned, residual_torque),
         )
         pushing: list[ByBand] = []
         for axis in range(3 if self.translates else 0):
@@ -273,15 +273,17 @@ class Balances:
                 flight = self.flights[number]
                 pushes = flight.motion.rotation[:, axis, axes] * along(number, listed)
                 signals[number] = _of_force(flight, axis, evaluated.at.free.vehicle.gravity_m_s2, pushes)
-            pushing.append(self.products(self.bands[len(self.bands_hz) :], signals, Laid(_pushed, left_of_force)))
+            pushing.append(
+                self.products(self.bands[len(self.bands_hz) :], signals, WindowedColumns(_pushed, residual_force))
+            )
         names = sorted(set().union(*turning, *(each for by_band in pushing for each in by_band)))
         size = len(INERTIA_ENTRIES) + len(factors.torque), 1 + len(factors.force)
         return _arranged([turning], names, size[0]), _arranged(pushing, names, size[1])
 
-    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], laid: Laid) -> ByBand:
+    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], windowed: WindowedColumns) -> ByBand:
         """Sum products by band, path and block."""
-        beside = self._beside(signals)
-        return [self.of_band(self._rows(band, signals, beside, laid)) for band in bands]
+        others = self._of_other_runs(signals)
+        return [self.of_band(self._rows(band, signals, others, windowed)) for band in bands]
 
     def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], tuple[Array, int]]:
         """Sum products of rows of a band."""
@@ -298,7 +300,7 @@ class Balances:
                 found[first, int(each)] = before + sums, count + len(mine)
         return found
 
-    def _beside(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
+    def _of_other_runs(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
         """Average what the other runs of its path have at the places of each flight."""
         whole = [
             np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
@@ -313,10 +315,10 @@ class Balances:
         return found
 
     def _rows(
-        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], laid: Laid
+        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], windowed: WindowedColumns
     ) -> Iterator[Rows]:
-        own = {number: laid(band, self.flights[number], each) for number, each in signals.items()}
-        known = {number: laid(band, self.flights[number], each) for number, each in others.items()}
+        own = {number: windowed(band, self.flights[number], each) for number, each in signals.items()}
+        known = {number: windowed(band, self.flights[number], each) for number, each in others.items()}
         known |= self._expected(band, {number: own[number] for number in self.asked})
         for number in self.path:
             yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))

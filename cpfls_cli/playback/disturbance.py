@@ -298,7 +298,7 @@ def gusts_in(
     powers = _powers(sides, given, band, told_by)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
-    runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
+    runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]

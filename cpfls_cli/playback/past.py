@@ -18,9 +18,9 @@ from cpfls_cli.playback.balances import (
     OVERLAP,
     Balances,
     ByBand,
-    Laid,
     Rows,
     Signals,
+    WindowedColumns,
     averaged,
     band_windows,
     middles_of,
@@ -63,10 +63,10 @@ class PastBalances(Balances):
         """Each flight is a path of its own."""
         return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
 
-    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], laid: Laid) -> ByBand:
+    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], windowed: WindowedColumns) -> ByBand:
         """Sum products of innovations with their predictions, fast ones and slow ones."""
         band = bands[0]
-        rows = list(self._new(band, signals, laid))
+        rows = list(self._new(band, signals, windowed))
         count = max(1, round(_SLOW_S / (band.hop * band.period)))
         slow = [_mean_of_last(own.known, count) for own in rows]
         fast = [own._replace(known=own.known - mean) for own, mean in zip(rows, slow, strict=True)]
@@ -75,14 +75,14 @@ class PastBalances(Balances):
             self.of_band(own._replace(known=mean) for own, mean in zip(rows, slow, strict=True)),
         ]
 
-    def _new(self, band: Windows, signals: Mapping[int, Signals], laid: Laid) -> Iterator[Rows]:
+    def _new(self, band: Windows, signals: Mapping[int, Signals], windowed: WindowedColumns) -> Iterator[Rows]:
         parts = [
             (number, replace(self.flights[number], stretches=(part,)))
             for number in self.path
             for part in self.flights[number].stretches
         ]
-        rows = [laid(band, flight, signals[number]) for number, flight in parts]
-        residual = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
+        rows = [windowed(band, flight, signals[number]) for number, flight in parts]
+        residual = [np.einsum("wac,ac->wa", own, windowed.residual) for own in rows]
         seen = [averaged(band, flight, _seen(flight)) for _, flight in parts]
         new, known, _ = innovations(rows, residual, seen, _PER_WINDOW, _BEFORE)
         for (number, flight), own, predicted in zip(parts, new, known, strict=True):

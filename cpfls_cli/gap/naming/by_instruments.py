@@ -278,7 +278,7 @@ def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[
     known = []
     for number, (own, middle) in enumerate(zip(rows, middles, strict=True)):
         total, count = np.zeros_like(own), np.zeros(len(own))
-        for other, places in given.repeats.beside[number].items():
+        for other, places in given.repeats.places[number].items():
             place, flat = places[middle], rows[other].reshape(len(rows[other]), -1)
             inside = (place >= middles[other][0]) & (place <= middles[other][-1]) if len(flat) else place < 0
             moved = [np.interp(place[inside], middles[other], column) for column in flat.T]

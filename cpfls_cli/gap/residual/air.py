@@ -97,7 +97,7 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
     known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}
-        for number, each in enumerate(given.repeats.beside)
+        for number, each in enumerate(given.repeats.places)
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
     return replace(given, repeats=Repeats(known, likeness))

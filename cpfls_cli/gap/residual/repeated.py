@@ -226,7 +226,7 @@ class RepeatedRuns:
             pair
             for path in given.repeats.paths()
             for pair in permutations(path, 2)
-            if pair[1] in given.repeats.beside[pair[0]] and all(runs[each].flight in different for each in pair)
+            if pair[1] in given.repeats.places[pair[0]] and all(runs[each].flight in different for each in pair)
         ]
         seen = len(recordings) - unseen
         judged = [pair for pair in pairs if any(runs[each].flight >= seen for each in pair)]
