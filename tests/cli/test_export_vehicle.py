@@ -51,7 +51,8 @@ def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
     if form == "json":
         document = json.loads(output.read_text())
         assert document["format"] == "cpfls/model-json"
-        assert len(document["weights"]["weight"]) == summary["weights"]
+        learned = document["learned"]["coefficients"]
+        assert len(document["numbers"]) + len(learned) == summary["weights"]
     else:
         done = self_test(output)
         assert done.returncode == 0, done.stdout + done.stderr
