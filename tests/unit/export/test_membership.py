@@ -6,16 +6,16 @@ their value about pitch. Derivatives by the breakpoints are compared in `tests/u
 """
 
 import re
-from functools import partial
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.export.json_form import HOW_TO_EVALUATE, HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.acting import wrench_along
+from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
@@ -174,7 +174,6 @@ def formula(words):
 
 WORDS = {
     "json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line),
-    "json of a vehicle": next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line),
     "method.md": METHOD.read_text(),
 }
 

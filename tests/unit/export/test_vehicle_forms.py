@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import turning_law
-from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.acting import parts_along, wrench_along
+from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import part_sizes, reference_points, reference_run
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
@@ -199,7 +199,11 @@ def test_the_self_test_of_c_passes(tmp_path, name, flags):
 
 @pytest.mark.parametrize(
     ("before", "after"),
-    [("slowness = R(0.45)", "slowness = R(0.4500001)"), ("rotor_1_thrust_factor = R(", "rotor_1_thrust_factor = R(1e-15 + "), ("* falling", "")],
+    [
+        ("slowness = R(0.45)", "slowness = R(0.4500001)"),
+        ("rotor_1_thrust_factor = R(", "rotor_1_thrust_factor = R(1e-15 + "),
+        ("* falling", ""),
+    ],
     ids=["slow actuation", "number", "nothing"],
 )
 def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, after):
