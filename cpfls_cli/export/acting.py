@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from cpfls_cli.playback.model import VehicleModel, acting_of
 from cpfls_cli.vehicle.motion import Acting, Instant, about_centre
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, Language, Symbol, used, written
-from cpfls_cli.vehicle.values import ARRAYS, ZERO, Each, Functions, Value, Vector, add, scaled
+from cpfls_cli.vehicle.values import ARRAYS, ZERO, Each, Functions, Value, Vector, add, scaled, zero
 
 LEARNED = "learned[{}]"
 """Name of a coefficient of the learned part."""
@@ -24,14 +24,14 @@ _FACTORS = {"thrust_factor": ("thrust_factor_n_s2", "N s^2"), "drag_factor": ("d
 
 
 def parts_of(
-    acting: Iterable[Acting], vehicle: VehicleSettings, motion: Sequence[Vector], functions: Functions = SYMBOLS
+    acting: Iterable[Acting], vehicle: VehicleSettings, motion: Sequence[Value], functions: Functions = SYMBOLS
 ) -> Iterator[tuple[str, Vector]]:
     """Give torque and force of each part, six components, those with levers for the forces of the others last.
 
     Parameters
     ----------
-    motion : sequence of vector
-        Velocity through the air, body rate, then of the rotors speeds, accelerations and slow squared speeds.
+    motion : sequence of value
+        Vectors of air velocity and body rate, then of the rotors speeds, accelerations and slow squared speeds.
     """
     air, rate, speed, turning, slow = motion
     seen = Instant(vehicle, speed, air, rate, turning, slow_square=slow, functions=functions)
@@ -42,14 +42,10 @@ def parts_of(
         felt = replace(seen, force=force) if one.of_all_forces else seen
         wrench = one.wrench(felt)
         torque, push = about_centre(felt, wrench)
-        if any(map(_known, wrench.momentum)):
+        if not all(map(zero, wrench.momentum)):
             torque = add(torque, one.wrench(spun).momentum)
         force = add(force, push)
         yield one.name, (*torque, *push)
-
-
-def _known(x: Value) -> bool:
-    return not (isinstance(x, (int, float)) and x == 0)
 
 
 def parts_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> dict[str, Array]:
@@ -75,7 +71,7 @@ def wrench_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> 
 
 
 def numbers_of(model: VehicleModel) -> dict[str, float]:
-    """Give the numbers of all that acts by name; coefficients of the learned part last."""
+    """Give the numbers of all that acts by name: of rotors, of effects, coefficients of the learned part."""
     found = {
         f"rotor_{place}_{name}": float(getattr(rotor, field))
         for place, rotor in enumerate(model.vehicle.rotors, 1)
@@ -88,11 +84,13 @@ def numbers_of(model: VehicleModel) -> dict[str, float]:
 
 def units_of(model: VehicleModel) -> dict[str, str]:
     """Give the units of numbers by name."""
-    units = {f"rotors_{name}": unit for name, unit in _OF_ROTORS.items()}
+    units = {"mass": "kg", "gravity": "m/s^2"} | dict.fromkeys(INERTIA_PARAMETERS, "kg m^2")
+    units |= {f"rotors_{name}": unit for name, unit in _OF_ROTORS.items()}
     for place in range(1, model.rotors + 1):
         units |= {f"rotor_{place}_{name}": unit for name, (_, unit) in _FACTORS.items()}
     for one in model.effects:
-        units |= {f"{one.name}_{each.name}": each.unit for each in (*one.known.coefficients, *one.known.shapes)}
+        units |= {f"{one.name}_{each.name}": each.unit for each in one.known.coefficients}
+        units |= {f"{one.name}_{each.name}": each.unit for each in one.known.shapes}
     return units
 
 
@@ -170,9 +168,8 @@ def share_of(part: str) -> str:
     return f"share_of_{part}"
 
 
-def _by_name(vehicle: VehicleSettings, named: object) -> VehicleSettings:
+def _by_name(vehicle: VehicleSettings, named: Callable[[str], Symbol]) -> VehicleSettings:
     """Put symbols in the place of numbers that differ between vehicles of a kind."""
-    assert callable(named)
     made = copy(vehicle)
     rotors = []
     for place, rotor in enumerate(vehicle.rotors, 1):

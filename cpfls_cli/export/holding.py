@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import positive_definite, vertical
@@ -124,7 +124,7 @@ class _Turned(NamedTuple):
 
     rate: Array
     direct: Array
-    exists: Array
+    exists: BoolArray
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class Held:
         return moved, momentum + interval * (wrench[:, :3] - direct)
 
 
-def _kept(good: Array, new: Array, old: Array) -> Array:
+def _kept(good: BoolArray, new: Array, old: Array) -> Array:
     return np.where(good.reshape(-1, *[1] * (new.ndim - 1)), new, old)
 
 

@@ -73,9 +73,9 @@ HOW_TO_EVALUATE_INERTIA = (
 
 HOW_TO_EVALUATE = (
     "wrench gives torque in N m and force in N, x y z, of air, rate and rotor: its lines in their order, then its six "
-    "components, in arithmetic of Python with sqrt, exp, sin, cos, atan2, floor and abs, indices from 0. Names are those "
-    "of numbers, and learned are the coefficients of the learned part; rotor are the terms of the rotors, in the order of "
-    "terms_of_rotors. A line that begins with # names the part that the next ones are of.",
+    "components, in arithmetic of Python with sqrt, exp, sin, cos, atan2, floor and abs, indices from 0. Names are "
+    "those of numbers, and learned are the coefficients of the learned part; rotor are the terms of the rotors, in the "
+    "order of terms_of_rotors. A line that begins with # names the part that the next ones are of.",
     "Terms of the rotors over the step from sample k to k + 1 of length h: 1; mean w of the speed that acts; w^2; its "
     "change over the step / h; z - w^2. The logged speed, late by delay_s with straight lines between samples, is x; "
     "before the first sample it is the first. lag_s > 0: tau w' + w = x, exactly, for x a straight line between "
@@ -138,17 +138,9 @@ def _wrench(sheet: Sheet) -> dict[str, Any]:
     """Give the numbers of what acts, their units, and what it makes of them."""
     traced, learned = traced_wrench(sheet.model), sheet.model.remainder
     lines, components = traced.written(PYTHON)
-    inertia = dict(zip(INERTIA_PARAMETERS, sheet.rigid_body.tolist(), strict=True))
-    own = {name: value for name, value in (inertia | sheet.numbers).items() if name in traced.used}
     units = units_of(sheet.model)
     return {
-        "numbers": {
-            **{
-                name: {"value": value, "unit": units.get(name, "kg m^2")}
-                for name, value in own.items()
-                if "[" not in name
-            },
-        },
+        "numbers": {name: {"value": value, "unit": units[name]} for name, value in sheet.needed(traced).items()},
         "learned": None
         if learned is None
         else {

@@ -1,4 +1,4 @@
-"""What acts on a vehicle as weights of terms: each of the motion times each of the rotors, which simulators are made of.
+"""What acts on a vehicle as weights of terms, each of the motion times one of the rotors: what simulators are made of.
 
 Polynomials are numbers that the vehicle is evaluated with (`cpfls_cli.vehicle.values`).
 """
@@ -6,7 +6,7 @@ Polynomials are numbers that the vehicle is evaluated with (`cpfls_cli.vehicle.v
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import combinations_with_replacement, product
 from typing import Any
@@ -110,7 +110,7 @@ def _size(x: Value) -> Value:
     return Polynomial({(f"|{factors[0]}|",): abs(value)})
 
 
-def _none(*given: Value) -> Value:
+def _none(*_given: Value) -> Value:
     raise NoPolynomialError
 
 
@@ -144,7 +144,7 @@ def weights_of(acting: Iterable[Acting], vehicle: VehicleSettings) -> dict[str, 
     return {name: _weighed(wrench, count) for name, wrench in parts_of(known, vehicle, motion, _FUNCTIONS)}
 
 
-def _is_polynomial(one: Acting, vehicle: VehicleSettings, motion: tuple[Vector, ...]) -> bool:
+def _is_polynomial(one: Acting, vehicle: VehicleSettings, motion: Sequence[Value]) -> bool:
     try:
         for _, wrench in parts_of([one], vehicle, motion, _FUNCTIONS):
             _weighed(wrench, len(vehicle.rotors))

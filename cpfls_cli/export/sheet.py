@@ -14,10 +14,10 @@ from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.export.acting import numbers_of
+from cpfls_cli.export.acting import Traced, numbers_of
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
 from cpfls_cli.version import __version__
@@ -136,6 +136,13 @@ class Sheet:
     def numbers(self) -> dict[str, float]:
         """Numbers of all that acts that are not 0, by name."""
         return {name: value for name, value in numbers_of(self.model).items() if value}
+
+    def needed(self, traced: Traced) -> dict[str, float]:
+        """Give the numbers that torque and force need, by name, but for the learned part."""
+        used, vehicle = traced.used, self.model.vehicle
+        known = {"mass": vehicle.mass_kg, "gravity": vehicle.gravity_m_s2}
+        known |= dict(zip(INERTIA_PARAMETERS, self.rigid_body.tolist(), strict=True)) | self.numbers
+        return {name: value for name, value in known.items() if name in used and "[" not in name}
 
     @property
     def rotor_terms(self) -> list[str]:

@@ -42,8 +42,6 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     points, runs, attitudes = sheet.references
     traced, units, learned = traced_wrench(sheet.model), units_of(sheet.model), _learned(sheet.model)
     lines, wrench = traced.written(C)
-    inertia = dict(zip(INERTIA_PARAMETERS, sheet.rigid_body.tolist(), strict=True))
-    numbers = {name: value for name, value in (inertia | sheet.numbers).items() if name in traced.used}
     words = {
         **_common_words(sheet, told),
         "source": comment_text(f"{stem}.c"),
@@ -51,9 +49,7 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
         "verdict_text": literal_text(sheet.verdict or "none"),
         "history": int(sheet.model.response.delay_s / _FASTEST_PERIOD * (1 + 1e-9)) + 2,
         "rigid_rows": [c_row(row) for row in symmetric(sheet.rigid_body)],
-        "numbers": [
-            (name, number(value), units.get(name, "kg m^2")) for name, value in numbers.items() if "[" not in name
-        ],
+        "numbers": [(name, number(value), units[name]) for name, value in sheet.needed(traced).items()],
         "learned_rows": filled(c_row(learned), 4) if learned else "",
         "learned_count": len(learned),
         "wrench_lines": lines,
@@ -143,7 +139,8 @@ def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], to
     names = [*_KNOWN, *(name for name, _ in _named(sheet, sheet.model))]
     first_learned = len(names) - len(_shares(sheet)) - len(_learned(sheet.model))
     first_rule = len(names)
-    needed = [(name, place) for place, name in enumerate(names) if name in traced.used and "[" not in name]
+    used = traced.used
+    needed = [(name, place) for place, name in enumerate(names) if name in used and "[" not in name]
     words = {
         **_common_words(sheet, told),
         "library": library,

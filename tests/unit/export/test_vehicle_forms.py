@@ -201,7 +201,7 @@ def test_the_self_test_of_c_passes(tmp_path, name, flags):
     ("before", "after"),
     [
         ("slowness = R(0.45)", "slowness = R(0.4500001)"),
-        ("rotor_1_thrust_factor = R(", "rotor_1_thrust_factor = R(1e-15 + "),
+        ("1_thrust_factor = R(", "1_thrust_factor = R(1e-15 + "),
         ("* falling", ""),
     ],
     ids=["slow actuation", "number", "nothing"],
