@@ -29,7 +29,7 @@ from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
 from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
-from cpfls_cli.playback.loop import wrench_during
+from cpfls_cli.playback.loop import during, wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows

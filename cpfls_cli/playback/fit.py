@@ -335,9 +335,14 @@ class _SideBySide:
     @cached_property
     def runs(self) -> Runs:
         motions = [each.motion for each in self.windows]
-        joined = (np.concatenate(parts) for parts in zip(*(each[:4] for each in motions), strict=True))
+        parts = zip(*(each[:4] for each in motions), strict=True)
+        position, velocity, rotation, rate = (np.concatenate(each) for each in parts)
         starts = np.arange(len(self.owner), dtype=np.int64) * (self.windows[0].horizon + 1)
-        return Runs(MeasuredMotion(*joined, motions[0].period), starts, self.windows[0].flight.translates)
+        return Runs(
+            MeasuredMotion(position, velocity, rotation, rate, motions[0].period),
+            starts,
+            self.windows[0].flight.translates,
+        )
 
     @cached_property
     def loss(self) -> Loss:

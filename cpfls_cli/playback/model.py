@@ -38,6 +38,7 @@ from cpfls_cli.playback.table import (
     wrench_of_numbers,
 )
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
+from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.motion import Acting, Acts, Vehicle, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -399,7 +400,7 @@ def _rows(components: Vector, samples: int) -> Array:
 def turning_by_attitude(fuzzy: InertiaModel) -> Turning:
     """Say how bodies turn whose inertia depends on the attitude."""
 
-    def inertia(rotation: Array) -> tuple[Array, Array, Array]:
+    def inertia(rotation: Array) -> tuple[Array, InertiaValues, Array]:
         attitude = rotations.euler_angles(np.nan_to_num(rotation.transpose(2, 0, 1)))
         return attitude, *body_inertia(fuzzy, attitude)
 

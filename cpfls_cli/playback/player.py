@@ -59,8 +59,7 @@ class Player:
             On top of what is known along the flight.
         """
         along = None if self.along is None else self.along[samples]
-        both = [each for each in (along, push) if each is not None]
-        return Steps(self.rotor[samples], sum(both) if both else None)
+        return Steps(self.rotor[samples], push if along is None else along if push is None else along + push)
 
     def wrench(self, flight: PlaybackFlight) -> Array:
         """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""

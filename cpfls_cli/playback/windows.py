@@ -144,7 +144,8 @@ class Rotors(NamedTuple):
     @classmethod
     def of(cls, terms: Array) -> Rotors:
         """Take what drives vehicles from terms of the rotors, shape (time, 1 + 4 rotors)."""
-        return cls(*(each.T for each in _rotor_motion(terms)))
+        speed, acceleration, slow = (each.T for each in _rotor_motion(terms))
+        return cls(speed, acceleration, slow)
 
 
 class Steps(NamedTuple):
@@ -253,8 +254,9 @@ class _Path(NamedTuple):
 
     def of_runs(self, part: slice) -> _Path:
         """Take some of the runs."""
-        *states, stages, diverged = self
-        return _Path(*(each[..., part] for each in states), tuple(each[..., part] for each in stages), diverged[part])
+        position, velocity, rotation, rate = (each[..., part] for each in self[:4])
+        stages = tuple(each[..., part] for each in self.stages)
+        return _Path(position, velocity, rotation, rate, stages, self.diverged[part])
 
 
 def exponential(turn: Array) -> tuple[Array, Array]:
