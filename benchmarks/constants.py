@@ -20,6 +20,7 @@ from scipy.stats import t as student
 from benchmarks.shared.measure import count, program, table
 from benchmarks.shared.playback_scores import SYMBOLS, free_runs, score
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group
@@ -241,8 +242,8 @@ def commands(seeds: int) -> None:
 
 def thrust(model: VehicleModel, speed: Array) -> Array:
     """Compute the thrust of a rotor, N."""
-    upwards = model.parts["rotors"][5, 0]
-    return np.asarray(speed * upwards[1] + speed**2 * upwards[1 + model.rotors])
+    factor = model.vehicle.rotors[0].thrust_factor_n_s2
+    return np.asarray(factor * (speed**2 + model.thrust_linear * hover_speed(model.vehicle) * speed))
 
 
 def rotorpy(seeds: int) -> None:

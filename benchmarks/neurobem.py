@@ -75,7 +75,7 @@ def wrench_of(model: VehicleModel, flight: PlaybackFlight) -> Array:
     rotor = model.response.terms_by_step(flight.speed, motion.period, flight.hold)
     # Terms are means over the step that begins at a sample; the mean with the step before lies at the sample.
     centred = 0.5 * (rotor + np.concatenate([rotor[:1], rotor[:-1]]))
-    torque, force = np.split(model.table.wrench(velocity, motion.rate, centred), 2, axis=1)
+    torque, force = np.split(model.wrench(velocity, motion.rate, centred), 2, axis=1)
     acceleration = (torque - np.cross(motion.rate, motion.rate @ body.inertia)) @ body.inverse
     stated = inertia * acceleration + np.cross(motion.rate, inertia * motion.rate)
     return np.hstack([stated, MASS / body.mass * force])

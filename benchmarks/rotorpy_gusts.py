@@ -21,9 +21,9 @@ from benchmarks.shared.gusty_sets import KINDS, MOMENTS, PATHS, REPEATED, RUNS, 
 from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.loop import loop_bounds
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gusty_flights import SMALL, Flight, path_of
 from tests.builders.gusty_flights import STEP_S as PATH_STEP_S

@@ -13,7 +13,6 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback import player
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer
-from cpfls_cli.playback.kernels import errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 
 HORIZON = 50
@@ -73,12 +72,7 @@ def by_run(runs: Sequence[Runs], first: int) -> Score:
 def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
     """Play a model back, without correction, from every n-th sample of a flight from which the horizon fits."""
     starts = flight.starts(horizon, every)
-    rotor = np.zeros((len(flight), 1 + 4 * model.rotors))
-    for part in flight.stretches:
-        rotor[part] = model.response.terms_by_step(flight.speed[part], flight.motion.period, flight.hold)
-    terms, weights = model.table.by_step(rotor)
-    errors = np.empty((len(starts), horizon, 4, 3))
-    diverged = errors_of_runs(flight.motion, model.body, terms, weights, starts, flight.translates, errors)
+    errors, diverged = player.free_runs(player.player_of(model, flight), flight, starts, horizon)
     return Runs(errors, int(np.sum(diverged >= 0)))
 
 

@@ -1,4 +1,4 @@
-"""The model of a whole vehicle: rotors, inertia, effects and a learned remainder, as one table of weights."""
+"""The model of a whole vehicle: rotors, inertia, effects and a learned remainder, once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
@@ -27,14 +26,8 @@ from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import (
     Remainder,
-    WrenchTable,
-    airflow_of,
-    airflow_terms,
     learned_wrench,
     lever_weights,
-    remainder_weights,
-    rotor_weights,
-    with_slow,
     wrench_of_numbers,
 )
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
@@ -100,13 +93,6 @@ class ModelEffect(NamedTuple):
         assert columns is not None, "what only an audit sees is in no model"
         return columns(signals, self.shape).at_samples(self.linear, signals.time)
 
-    def weights(self, probe: Probe) -> Array | None:
-        """Weigh the terms, shape (6, 34, 1 + 4 rotors); None for what is no polynomial of motion and rotor speeds."""
-        known = self.effect
-        # A body with a state of its own: the random motions of the probe, a second apart, may make it diverge.
-        found = None if self.is_filter or known.carried is not None else polynomial(known, probe, self.shape)
-        return None if found is None else np.tensordot(self.linear, with_slow(found, probe), axes=1)
-
     @property
     def is_simulated(self) -> bool:
         """Whether it follows from what free runs know: air velocity, body rate and rotors."""
@@ -158,32 +144,6 @@ class VehicleModel:
     def rotors(self) -> int:
         """Number of rotors."""
         return len(self.vehicle.rotors)
-
-    @cached_property
-    def table(self) -> WrenchTable:
-        """Torque and force of all parts that are sums of weights."""
-        return WrenchTable(np.asarray(sum(self.parts.values())), self.remainder)
-
-    @cached_property
-    def parts(self) -> Mapping[str, Array]:
-        """Weights of each part alone: rotors, effects by name, remainder; shapes as those of the table."""
-        learned = airflow_terms(airflow_of(self.remainder))
-        parts = {"rotors": np.zeros((6, len(STATE_TERMS) + learned, 1 + 4 * self.rotors))}
-        parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
-        for name, weights in self._polynomials.items():
-            parts[name] = np.concatenate([weights, np.zeros((6, learned, weights.shape[2]))], axis=1)
-        if self.remainder is not None:
-            parts["remainder"] = remainder_weights(self.remainder, self.rotors)
-        levers = [known for known in self.effects if known.is_lever]
-        forces = sum(parts.values()) if levers else np.zeros(6)
-        return parts | {known.name: lever_weights(known.coefficients, np.asarray(forces)) for known in levers}
-
-    @cached_property
-    def _polynomials(self) -> dict[str, Array]:
-        """Weights of the effects that are polynomials, by name."""
-        probe = Probe.of(self.vehicle) if self.effects else None
-        found = {one.name: one.weights(probe) for one in self.effects if probe is not None and not one.is_lever}
-        return {name: weights for name, weights in found.items() if weights is not None}
 
     @property
     def along(self) -> tuple[ModelEffect, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from math import pi
 from typing import Any, NamedTuple
@@ -12,12 +12,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.fuzzy.basis import Consequents
-from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
@@ -127,60 +125,6 @@ def _blended(by_rule: Sequence[Value], breakpoints: Sequence[float], turn: Value
     return total
 
 
-@dataclass(frozen=True)
-class WrenchTable:
-    """Torque and force on a body, without weight, as a sum of weights of terms.
-
-    Attributes
-    ----------
-    weights : array, shape (6, terms, 1 + 4 rotors)
-        Torque (3) and force (3) by term of the motion and term of the rotors.
-    remainder : Remainder or None
-        Whose terms of the motion stand behind the others.
-    """
-
-    weights: Array
-    remainder: Remainder | None = None
-
-    @property
-    def airflow(self) -> Airflow:
-        """Terms of the remainder, for the compiled loops."""
-        return airflow_of(self.remainder)
-
-    @property
-    def feels_air(self) -> bool:
-        """Whether torque or force depend on the velocity through the air."""
-        of_velocity = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
-        return bool(np.any(self.weights[:, of_velocity]) or np.any(self.weights[:, len(STATE_TERMS) :]))
-
-    def terms(self, velocity: Array, rate: Array) -> Array:
-        """Evaluate the terms of the motion, shape (time, terms), of velocity through the air and rate, body frame."""
-        return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
-
-    def wrench(self, velocity: Array, rate: Array, rotor: Array) -> Array:
-        """Compute torque and force.
-
-        Parameters
-        ----------
-        velocity : array, shape (time, 3), m/s, body frame
-            Through the air.
-        rate : array, shape (time, 3), rad/s, body frame
-        rotor : array, shape (time, 1 + 4 rotors)
-            See `RotorResponse.terms_by_step`.
-
-        Returns
-        -------
-        array, shape (time, 6), N m and N, body frame
-        """
-        return wrench_of(self.weights, self.terms(velocity, rate), rotor)
-
-
-def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
-    """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
-    # Of all three at once NumPy takes the products one by one, eight times as long over a flight of minutes.
-    return np.stack([np.einsum("tu,tu->t", terms @ own, rotor) for own in weights], axis=1)
-
-
 def airflow_of(remainder: Remainder | None) -> Airflow:
     """Describe the terms of a remainder to the compiled loops."""
     if remainder is None:
@@ -269,20 +213,3 @@ def remainder_weights(remainder: Remainder, rotors: int) -> Array:
         table[row, at, 1 : 1 + rotors] = by_column[:, :1] / rotors
         table[row, at + 1, 0] = by_column[:, 1]
     return table
-
-
-def remainder_terms(remainder: Remainder | None, velocity: Array) -> Array:
-    """Evaluate the terms of a remainder, shape (time, terms).
-
-    Parameters
-    ----------
-    velocity : array, shape (time, 3), m/s, body frame
-    """
-    if remainder is None:
-        return np.zeros((len(velocity), 0))
-    order = remainder.harmonic_order
-    consequents: Consequents = "harmonic" if order else "seesaw"
-    structure = PeriodicStructure((remainder.breakpoints,), consequents, order, "additive")
-    columns = structure.columns(np.arctan2(velocity[:, 1], velocity[:, 0])[:, None])
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])[:, None]
-    return np.stack([columns * speed, columns * speed**2], axis=2).reshape(len(velocity), -1)

@@ -26,20 +26,7 @@ def regressor():
     samples.products(uniform_breakpoints(structure))
 
 
-def playback():
-    """Run a vehicle for one step."""
-    from cpfls_cli.playback.kernels import errors_of_runs
-    from cpfls_cli.playback.motion import MeasuredMotion
-    from cpfls_cli.playback.model import VehicleModel
-    from cpfls_cli.vehicle.settings import VehicleSettings
-
-    model, still = VehicleModel(vehicle=VehicleSettings()), np.zeros((2, 3))
-    used, weights = model.table.by_step(np.ones((2, 1 + 4 * model.rotors)))
-    motion = MeasuredMotion(still, still, np.tile(np.eye(3), (2, 1, 1)), still, 0.01)
-    errors_of_runs(motion, model.body, used, weights, np.zeros(1, np.int64), True, np.zeros((1, 1, 4, 3)))
-
-
-LOOPS = {"regressor": regressor, "playback": playback}
+LOOPS = {"regressor": regressor}
 
 
 def missing():

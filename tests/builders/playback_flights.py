@@ -11,13 +11,12 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.config.unknown import with_guesses
-from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import Remainder, remainder_terms
+from cpfls_cli.playback.table import Remainder
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
@@ -231,14 +230,7 @@ class _Fleet:
         self.marks = np.unique(np.append(even, np.round(model.response.delay_s / period % 1.0, 9)))
         self.ends = np.cumsum([3, 3, 4, 3, self.rotors])
         self.weight = np.array([0.0, 0.0, model.vehicle.gravity_m_s2])
-        self.used = np.flatnonzero(np.any(model.table.weights, axis=(0, 2)))
-        self.weights = model.table.weights[:, self.used].reshape(-1, model.table.weights.shape[2]).T
         self.ones, self.still = np.ones((self.flights, 1)), np.zeros((self.flights, self.rotors))
-        # Among 1, air velocity and rate; what is no product of two of them is left to the package.
-        pairs = np.vstack([[(0, 0)], [(axis, 0) for axis in range(1, 7)], FACTORS + 1])
-        self.named = self.used[self.used < len(STATE_TERMS)]
-        self.learned = self.used[len(self.named) :] - len(STATE_TERMS)
-        self.factors = pairs[self.named].T if self.named.max() < len(pairs) else None
 
     def flown(self, samples):
         """Give states and logged rotor speeds at all samples, time first."""
@@ -300,8 +292,7 @@ class _Fleet:
         rotor = np.concatenate([self.ones, acting, squared, change, slow - squared], axis=1)
         rotation = _rotation(quaternion)
         air = (velocity[:, None] @ rotation)[:, 0]
-        by_rotor = (rotor @ self.weights).reshape(self.flights, 6, -1)
-        wrench = (by_rotor @ self.terms(air, rate)[:, :, None])[:, :, 0]
+        wrench = self.model.wrench(air, rate, rotor)
         angular = (wrench[:, :3] - _cross(rate, rate @ body.inertia)) @ body.inverse
         acceleration = (rotation @ wrench[:, 3:, None])[:, :, 0] / body.mass - self.weight
         parts = [
@@ -313,17 +304,6 @@ class _Fleet:
             (squared - slow) / response.slow_s,
         ]
         return np.concatenate(parts, axis=1)
-
-    def terms(self, air, rate):
-        """Evaluate the terms of the motion that the model has."""
-        if self.factors is None:
-            terms = state_terms(air, rate)[:, self.named]
-        else:
-            motion = np.concatenate([self.ones, air, rate], axis=1)
-            terms = motion[:, self.factors[0]] * motion[:, self.factors[1]]
-        if not len(self.learned):
-            return terms
-        return np.concatenate([terms, remainder_terms(self.model.remainder, air)[:, self.learned]], axis=1)
 
     def command(self, sample, state):
         """Ask for rotor speeds."""

@@ -146,10 +146,17 @@ def source_of_vehicle(vehicle, label="vehicle.h5"):
     return source_of_result(vehicle, ORIGIN, label, label, "")
 
 
+def wrench_somewhere(model, count=20):
+    """Torque and force of a model at motions and rotor speeds at random."""
+    rng = np.random.default_rng(0)
+    motion = rng.normal(0, 2, (2, count, 3))
+    return model.wrench(*motion, np.hstack([np.ones((count, 1)), rng.uniform(0, 1000, (count, 4 * model.rotors))]))
+
+
 def accelerations(model, state, rotor):
     """``v' = g + R F / m`` and ``omega' = I^-1 (M - omega x I omega)`` of a constant inertia, shape (samples, 6)."""
     body = model.body
     air = np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind)
-    wrench = model.table.wrench(air, state.rate, rotor)
+    wrench = model.wrench(air, state.rate, rotor)
     linear = np.einsum("nij,nj->ni", state.rotation, wrench[:, 3:]) / body.mass - [0.0, 0.0, body.gravity]
     return np.hstack([linear, (wrench[:, :3] - np.cross(state.rate, state.rate @ body.inertia)) @ body.inverse])

@@ -9,7 +9,6 @@ from cpfls_cli.playback.fit import FitWindows, fit
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
-from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.playback.vehicle import find_vehicle
 from tests.builders.playback_flights import (
     KINDS,
@@ -106,7 +105,7 @@ def pushes(model, speed=2.0):
     angle = np.linspace(0, 2 * np.pi, 36)
     velocity = speed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     rotor = model.response.terms_by_step(np.full((len(angle), model.rotors), hover_speed(STATED)), 0.01, "previous")
-    return wrench_of(model.parts["remainder"], model.table.terms(velocity, 0 * velocity), rotor)[:, 3:]
+    return model.wrench_by_part(velocity, 0 * velocity, rotor)["remainder"][:, 3:]
 
 
 def test_the_drag_of_another_simulator_is_found():

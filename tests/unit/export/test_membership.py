@@ -18,9 +18,10 @@ from cpfls_cli.export.acting import wrench_along
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
-from cpfls_cli.playback import kernels as playback
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.table import Remainder, learned_wrench
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor
@@ -148,17 +149,16 @@ def test_the_learned_part_of_a_vehicle_that_is_simulated(airflow):
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
 
 
-def test_the_compiled_loops_of_playback(airflow):
+def test_the_free_runs_of_playback(airflow):
     """One step from rest changes the rate by the torque at its middle, where the airflow is that of the start."""
     model, samples = airflow.model, len(airflow.air)
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(samples, axis=0)
-    used, weights = model.table.by_step(rotor)
     still, level = np.zeros((samples + 1, 3)), np.eye(3)[None].repeat(samples + 1, axis=0)
     velocity = np.vstack([airflow.air, airflow.air[:1]])
-    errors, period = np.zeros((samples, 1, 4, 3)), 1e-7
-    body = model.body._replace(gravity=0.0)
-    motion = playback.MeasuredMotion(still, velocity, level, still, period)
-    playback.errors_of_runs(motion, body, used, weights, np.arange(samples), True, errors)
+    period = 1e-7
+    flown = replace(model.flown, body=model.body._replace(gravity=0.0))
+    runs = Runs(MeasuredMotion(still, velocity, level, still, period), np.arange(samples), translates=True)
+    errors, _ = errors_of_runs(flown, runs, Steps(rotor[None]))
     torque = errors[:, 0, 3, 0] / period * model.body.inertia[0, 0]
     # Rolling for half a step turns the airflow, by next to nothing.
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-7)

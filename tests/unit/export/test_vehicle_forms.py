@@ -12,12 +12,11 @@ from cpfls_cli.export.acting import parts_along, wrench_along
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import part_sizes, reference_points, reference_run
 from cpfls_cli.export.source import c_source
-from cpfls_cli.playback.kernels import errors_of_runs
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.motion import MeasuredMotion, State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders.compiled_c import build, require_gcc, written
 from tests.builders.exported_models import CASES, model_of
@@ -168,22 +167,21 @@ def test_acting_rotors_are_those_of_the_library(response, tmp_path):
 
 @pytest.mark.parametrize("form", ["c", "jax"])
 @pytest.mark.parametrize("name", ["harmonic", "seesaw, six rotors"])
-def test_steps_along_a_flight_are_those_of_the_compiled_loops(exports, name, form):
-    """Each sample of a flight is taken one step further; what the loops of the library predict lies there."""
+def test_steps_along_a_flight_are_those_of_playback(exports, name, form):
+    """Each sample of a flight is taken one step further; what the library predicts lies there."""
     model = MODELS[name]
     run = reference_run(model, np.random.default_rng(8), "linear", 200)
     exported, rotor = exports(name, form), exports(name, form).rotor_terms(run.speed, PERIOD, "linear")
     path = run.states
     _, moved = exported.motion(State(*(part[:-1] for part in path)), rotor[:-1], PERIOD)
-    used, weights = model.table.by_step(model.response.terms_by_step(run.speed, PERIOD, "linear"))
+    terms = model.response.terms_by_step(run.speed, PERIOD, "linear")
     size = max(np.abs(part).max() for part in path)
     for sample in range(len(moved)):
         position, velocity, rotation, rate = np.split(moved[sample], [3, 6, 15])
         after = (position, velocity, rotation.reshape(3, 3), rate)
         pair = [np.stack([part[sample], own]) for part, own in zip(path, after, strict=True)]
-        errors = np.zeros((1, 1, 4, 3))
-        one = np.ascontiguousarray(weights[sample : sample + 1])
-        errors_of_runs(MeasuredMotion(*pair, PERIOD), model.body, used, one, np.zeros(1, np.int64), True, errors)
+        step = Runs(MeasuredMotion(*pair, PERIOD), np.zeros(1, np.int64), translates=True)
+        errors, _ = errors_of_runs(model.flown, step, Steps(terms[sample][None, None]))
         assert np.abs(errors).max() < ALLOWED * size
 
 

@@ -91,14 +91,14 @@ def test_wrong_numbers_of_the_vehicle_are_in_inertia_and_thrust():
     signals = signals_of(flown())
     flight, player = made_ready(whole(inertia_x=0.2, coupling_y=0.3, thrust_scale=0.1), logged(signals))
     np.testing.assert_allclose(player.body.inertia, np.diag([0.72, 0.6, 1.2]))
-    used, weights = player.step_weights(slice(0, 5))
-    plain, stated = player_of(VehicleModel(vehicle=VEHICLE), flight).step_weights(slice(0, 5))
-    assert plain.active.tolist() == [0]
-    np.testing.assert_allclose(weights[:, :3, 0], stated[:, :3, 0])
-    np.testing.assert_allclose(weights[:, 5, 0], 1.1 * stated[:, 5, 0])
+    turning = replace(flight, motion=flight.motion._replace(rate=np.tile([0.5, 0.0, 2.0], (len(flight), 1))))
+    still = replace(flight, motion=flight.motion._replace(rate=np.zeros((len(flight), 3))))
+    stated = player_of(VehicleModel(vehicle=VEHICLE), flight).wrench(still)
+    np.testing.assert_allclose(player.wrench(still)[:, :3], stated[:, :3])
+    np.testing.assert_allclose(player.wrench(still)[:, 5], 1.1 * stated[:, 5])
     # Of the catalogue: -g_y (I_x + I_z) / 2 times the other two rates.
-    (coupled,) = [index for index, term in enumerate(used.active) if term and weights[0, 1, index]]
-    assert weights[0, 1, coupled] == pytest.approx(-0.3 * 0.9)
+    coupled = player.wrench(turning) - player.wrench(still)
+    np.testing.assert_allclose(coupled, np.tile([0, -0.3 * 0.9 * 0.5 * 2.0, 0, 0, 0, 0], (len(flight), 1)), atol=1e-12)
 
 
 def test_a_lag_leaves_measured_speeds_as_they_are():
@@ -115,8 +115,8 @@ def test_what_the_flight_lacks_is_named():
     with pytest.raises(InputError, match="flight: lacks height, which the model's effect ground_effect needs"):
         made_ready(ground, logged(blind))
     # Air that nobody measured is taken as still, which `replay` says.
-    _, player = made_ready(model_of({"rotor_drag": [3e-4]}), logged(blind))
-    assert player.table.feels_air
+    made_ready(model_of({"rotor_drag": [3e-4]}), logged(blind))
+    assert model_of({"rotor_drag": [3e-4]}).feels_air
 
 
 def test_stretches_are_played_apart():

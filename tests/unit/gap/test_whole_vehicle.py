@@ -151,7 +151,7 @@ def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_ine
     flown, extended = recording.signals, with_effects(model)
     assert (flown.vehicle, extended.base) == (model.vehicle, None)
     rotor = model.response.terms_at_samples(flown.rotor_speed, flown.period, "linear")
-    wanted = model.table.wrench(flown.air_velocity, flown.body_rate, rotor)
+    wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
     (beyond,) = extended.chosen
     found = flown.wrench + columns_of(beyond, flown).direct[:, :, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())

@@ -1,12 +1,11 @@
 """What a model lacks: shares of its parts and a rest, found in power of what is left, piece by piece."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from cpfls_cli.estimation.whittle import GaussMarkov
 from cpfls_cli.playback.lack import Lack, lack_of
+from cpfls_cli.playback.model import acting_of
 from tests.builders.playback_flights import truth
 
 PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
@@ -65,7 +64,12 @@ def test_a_model_whose_parts_give_nothing_has_a_rest_alone(rest):
 def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     model, nothing = truth(), [np.nan] * 3
     share = np.array([[0.3, 0.1, 0.2], [0.0, 2.0, 0.4], [0.1, 0.0, 0.0], *[nothing] * 3])
-    lack = Lack(tuple(model.parts)[:3], share, np.array([0.01, 0.02, 0.0, *nothing]), np.array([0.5, 0.1, 2, *nothing]))
+    lack = Lack(
+        tuple(one.name for one in acting_of(model))[:3],
+        share,
+        np.array([0.01, 0.02, 0.0, *nothing]),
+        np.array([0.5, 0.1, 2, *nothing]),
+    )
     drawn = lack.drawn(model, np.random.default_rng(1), 0.01, 4000)
     assert drawn.unit[:, :2].std(axis=0) == pytest.approx(1.0, abs=0.15)
     assert np.corrcoef(drawn.unit[:-1, 1], drawn.unit[1:, 1])[0, 1] == pytest.approx(np.exp(-0.1), abs=0.03)
@@ -74,10 +78,8 @@ def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     alike = np.full(4, np.sqrt((speed**2).mean()))
     terms = np.concatenate([[1.0], alike, alike**2, np.zeros(8)])
     still = np.zeros((1, 3))
-    parts = [
-        replace(model.table, weights=model.parts[name]).wrench(velocity[None], still, terms[None])[0]
-        for name in lack.part
-    ]
+    by_part = model.wrench_by_part(velocity[None], still, terms[None])
+    parts = [by_part[name][0] for name in lack.part]
     size = np.sqrt(
         lack.rest[:3] ** 2 + sum((own * part[:3]) ** 2 for own, part in zip(share[:3].T, parts, strict=True))
     )

@@ -1,14 +1,13 @@
-"""Accelerations and steps of a vehicle model are those of the compiled loops."""
+"""Steps of a vehicle model, and its accelerations."""
 
 import numpy as np
 import pytest
 
 from cpfls_cli.effects import scales
-from cpfls_cli.playback.kernels import errors_of_runs
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.motion import MeasuredMotion, State
 from cpfls_cli.playback.player import one_step
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import rotor_demand
 from tests.builders.vehicle_models import HEXA, QUAD, accelerations, whole
@@ -33,17 +32,16 @@ def states(count, seed=1):
     return State(rng.normal(0, 3, (count, 3)), rng.normal(0, 3, (count, 3)), rotation, rng.normal(0, 3, (count, 3)))
 
 
-def test_a_step_is_that_of_the_compiled_loops(model):
+def test_a_run_is_one_step_after_another(model):
     """A run over a flight is held against the steps themselves: what is left is rounding."""
     rotor = model.response.terms_by_step(speeds(model, 12), PERIOD, "linear")
     path = [State(*(part[:1] for part in states(1)))]
     for row in rotor[:-1]:
         path.append(one_step(model, path[-1], row[None], PERIOD))
     motion = MeasuredMotion(*(np.concatenate(parts) for parts in zip(*path, strict=True)), PERIOD)
-    used, weights = model.table.by_step(rotor)
-    errors = np.zeros((1, len(path) - 1, 4, 3))
-    starts = np.zeros(1, dtype=np.int64)
-    assert errors_of_runs(motion, model.body, used, weights, starts, True, errors).tolist() == [-1]
+    runs = Runs(motion, np.zeros(1, dtype=np.int64), translates=True)
+    errors, diverged = errors_of_runs(model.flown, runs, Steps(rotor[:-1, None]))
+    assert diverged.tolist() == [-1]
     assert np.abs(errors).max() < 1e-12
 
 

@@ -6,22 +6,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback import vehicle
-from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.fit import (
-    FitWindows,
-    fit,
-    loss_of,
-    rate_stays,
-    uncertainty,
-    window_errors,
-    window_loss,
-    window_sums,
-)
+from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, window_errors
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import errors_of_runs
-from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
+from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.table import Airflow
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
@@ -48,23 +39,22 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules)
     free = numbers(STATED, blocks_of(STATED), rules)
     values, scale = somewhere(free), free.scales
     starts = flight.starts(20, 40)
-    windows = FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20)))
-    group = np.zeros(len(starts), dtype=np.int64)
-    gradient = window_sums(Evaluated.of(free.base, values), windows, group)[1][0] * scale
+    windows = WindowSet((FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20))),))
+    (((gradient,), _),) = windows.derivatives(free, values, [np.zeros(len(starts), dtype=np.int64)])
+    gradient = gradient * scale
     step = 1e-5
     for place, number in enumerate(free.numbers):
         moved = step * scale[place] * np.eye(len(values))[place]
-        ahead, behind = (window_loss(Evaluated.of(free.base, v), windows) for v in (values + moved, values - moved))
+        ahead, behind = (windows.losses(free, v)[0] for v in (values + moved, values - moved))
         assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
 
 
 def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
     free = numbers(STATED, ("inertia", "linear_damping"), RULES["one rule"])
     windows = FitWindows.of(flight, 20, 30)
-    evaluated = Evaluated.of(free.base, free.starts)
-    total, by_group, _ = window_sums(evaluated, windows, np.arange(len(windows.starts), dtype=np.int64))
+    ((by_group, _),) = WindowSet((windows,)).derivatives(free, free.starts, [np.arange(len(windows.starts))])
     fitted = fit(free, [windows], {}, 0, 1e-3)
-    assert window_errors(fitted, windows).sum() == pytest.approx(total, rel=1e-12)
+    assert window_errors(fitted, [windows])[0].mean() == pytest.approx(fitted.loss, rel=1e-12)
     assert len(by_group) == len(windows.starts)
 
 
@@ -72,14 +62,11 @@ def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
 def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
     free = numbers(STATED, blocks_of(STATED), rules)
     values = somewhere(free, seed=1)
-    model, evaluated, starts = free.at(values).model, Evaluated.of(free.base, values), flight.starts(30, 50)
-    rotor = model.response.terms_by_step(flight.speed, flight.motion.period, flight.hold)
-    used, weights = model.table.by_step(rotor)
-    runs, expected = (np.empty((len(starts), 30, 4, 3)) for _ in range(2))
-    errors_of_runs(flight.motion, model.body, used, weights, starts, True, runs)
-    terms = evaluated.rotor_terms(flight, np.arange(len(flight)))
-    used = evaluated.flown
-    errors_of_runs(flight.motion, evaluated.body, used, evaluated.weights(terms, used), starts, True, expected)
+    starts = flight.starts(30, 50)
+    at, runs = free.at(values), Runs(flight.motion, starts, translates=True)
+    steps = Steps(at.rotor_terms(flight, starts + np.arange(30)[:, None]))
+    expected, _ = errors_of_runs(at.flown, runs, steps)
+    runs = free_runs(player_of(at.model, flight), flight, starts, 30).errors
     assert runs == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
 
 

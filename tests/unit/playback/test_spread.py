@@ -8,13 +8,14 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
-from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, Estimates, drawn, model_at
+from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass
+from tests.builders.vehicle_models import wrench_somewhere
 
 COUNT = 400
 
@@ -72,7 +73,8 @@ def test_the_model_of_a_fit_is_made_again_from_what_people_know_of_its_numbers()
         for name, each in first.physical.items()
     ]
     made = model_at(first.model, numbers, np.array([each.value for each in second.physical.values()]))
-    assert np.abs(made.table.weights - second.model.table.weights).max() < 1e-12 * np.abs(made.table.weights).max()
+    given, wanted = wrench_somewhere(made), wrench_somewhere(second.model)
+    assert np.abs(given - wanted).max() < 1e-12 * np.abs(wanted).max()
     assert np.allclose(made.body.inertia, second.model.body.inertia, rtol=1e-12)
     assert made.response == second.model.response
     positive = {name for name, each in first.physical.items() if each.positive}
