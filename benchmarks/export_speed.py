@@ -57,7 +57,11 @@ void wrench(const m_real *in, long n, m_real *sink) {
 }
 void step(const m_real *in, long n, m_real *sink) {
     m_state s;
-    for (long i = 0; i < n; ++i, in += COLUMNS) { memcpy(&s, in + 6, sizeof s); m_step(&s, in + 24, 0.01); *sink += s.rate[0]; }
+    for (long i = 0; i < n; ++i, in += COLUMNS) {
+        memcpy(&s, in + 6, sizeof s);
+        m_step(&s, in + 24, 0.01);
+        *sink += s.rate[0];
+    }
 }
 """
 VEHICLES = {
