@@ -81,7 +81,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     given = instruments(flights)
     constants = find_constants(vehicle, flights, given, PlaybackSettings().leave_out)
     assert constants is not None
-    assert constants.tells, "instruments tell the body of these flights"
+    assert constants.identified, "instruments identify the body of these flights"
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
@@ -377,7 +377,7 @@ def law_of(model: VehicleModel, given: Instruments) -> Law:
     """
     before, after = [], []
     for number, run in enumerate(given.flown):
-        for other, place in given.repeats.beside[number].items():
+        for other, place in given.repeats.places[number].items():
             known = np.isfinite(place)
             there = known[1:] & known[:-1]
             rows = np.hstack([answers(model, run.speed), states(run)]) - given.repeats.at(

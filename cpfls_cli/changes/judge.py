@@ -323,7 +323,6 @@ class _Space:
         precise, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
 
         def over_kinds(each: Sequence[Array]) -> Array:
-            """Add up what each kind shows, by its precision at the nodes."""
             return np.asarray((precise @ np.reshape(each, (len(each), -1))).reshape(len(precise), *each[0].shape))
 
         moves = [directions[own] for own in kinds]

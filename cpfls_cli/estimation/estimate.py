@@ -83,6 +83,12 @@ class Prior(NamedTuple):
         """Know nothing."""
         return cls(np.zeros(numbers), np.full(numbers, np.inf))
 
+    @classmethod
+    def about_zero(cls, precision: Array) -> Prior:
+        """Expect numbers near 0, by their inverse variances."""
+        with np.errstate(divide="ignore"):
+            return cls(np.zeros(len(precision)), precision**-0.5)
+
     @property
     def precision(self) -> Array:
         """Inverse variance, shape (number,)."""
@@ -168,7 +174,7 @@ def solve(
         if leave_out is not None:
             information = information - normal.information[leave_out]
             score = score - normal.score[leave_out]
-        step = np.linalg.solve(information + np.diag(prior.precision + _RIDGE), score + prior.pull(values))
+        step = np.linalg.solve(_invertible(information + np.diag(prior.precision)), score + prior.pull(values))
         # One that turns back has gone too far.
         share = max(share / 2, _LEAST_SHARE) if step @ before < 0 else min(1.5 * share, 1.0)
         before, moved = step, values + step * min(share, _FARTHEST / max(float(np.abs(step).max()), _TINY))
@@ -195,7 +201,7 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         [solve(equations, values, prior, bounds, block, _STEPS_LEFT_OUT).values for block in range(len(normal.score))]
     )
     total = normal.information.sum(axis=0)
-    inverse = np.linalg.inv(total + np.diag(prior.precision + _RIDGE))
+    inverse = np.asarray(np.linalg.inv(_invertible(total + np.diag(prior.precision))), dtype=float)
     held = inverse @ np.diag(prior.precision) @ inverse.T
     return Fit(
         values=values,
@@ -208,11 +214,22 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
     )
 
 
-def without_each(normal: Normal, prior: Prior, values: Array) -> Array:
-    """Give the numbers without each block by one step from the values of all, shape (block, number)."""
-    information = normal.information.sum(axis=0) - normal.information + np.diag(prior.precision + _RIDGE)
-    score = normal.score.sum(axis=0) - normal.score + prior.pull(values)
-    return np.asarray(values + np.linalg.solve(information, score[..., None])[..., 0])
+def one_step(normal: Normal, prior: Prior, values: Array) -> tuple[Array, Array]:
+    """Step once from values, which solves linear equations: of all blocks, and without each, (block, number)."""
+
+    def kept(each: Array) -> Array:
+        return np.asarray(each.sum(axis=0) - np.concatenate([np.zeros_like(each[:1]), each]))
+
+    information = kept(normal.information) + np.diag(prior.precision)
+    score = kept(normal.score) + prior.pull(values)
+    moved = values + np.linalg.solve(_invertible(information), score[..., None])[..., 0]
+    return moved[0], moved[1:]
+
+
+def _invertible(information: Array) -> Array:
+    """Add a little information, so that nothing is divided by 0, in any units."""
+    own = np.diagonal(information, axis1=-2, axis2=-1)
+    return information + _RIDGE * np.where(own == 0, 1.0, own)[..., None] * np.eye(information.shape[-1])
 
 
 def conditional_strength(normal: Normal, prior: Prior) -> Array:
@@ -226,7 +243,7 @@ def conditional_strength(normal: Normal, prior: Prior) -> Array:
     ----------
     Sanderson and Windmeijer 2016; Stock and Yogo 2005 (below 10 the estimate falls back to least squares).
     """
-    inverse = np.linalg.inv(normal.information.sum(axis=0) + np.diag(prior.precision + _RIDGE))
+    inverse = np.linalg.inv(_invertible(normal.information.sum(axis=0) + np.diag(prior.precision)))
     alone = np.where(np.diag(inverse) == 0, _TINY, np.diag(inverse))
     # Columns: the rest of each number when the others have moved with it.
     cleared = inverse / alone

@@ -14,10 +14,8 @@ from cpfls_cli.blocks import contiguous
 
 FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
-_RIDGE = 1e-6
-"""So that instruments that hardly differ from each other do no harm."""
-OF_MANY = 1e-3
-"""The same for many instruments that go together, in flights that differ."""
+RIDGE, OF_MANY = 1e-6, 1e-3
+"""So that instruments that hardly differ do no harm; of many that go together, in flights that differ."""
 
 
 def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, beside: int = 0) -> Numbers:
@@ -41,7 +39,7 @@ def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, beside: i
     return np.asarray(np.linalg.solve(gram + ridge * np.eye(gram.shape[-1]), moment))
 
 
-def first_stage_fit(instruments: Array, values: Array, ridge: float = _RIDGE) -> Array:
+def first_stage_fit(instruments: Array, values: Array, ridge: float = RIDGE) -> Array:
     """Predict values from instruments and a constant, each of five parts by the other ones.
 
     Parameters
@@ -66,7 +64,7 @@ def first_stage_fit(instruments: Array, values: Array, ridge: float = _RIDGE) ->
 
 
 def first_stage_fit_by_run(
-    instruments: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = _RIDGE
+    instruments: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = RIDGE
 ) -> dict[int, Array]:
     """Predict values of runs by their numbers, all runs together; see `first_stage_fit`."""
     if not instruments:

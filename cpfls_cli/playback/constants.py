@@ -1,9 +1,9 @@
 """Constants of a vehicle from what moves it and knows nothing of its gusts: balances in bands, with instruments.
 
 Torque and force of a model are held against what the motion takes, averaged over smooth windows of several lengths. An
-autopilot answers gusts with torque, so torque and gust go together, and least squares finds a mixture of vehicle and
+autopilot answers gusts with torque, so torque and gust correlate, and least squares finds a mixture of vehicle and
 autopilot. The same balance in another run of the same path has the same torque asked for, and another gust: it is the
-instrument, and what is left of a balance must not go with it.
+instrument, and the residual of a balance must not correlate with it.
 """
 
 from __future__ import annotations
@@ -17,24 +17,23 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
-from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, solve, without_each
+from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
-from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_bands
+from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, PastBalances, Sums, fitting_bands
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
-from cpfls_cli.playback.past import PastBalances
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 ENOUGH_BLOCKS = 8
-"""Whose scatter tells an error by instruments."""
+"""Whose scatter gives an error by instruments."""
 _LONGEST_S = 8.0
-"""Length from which on a run tells something in all bands."""
+"""Length from which on a run identifies something in all bands."""
 _FLAT = 0.85
 """Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
@@ -42,13 +41,13 @@ _NOT_TRIED = "slow_actuation"
 _STEPS, _SETTLED = 12, 1e-3
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
-"""Of the power of a band that is never taken for what comes again."""
+"""Share of the power of a band that is never taken for repeatable."""
 STRONG = 10.0
 """F statistic of an instrument below which it is weak, and its interval no interval."""
 _APART = 3.0
 """Standard errors by which bands may differ on a moment of inertia."""
 _WORTH = 3.0
-"""Standard errors by which a block has to lower what is left of balances kept aside."""
+"""Standard errors by which a block has to lower the residual of balances kept aside."""
 
 
 class Repeat(NamedTuple):
@@ -117,7 +116,7 @@ class Constants:
         return np.where(self.spread.determined[places], half, np.inf)
 
     @property
-    def tells(self) -> bool:
+    def identified(self) -> bool:
         """Whether the moments of inertia about roll and pitch are known to a factor of two."""
         return bool((2 * self.half[:2] <= np.log(KNOWN)).all())
 
@@ -143,6 +142,15 @@ class _Problem:
     def places(self) -> IntArray:
         """Numbers that are estimated."""
         return np.flatnonzero([number.name not in self.held for number in self.free.numbers])
+
+    @property
+    def blocks(self) -> list[str]:
+        """Blocks of the numbers."""
+        return list(dict.fromkeys(number.block for number in self.free.numbers))
+
+    def places_of(self, blocks: Sequence[str]) -> IntArray:
+        """Give the estimated numbers of some blocks."""
+        return self.places[[self.free.numbers[place].block in blocks for place in self.places]]
 
     @cached_property
     def weights(self) -> Array:
@@ -176,32 +184,42 @@ class _Problem:
         """Conditional F statistic of each estimated number."""
         return conditional_strength(self.normal(self.places), Prior.none(len(self.places)))
 
-    @cached_property
-    def left_out(self) -> Array:
-        """Numbers without each block, as steps in natural sizes, shape (block, number)."""
-        return self._steps(self.places)
-
-    def _steps(self, places: IntArray, weighed: Array | None = None) -> Array:
-        steps = np.zeros((len(self.weighed if weighed is None else weighed), len(self.values)))
+    def left_out(self, places: IntArray, weighed: Array | None = None) -> Array:
+        """Give steps of some numbers without each block, in natural sizes, shape (block, number)."""
         at = (self.values / self.free.scales)[places]
-        steps[:, places] = without_each(self.normal(places, weighed), self.prior(places), at) - at
+        moved = one_step(self.normal(places, weighed), self.prior(places), at)[1] - at
+        steps = np.zeros((len(moved), len(self.values)))
+        steps[:, places] = moved
         return steps
 
-    @property
-    def moments_left_out(self) -> Array:
-        """Logarithms of the moments about roll and pitch without each block, but for a constant, (block, 2)."""
+    @cached_property
+    def moments(self) -> tuple[Array, Array]:
+        """Logarithms of the moments about roll and pitch, and how they move without each block, (block, 2)."""
         places = [self.free.index[name] for name in LOG_INERTIA[:2]]
-        return np.asarray(self.left_out[:, places] * self.free.scales[places])
+        return self.values[places], (self.left_out(self.places) * self.free.scales)[:, places]
 
     @property
-    def named(self) -> dict[str, float]:
-        """Values of the numbers, by name."""
-        return self.free.named(self.values)
+    def identifies(self) -> bool:
+        """Whether the moments of inertia about roll and pitch are known to a factor of two."""
+        _, moved = self.moments
+        narrow = 2 * half_width(jackknife_error(moved), len(moved)) <= np.log(KNOWN)
+        return not self.held & {*LOG_INERTIA[:2]} and bool(narrow.all())
+
+    def agrees(self, other: _Problem) -> bool:
+        """Check whether other bands have the moments of inertia about roll and pitch where these have them."""
+        (own, moved), (others, others_moved) = self.moments, other.moments
+        return bool((np.abs(others - own) <= _APART * jackknife_error(others_moved - moved)).all())
+
+    def explains(self, band: int) -> bool:
+        """Check whether 90 % of the repeatable roll and pitch in a band are explained, as far as is known."""
+        share, error = self.explained
+        return bool((share[band, :2] + error[band, :2] >= EXPLAINED).all())
 
     def left(self, places: IntArray) -> Array:
         """Sum the repeatable residual of blocks kept aside in turn, with some numbers estimated, shape (block,)."""
         part = contiguous(len(self.weighed), FOLDS)
-        steps = self._steps(places, np.array([self.weighed[part == fold].sum(axis=0) for fold in range(FOLDS)]))[part]
+        by_fold = np.array([self.weighed[part == fold].sum(axis=0) for fold in range(FOLDS)])
+        steps = self.left_out(places, by_fold)[part]
         moved = np.column_stack([np.ones(len(steps)), steps, np.zeros(len(steps))])
         return np.asarray(np.einsum("bp,bpq,bq->b", moved, self.weighed, moved))
 
@@ -212,14 +230,19 @@ class _Problem:
 
 
 def find_constants(
-    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], given: Instruments, leave_out: Sequence[str] = ()
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    given: Instruments,
+    leave_out: Sequence[str] = (),
+    *,
+    past: bool = False,
 ) -> Constants | None:
     """Estimate the constants of a vehicle from flights that repeat each other, or whose setpoints are known.
 
     Numbers that are not known are free, and the moments of inertia; blocks of others join one by one while they lower
-    what is left of balances that were kept aside. The slowest band is left out, and the next, where the faster ones
-    tell the moments of inertia, and it disagrees with them or the model does not explain 90 % of the rotation in it
-    that comes again: the model lacks something there, which no constant may stand for.
+    the residual of balances that were kept aside. The slowest band is left out, and the next, where the faster ones
+    identify the moments of inertia, and it disagrees with them or the model does not explain 90 % of the repeatable
+    rotation in it: the model lacks something there, which no constant may stand for.
 
     Parameters
     ----------
@@ -231,100 +254,59 @@ def find_constants(
         Of these flights.
     leave_out : sequence of str
         Blocks that are not tried.
+    past : bool
+        Whether the past is the instrument, of innovations, for flights that show their loop. Slow ones go wherever they
+        disagree or are not explained, and a moment is identified only where it is known to a tenth how much of the
+        predicted rotation is explained: nothing from outside of the loop stands for it.
 
     Returns
     -------
     Constants or None
-        None where nothing tells how the flights were moved apart from gusts, for too short a time or too slow a log,
+        None where nothing shows how the flights were moved apart from gusts, for too short a time or too slow a log,
         and where the inertia is not to be sought.
 
     References
     ----------
-    Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
-    """
-    return _found(vehicle, Balances(given.flown, given), _tried(vehicle, flights, leave_out))
-
-
-def constants_of_past(
-    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], given: Instruments, leave_out: Sequence[str] = ()
-) -> Constants | None:
-    """Estimate the constants of a vehicle from flights that show its loop, by what was before.
-
-    As `find_constants`, in what is new along the flights, and in what of that was foretold fast and slowly. What is
-    slow goes wherever it disagrees or is not explained, and a moment is told only where it is known to a tenth how much
-    of the rotation that was foretold is explained: nothing from outside of the loop stands for it.
-
-    Parameters
-    ----------
-    vehicle, flights, given, leave_out
-        As of `find_constants`; the flights need no instruments.
-
-    References
-    ----------
+    Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats);
     Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument).
     """
-    return _found(vehicle, PastBalances(given.flown, given), _tried(vehicle, flights, leave_out))
-
-
-def _found(vehicle: VehicleSettings, balances: Balances, tried: Sequence[str]) -> Constants | None:
-    """Estimate the constants by what some balances know."""
+    balances = (PastBalances if past else Balances)(given.flown, given)
     periods = {flight.motion.period for flight in balances.flights}
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
         return None
+    translates = all(flight.translates for flight in flights)
+    tried = [
+        block
+        for block in blocks_of(vehicle)
+        if block not in (*leave_out, *LEARNED, _NOT_TRIED) and (translates or not needs_velocity(block))
+    ]
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
-    setting = _Setting(vehicle, balances)
-    free = setting.free(blocks)
+    search = _Search(vehicle, balances, blocks, tried)
+    free = search.free(blocks)
     if not balances.path or LOG_INERTIA[0] not in free.index or balances.longest_s < _LONGEST_S:
         return None
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
     held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(free.index) else set()
-    problem = _problem(setting, np.ones(len(balances.bands), dtype=bool), blocks, tried, held)
-    if len(problem.sums.ztx) < ENOUGH_BLOCKS:
+    found = search.chosen(np.ones(len(balances.bands), dtype=bool), held)
+    if len(found.sums.ztx) < ENOUGH_BLOCKS:
         return None
     for slowest in range(len(balances.bands_hz) - 1, 0, -1):
-        faster = problem.bands.copy()
+        faster = found.bands.copy()
         faster[slowest] = False
-        fast = _problem(setting, faster, blocks, tried, held)
-        alike = _agree(fast, problem) and _explains(problem, slowest)
-        if alike or not (balances.of_past or _tells(fast)):
+        fast = search.chosen(faster, held)
+        if (fast.agrees(found) and found.explains(slowest)) or not (past or fast.identifies):
             break
-        problem = fast
-    return _constants(problem, balances)
+        found = fast
+    return _constants(found, balances)
 
 
-def _problem(
-    setting: _Setting, bands: BoolArray, blocks: Sequence[str], tried: Sequence[str], held: Set[str]
-) -> _Problem:
-    """Estimate what is asked for in some bands, and choose what else is worth it."""
-    return _chosen(setting, _settled(setting, blocks, bands, {}, held), tried)
-
-
-def _tells(problem: _Problem) -> bool:
-    """Whether the moments of inertia about roll and pitch are known to a factor of two."""
-    if problem.held & {*LOG_INERTIA[:2]}:
-        return False
-    left_out = problem.moments_left_out
-    return bool((2 * half_width(jackknife_error(left_out), len(left_out)) <= np.log(KNOWN)).all())
-
-
-def _agree(fast: _Problem, more: _Problem) -> bool:
-    """Check whether a slower band leaves the moments about roll and pitch where the faster ones have them."""
-    moved = np.array([more.named[name] - fast.named[name] for name in LOG_INERTIA[:2]])
-    error = jackknife_error(more.moments_left_out - fast.moments_left_out)
-    return bool((np.abs(moved) <= _APART * error).all())
-
-
-def _explains(problem: _Problem, band: int) -> bool:
-    """Check whether 90 % of the repeatable roll and pitch in a band are explained, as far as is known."""
-    share, error = problem.explained
-    return bool((share[band, :2] + error[band, :2] >= EXPLAINED).all())
-
-
-class _Setting(NamedTuple):
-    """What constants are sought in."""
+class _Search(NamedTuple):
+    """What constants are sought in: blocks of numbers that are estimated anyway, and others that are tried."""
 
     vehicle: VehicleSettings
     balances: Balances
+    asked: Sequence[str]
+    tried: Sequence[str]
 
     def free(self, blocks: Sequence[str]) -> JointNumbers:
         """Give the numbers of some blocks."""
@@ -335,81 +317,59 @@ class _Setting(NamedTuple):
         """Take the balances at values of the numbers."""
         return _Problem(free, self.balances.sums(free.base, values), values, bands, self.balances.bands_hz, held)
 
+    def chosen(self, bands: BoolArray, held: Set[str]) -> _Problem:
+        """Estimate numbers in some bands, and add the block that lowers the residual most until none does."""
+        found = self.solved(self.asked, bands, {}, held)
+        while best := self._best_block(found):
+            more = self.solved([*found.blocks, best], bands, found.free.named(found.values), found.held & {DRAG})
+            if not len(more.places_of([best])):
+                break
+            found = more
+        return found
 
-def _tried(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], leave_out: Sequence[str]) -> tuple[str, ...]:
-    """List the blocks that are constants of a vehicle and that the flights can tell of."""
-    translates = all(flight.translates for flight in flights)
-    return tuple(
-        block
-        for block in blocks_of(vehicle)
-        if block not in (*leave_out, *LEARNED, _NOT_TRIED) and (translates or not needs_velocity(block))
-    )
+    def _best_block(self, found: _Problem) -> str:
+        """Find the block with which least is left of what was kept aside; empty where none is worth it."""
+        taken, named = found.blocks, found.free.named(found.values)
+        free = self.free([*taken, *(block for block in self.tried if block not in taken)])
+        values = free.values({number.name: number.absent for number in free.numbers} | named)
+        every = self.problem(free, values, found.bands, found.held)
+        left, gains = every.left(every.places_of(taken)), [(0.0, "")]
+        for block in every.blocks:
+            if block not in taken:
+                gain = left - every.left(every.places_of([*taken, block]))
+                if gain.mean() > _WORTH * mean_error(gain):
+                    gains.append((float(gain.sum()), block))
+        return max(gains)[1]
 
+    def solved(self, blocks: Sequence[str], bands: BoolArray, known: Mapping[str, float], held: Set[str]) -> _Problem:
+        """Solve the balances for all numbers but those held, within bounds.
 
-def _chosen(setting: _Setting, problem: _Problem, tried: Sequence[str]) -> _Problem:
-    """Add the block that lowers most what is left, and estimate again, until none does."""
-    while True:
-        taken = _blocks(problem.free)
-        others = [block for block in tried if block not in taken]
-        best = _best_block(setting, problem, taken, others)
-        if best is None:
-            return problem
-        more = _settled(setting, [*taken, best], problem.bands, problem.named, problem.held & {DRAG})
-        if not len(_of_blocks(more, [best])):
-            return problem
-        problem = more
+        What instruments hardly identify is held with the numbers that are held anyway, where it was believed to be.
+        """
+        free = self.free(blocks)
+        values = free.values(known)
+        problem = self.problem(free, values, bands, held)
+        # The weakest first: conditional on a number that nothing identifies, nothing identifies the others either.
+        while len(problem.places) and problem.strength.min() < STRONG:
+            weakest = free.numbers[problem.places[np.argmin(problem.strength)]]
+            values[free.index[weakest.name]] = weakest.absent
+            held = held | {weakest.name}
+            problem = replace(problem, held=held)
+        places, scales = problem.places, free.scales[problem.places]
 
+        def equations(natural: Array) -> Normal:
+            nonlocal problem
+            moved = values.copy()
+            moved[places] = natural * scales
+            if LOG_INERTIA[2] in held and INERTIA in self.vehicle.unknown:
+                moved[free.index[LOG_INERTIA[2]]] = _of_a_flat_body(free, moved)
+            problem = self.problem(free, moved, bands, held)
+            return problem.normal(places)
 
-def _best_block(setting: _Setting, problem: _Problem, taken: Sequence[str], others: Sequence[str]) -> str | None:
-    """Find the block with which least is left of what was kept aside; None where none is worth it."""
-    free = setting.free([*taken, *others])
-    values = free.values({number.name: number.absent for number in free.numbers} | problem.named)
-    every = setting.problem(free, values, problem.bands, problem.held)
-    left, found = every.left(_of_blocks(every, taken)), []
-    for block in dict.fromkeys(number.block for number in free.numbers):
-        if block not in taken:
-            gain = left - every.left(_of_blocks(every, [*taken, block]))
-            if gain.mean() > _WORTH * mean_error(gain):
-                found.append((gain.sum(), block))
-    return max(found)[1] if found else None
-
-
-def _of_blocks(problem: _Problem, blocks: Sequence[str]) -> IntArray:
-    """Give the estimated numbers of some blocks."""
-    return np.array([place for place in problem.places if problem.free.numbers[place].block in blocks], dtype=np.int64)
-
-
-def _settled(
-    setting: _Setting, blocks: Sequence[str], bands: BoolArray, known: Mapping[str, float], held: Set[str]
-) -> _Problem:
-    """Solve the balances for all numbers but those held, within bounds.
-
-    What instruments hardly identify is held with the numbers that are held anyway, where it was believed to be.
-    """
-    free = setting.free(blocks)
-    values = free.values(known)
-    problem = setting.problem(free, values, bands, held)
-    # The weakest first: conditional on a number that nothing identifies, nothing identifies the others either.
-    while len(problem.places) and problem.strength.min() < STRONG:
-        weakest = free.numbers[problem.places[np.argmin(problem.strength)]]
-        values[free.index[weakest.name]] = weakest.absent
-        held = held | {weakest.name}
-        problem = replace(problem, held=held)
-    places, scales = problem.places, free.scales[problem.places]
-
-    def equations(natural: Array) -> Normal:
-        nonlocal problem
-        moved = values.copy()
-        moved[places] = natural * scales
-        if LOG_INERTIA[2] in held and INERTIA in setting.vehicle.unknown:
-            moved[free.index[LOG_INERTIA[2]]] = _of_a_flat_body(free, moved)
-        problem = setting.problem(free, moved, bands, held)
-        return problem.normal(places)
-
-    if len(places):
-        bounds = free.lows[places] / scales, free.highs[places] / scales
-        solve(equations, values[places] / scales, problem.prior(places), bounds, steps=_STEPS, settled=_SETTLED)
-    return problem
+        if len(places):
+            bounds = free.lows[places] / scales, free.highs[places] / scales
+            solve(equations, values[places] / scales, problem.prior(places), bounds, steps=_STEPS, settled=_SETTLED)
+        return problem
 
 
 def _of_a_flat_body(free: JointNumbers, values: Array) -> float:
@@ -417,10 +377,6 @@ def _of_a_flat_body(free: JointNumbers, values: Array) -> float:
     started = np.array(free.base.vehicle.inertia_kg_m2[:3])
     roll, pitch = started[:2] * np.exp(values[[free.index[name] for name in LOG_INERTIA[:2]]])
     return float(np.log(_FLAT * (roll + pitch) / started[2]))
-
-
-def _blocks(free: JointNumbers) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(number.block for number in free.numbers))
 
 
 def _shares(ztx: Array) -> tuple[Array, Array]:
@@ -452,13 +408,14 @@ def _constants(problem: _Problem, balances: Balances) -> Constants:
         # Where much of what is repeatable is not explained, a moment may stand for what is missing.
         if name in free.index and not enough:
             known[free.index[name]] = False
-    covariance = np.diag(np.where(known, 0.0, free.spreads**2)) + jackknife_covariance(problem.left_out)
+    left_out = problem.left_out(problem.places)
+    covariance = np.diag(np.where(known, 0.0, free.spreads**2)) + jackknife_covariance(left_out)
     share, _ = problem.explained
     every = np.arange(len(free.numbers))
     hessian = problem.normal(every).information.sum(axis=0) + np.diag(problem.prior(every).precision)
     return Constants(
         Fitted(free, problem.values, float(1 - share[0, :2].mean()), hessian),
-        Uncertainty(covariance * np.outer(free.scales, free.scales), len(problem.left_out), known),
+        Uncertainty(covariance * np.outer(free.scales, free.scales), len(left_out), known),
         UsedInstruments(
             kind="past" if past else given.kind,
             setpoints=() if past else given.names,

@@ -19,17 +19,18 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.blocks import block_length, contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.balances import middles_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
 from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
 from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
@@ -161,12 +162,6 @@ class _Band(NamedTuple):
         """Take what both sides of a balance differ by, shape (time, 2, axis) to (piece, axis, frequency)."""
         return -self.laid(flight, sides[:, 0], self.slope) - self.laid(flight, sides[:, 1], self.weight)
 
-    def starts(self, flight: PlaybackFlight) -> IntArray:
-        """Give the first sample of each piece."""
-        hop, counts = self.pieces.hop, [self.pieces.count(part.stop - part.start) for part in flight.stretches]
-        found = [part.start + np.arange(count) * hop for part, count in zip(flight.stretches, counts, strict=True)]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
-
 
 def find_gusts(
     model: VehicleModel,
@@ -245,10 +240,10 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     if not left:
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
-    newly = newly_left(seen, left, told, moving, found.noise)
-    foretold, without = newly.shares
-    foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
-    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_RARE)
+    new = residual_innovations(seen, left, told, moving, found.noise)
+    foretold, without = new.shares
+    little = foretold + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
+    gusty = np.isfinite(found.size) & little & ~new.grows(_RARE)
     if not blows(gusty, np.ones_like(gusty)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -303,7 +298,7 @@ def gusts_in(
     powers = _powers(sides, given, band, told_by)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
-    runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
+    runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
@@ -338,42 +333,36 @@ def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
 
 
 def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: ToldBy) -> _Powers:
-    """Take the power of what does not come again, by block of a run."""
+    """Take the power of the non-repeatable residual, by block of a run."""
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if told_by == "repeats":
-        beside = [
-            band.left(flight, given.repeats.others(number, sides)) if given.repeats.beside[number] else np.nan * own
-            for number, (flight, own) in enumerate(zip(given.flown, left, strict=True))
-        ]
+        beside = [band.left(flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
     elif told_by == "setpoints":
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
-    block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
-    power, whole, count, each_left = [], [], [], []
+    block_s = block_length(seen, _PIECE_S, _LEAST_BLOCK_S, _BLOCKS)
+    sums, count, each_left = [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
-        products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
-        block = band.starts(flight)[there] * period // block_s
-        each_left.append(squares)
-        for each in np.unique(block):
-            power.append(products[block == each].sum(axis=0))
-            whole.append(squares[block == each].sum(axis=0))
-            count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
+        both = np.stack([(own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2], axis=1)
+        block = (middles_of(band.pieces, flight)[there] - len(band.weight) // 2) * period // block_s
+        each_left.append(both[:, 1])
+        numbers, windows = np.unique(block, return_counts=True)
+        sums += [both[block == each].sum(axis=0) for each in numbers]
+        count += windows.tolist()
+    power, whole = np.reshape(sums, (len(count), 2, *left[0].shape[1:])).swapaxes(0, 1)
+    return _Powers(power, whole, np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
 def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: ToldBy) -> _Complex:
-    """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
+    """Give parts of a model as instruments predict them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]
     if told_by == "repeats":
-        flat = [
-            given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own
-            for number, own in enumerate(flat)
-        ]
+        flat = [given.repeats.others(number, flat) for number in range(len(flat))]
     laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
     if told_by == "setpoints":
         laid = _expected(given, laid, band)

@@ -34,9 +34,9 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 
 
 Told = Literal["repeats", "setpoints", "none"]
-"""What tells gusts and what a model lacks apart."""
+"""What separates gusts from what a model lacks."""
 ToldBy = Literal[Told, "past"]
-"""Where nothing moves a vehicle but its loop, what was before may tell."""
+"""Where nothing moves a vehicle but its loop, the past may separate them."""
 
 _ANSWERED_S = 0.5
 """What was asked for is answered within this time."""
@@ -61,7 +61,7 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Instruments:
-    """What tells of each run how it was moved, apart from its gusts.
+    """What shows how each run was moved, apart from its gusts.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Instruments:
 
     @property
     def kind(self) -> Told:
-        """What most can be told from: runs of a path tell more than what was asked for."""
+        """What identifies most: runs of a path show more than what was asked for."""
         if self.repeats.likeness:
             return "repeats"
         return "setpoints" if self.names else "none"
@@ -97,7 +97,7 @@ class Instruments:
             return frozenset(self.runs[number].flight for path in self.repeats.paths() for number in path)
         return frozenset(run.flight for run, asked in zip(self.runs, self.setpoints, strict=True) if asked is not None)
 
-    def beside(self, values: Sequence[Array]) -> list[Array | None]:
+    def by_flight(self, values: Sequence[Array]) -> list[Array | None]:
         """Give the instruments of each flight: of repeats what other runs have there, else what was asked of it.
 
         Parameters
@@ -111,18 +111,16 @@ class Instruments:
             NaN where no other run is; None for a flight without instruments.
         """
         cut = [values[run.flight][run.part] for run in self.runs]
-        found: list[Array | None] = []
-        for flight, own in enumerate(values):
-            columns: Array | None = None
-            for number, run in enumerate(self.runs):
-                if run.flight != flight or flight not in self.flights:
-                    continue
-                asked = self.setpoints[number]
-                known = self.repeats.others(number, cut)[:, None] if self.kind == "repeats" else asked
-                if known is not None:
-                    columns = np.full((len(own), known.shape[1]), np.nan) if columns is None else columns
-                    columns[run.part] = known
-            found.append(columns)
+        found: list[Array | None] = [None] * len(values)
+        for number, run in enumerate(self.runs):
+            asked = self.setpoints[number]
+            known = self.repeats.others(number, cut)[:, None] if self.kind == "repeats" else asked
+            if known is not None and run.flight in self.flights:
+                columns = found[run.flight]
+                if columns is None:
+                    columns = np.full((len(values[run.flight]), known.shape[1]), np.nan)
+                columns[run.part] = known
+                found[run.flight] = columns
         return found
 
 
@@ -157,7 +155,7 @@ def held(flight: PlaybackFlight) -> bool:
 
 
 def past_setpoints(asked: Array, period: float, apart: int) -> Array:
-    """Put setpoints beside themselves as they were before, so many samples apart, shape (time, column)."""
+    """Stack setpoints and their past, so many samples apart, shape (time, column)."""
     lags = range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
     return np.hstack([delayed(asked, lag, "previous") for lag in lags])
 
@@ -223,7 +221,7 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
 
 
 def _of_one_kind(flights: Sequence[PlaybackFlight], repeated: Collection[int]) -> list[tuple[str, ...]]:
-    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is foretold of all."""
+    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is predicted for all."""
     held = [{(name, flight.setpoints[name].shape[1]) for name in _outside(flight)} for flight in flights]
     voting = [number for number in range(len(flights)) if number not in repeated] or range(len(flights))
 
@@ -241,13 +239,13 @@ class Repeats:
 
     Attributes
     ----------
-    beside : tuple of mapping of int to array, shape (time,)
+    places : tuple of mapping of int to array, shape (time,)
         For each flight, by number of another: its sample, in parts of one, at each own sample; NaN where there is none.
     likeness : mapping of pair of int to float
         Correlation of flights of the same path, first the smaller number.
     """
 
-    beside: tuple[Mapping[int, Array], ...]
+    places: tuple[Mapping[int, Array], ...]
     likeness: Mapping[tuple[int, int], float]
 
     def paths(self) -> tuple[tuple[int, ...], ...]:
@@ -275,7 +273,7 @@ class Repeats:
         """
         own = values[number]
         total, count = np.zeros_like(own), np.zeros(len(own))
-        for other, place in self.beside[number].items():
+        for other, place in self.places[number].items():
             inside = np.isfinite(place)
             total[inside] += _between(values[other], place[inside])
             count += inside
@@ -297,7 +295,7 @@ class Repeats:
         array, shape (time, ...)
             At the samples of the flight; NaN where the other is not.
         """
-        place = self.beside[number][other]
+        place = self.places[number][other]
         inside = np.isfinite(place)
         found = np.full((len(place), *values.shape[1:]), np.nan)
         found[inside] = _between(values, place[inside])
@@ -319,7 +317,7 @@ class Repeats:
             NaN where the first is not.
         """
         first = next((group[0] for group in self.paths() if number in group), number)
-        return first, self.beside[number].get(first, np.arange(length, dtype=float))
+        return first, self.places[number].get(first, np.arange(length, dtype=float))
 
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:

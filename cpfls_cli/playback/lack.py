@@ -1,10 +1,10 @@
-"""What a model lacks, as it comes again: a torque and a force with a memory, as large as shares of the model's parts.
+"""What a model lacks that is repeatable: a torque and a force with a memory, as large as shares of the model's parts.
 
 A formula that is wrong is wrong in proportion to what it gives: little where little flows, much in a fast climb. So
 what a model lacks about or along an axis is a Gauss-Markov process whose size at an instant is the root of the sum of
 squares of a rest and of shares of what the flow does there to each part of the model, while the body does not turn and
 all rotors turn alike: a size in proportion to rates and commands, which answer it, would excite itself. Other runs of a
-path, or what was asked for, tell the parts, so that no gust is mistaken for them.
+path, or what was asked for, predict the parts, so that no gust is mistaken for them.
 """
 
 from __future__ import annotations
