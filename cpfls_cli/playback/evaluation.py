@@ -10,7 +10,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.polynomial import Probe
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -31,9 +30,10 @@ from cpfls_cli.playback.parameters import (
     THRUST,
     FreeNumbers,
     Physical,
+    unit_wrenches,
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import effect_weights, learned_wrench, rotor_weights
+from cpfls_cli.playback.table import learned_wrench, rotor_weights
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -148,14 +148,17 @@ class VehicleAt:
     @cached_property
     def effects(self) -> tuple[ModelEffect, ...]:
         """Effects, their coefficients counted on this vehicle and not on the stated one: some share its thrust."""
-        probe, effects = Probe.of(self.vehicle), []
-        for name in self.free.effects:
-            numbers = zip(self.free.of_block(name), effect_weights(name, {}, probe), strict=True)
-            counted = [
-                self.coefficients[number.name] * self.free.columns[number.name].counted(weights)
-                for number, weights in numbers
-            ]
-            effects.append(ModelEffect(name, {}, np.array(counted)))
+        effects, stated = [], self.free.vehicle
+        # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
+        rotors = tuple(
+            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self.drag_over_thrust) for each in stated.rotors
+        )
+        flown = replace(stated, rotors=rotors)
+        for block in self.free.effects:
+            before, found = (unit_wrenches(block, vehicle) for vehicle in (flown, self.vehicle))
+            ratio = (before * found).sum(axis=(1, 2)) / (found**2).sum(axis=(1, 2))
+            own = [self.coefficients[number.name] for number in self.free.of_block(block)]
+            effects.append(ModelEffect(block, {}, np.array(own) * ratio))
         return tuple(effects)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
@@ -139,6 +139,10 @@ class VehicleModel:
     """Faults of the sensors, which are taken out of signals first."""
     gusts: Gusts | None = part(default=None)
     """In its flights, as far as they are known; no part of what the model forecasts."""
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave what follows from the fields to whoever gets a copy: it holds functions, which no process can send."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def rotors(self) -> int:

@@ -134,15 +134,14 @@ def _stated_weights(block: str, vehicle: VehicleSettings) -> Array:
 
 @lru_cache(maxsize=256)
 def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
-    """Find the rows of each coefficient that grow with the drag factor while others do not, (coefficient, 6)."""
+    """Find the rows of each coefficient that grow with the drag factor, shape (coefficient, 6)."""
     known, signals = CATALOGUE[block], Probe.of(vehicle).signals
     if known.columns is None or known.kind != "wrench":
         return np.zeros((len(known.coefficients), 6), dtype=bool)
     twice = [replace(rotor, drag_factor_n_m_s2=2 * rotor.drag_factor_n_m_s2) for rotor in vehicle.rotors]
     other = replace(signals, vehicle=replace(vehicle, rotors=tuple(twice)))
     stated, changed = (known.columns(each, {}).direct for each in (signals, other))
-    grows, acts = np.any(changed != stated, axis=0).T, np.any(stated, axis=0).T
-    return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
+    return np.any(changed != stated, axis=0).T
 
 
 @lru_cache(maxsize=256)
@@ -225,11 +224,6 @@ class Column:
     def scaled(self, drag: float) -> Array:
         """Weights for a unit counted in thrust, with a drag factor that changed by as much more than the thrust's."""
         return np.where(self.drags[:, None, None], drag * self.weights, self.weights) if self.dragged else self.weights
-
-    def counted(self, found: Array) -> float:
-        """Count a unit on another vehicle, shape of its weights (6, 34, 1 + 4 rotors)."""
-        stated, other = self.weights[~self.drags, : len(STATE_TERMS)], found[~self.drags]
-        return float(np.sum(stated * other) / np.sum(other**2))
 
 
 @dataclass(frozen=True)

@@ -540,7 +540,7 @@ def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntA
     """
     numbers, groups, horizon = len(flown.inertia_by), int(group.max(initial=0)) + 1, len(loss.weight)
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
-    for part, own, of_steps in runs.blocks(steps, _RUNS):
+    for part, own, of_steps in runs.blocks(steps, _RUNS) if numbers else ():
         path = own.fly(flown, of_steps, stages=True)
         errors = own.errors(path)[1:]
         weight, delta = (each[:, 1:] for each in loss.of_runs(part))

@@ -308,7 +308,8 @@ class Vehicle:
 
     @cached_property
     def _with_momentum(self) -> frozenset[str]:
-        rotors = SYMBOLS.rotors([2.0 + rotor for rotor in range(len(self.settings.rotors))])
+        # Powers of 2, whose sums with any signs are not 0.
+        rotors = SYMBOLS.rotors([2.0**rotor for rotor in range(len(self.settings.rotors))])
         moving = Instant(self.settings, rotors, (1.0, 2.0, 3.0), (1.0, 2.0, 3.0), height=1.0, force=(1.0, 2.0, 3.0))
         return frozenset(one.name for one in self.acting if not all(map(zero, one.wrench(moving).momentum)))
 

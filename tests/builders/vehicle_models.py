@@ -67,6 +67,8 @@ def polynomial_effects(vehicle):
 
 def is_held(known, vehicle):
     """Say whether an effect follows from air velocity, body rate and rotors."""
+    if "rotor_radius" in known.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
+        return False
     shape = {one.name: one.grid[0] for one in known.shapes}
     numbers = 0.1 * np.ones(0 if known.unit_coefficient else len(known.coefficients))
     return not VehicleModel(vehicle=vehicle, effects=(ModelEffect(known.name, shape, numbers),)).beside_table

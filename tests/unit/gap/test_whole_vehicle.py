@@ -16,7 +16,7 @@ from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, acting_of
 from cpfls_cli.playback.player import free_runs, made_ready, player_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders import vehicle_models
@@ -58,7 +58,7 @@ def test_torque_force_and_inertia_are_those_of_the_effects():
     assert whole.beside_table == ()
     steady = np.zeros((len(flown), 17))
     steady[:, 0], steady[:, 1:5], steady[:, 5:9] = 1.0, flown.rotor_speed, flown.rotor_speed**2
-    found = whole.table.wrench(flown.air_velocity, flown.body_rate, steady)
+    found = whole.wrench(flown.air_velocity, flown.body_rate, steady)
     moved = actuated(flown, extended.chosen)
     wanted = moved.wrench + sum(columns_of(*pair).direct @ each for *pair, each in _columns(extended, moved))
     # The coupling of the rates alone, which no inertia holds.
@@ -82,11 +82,11 @@ def test_lag_and_delay_are_those_of_the_rotors():
     assert whole.effects == ()
 
 
-def test_what_is_no_polynomial_is_named():
+def test_what_is_not_simulated_with_the_state_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
     assert whole.beside_table == ("battery_sag", "wind")
-    assert [*whole.parts] == ["rotors", "torque_bias"]
+    assert [each.name for each in acting_of(whole)] == ["rotors", "torque_bias"]
 
 
 def test_height_of_the_mass_and_wind_are_those_of_the_effects():
@@ -113,9 +113,10 @@ def test_height_of_the_mass_and_wind_are_those_of_the_effects():
     for changed in (lower, replace(whole, wind=(0.0, 0.0, 0.0))):
         assert np.abs(free_runs(player_of(changed, flight), flight, starts, 12).errors - runs).max() > 1e-3
     # The height alone has a lever for the forces across the rotors, which the thrust is none of.
-    table, centre = whole.parts["com_offset"], np.array([0.004, -0.003, 0.02])
-    forces = whole.table.weights[3:]
-    np.testing.assert_allclose(table[:3], -np.cross(centre, forces, axisb=0, axisc=0), atol=1e-15)
+    air, rate = np.random.default_rng(0).normal(0, 2, (2, 5, 3))
+    steady = np.hstack([np.ones((5, 1)), np.full((5, 4), 1000.0), np.full((5, 4), 1e6), np.zeros((5, 8))])
+    lever, force = whole.wrench_by_part(air, rate, steady)["com_offset"], whole.wrench(air, rate, steady)[:, 3:]
+    np.testing.assert_allclose(lever[:, :3], -np.cross([0.004, -0.003, 0.02], force), atol=1e-15)
 
 
 def test_what_is_left_out_is_measured_along_flights():

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.playback.fit import Fitted, windows_of
 from cpfls_cli.playback.history import Observer, past_of
-from cpfls_cli.playback.history_fit import _Begun, _evaluated, _point, errors_with_past, fit_observer
+from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, fit_observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, observed, player_of
 from cpfls_cli.playback.structure import Structure
@@ -114,7 +114,7 @@ def gusty():
 
 def test_the_gradient_of_the_observer_is_the_difference_quotient(gusty):
     flights, fitted = gusty
-    at, windows = _evaluated(fitted), windows_of(flights[:1], 0.3, 1.0)
+    at, windows = _vehicle(fitted), windows_of(flights[:1], 0.3, 1.0)
     begun, values = [_Begun.of(at, each, 0.2) for each in windows], np.log([[20.0, 0.2], [8.0, 0.4]] * 2).ravel()
     found = _point(at, begun, 0.2, values)
     steps = 1e-4 * np.eye(len(values))
