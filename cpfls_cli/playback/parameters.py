@@ -141,7 +141,7 @@ def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     twice = [replace(rotor, drag_factor_n_m_s2=2 * rotor.drag_factor_n_m_s2) for rotor in vehicle.rotors]
     other = replace(signals, vehicle=replace(vehicle, rotors=tuple(twice)))
     stated, changed = (known.columns(each, {}).direct for each in (signals, other))
-    return np.any(changed != stated, axis=0).T
+    return np.asarray(np.any(changed != stated, axis=0).T, dtype=bool)
 
 
 @lru_cache(maxsize=256)

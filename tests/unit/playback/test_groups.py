@@ -88,14 +88,14 @@ def test_effects_stay_what_they_are_where_the_inertia_differs():
 @pytest.mark.parametrize("blocks", [TRUE_BLOCKS, TRUE_BLOCKS[1:]], ids=["inertia of all", "of the group alone"])
 def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks):
     """Against difference quotients, for all numbers, shared ones and those of the group."""
-    from cpfls_cli.playback.fit import WindowSums
+    from cpfls_cli.playback.fit import WindowSet, WindowSums
 
     windows = windows_of([flights[0], flights[-1]], 0.2, 2.0)
     free = replace(JOINT, base=FreeNumbers(STATED, blocks, NO_REMAINDER))
     values = free.starts + 0.1 * free.scales
-    gradient = WindowSums(free, windows, values).mean().gradient
+    gradient = WindowSums(free, WindowSet(tuple(windows)), values).mean().gradient
     for place, scale in enumerate(free.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (WindowSums(free, windows, values + sign * step).mean().objective for sign in (1, -1))
+        ahead, behind = (WindowSums(free, WindowSet(tuple(windows)), values + sign * step).mean().objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)
