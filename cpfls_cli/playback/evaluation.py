@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -33,11 +33,12 @@ from cpfls_cli.playback.parameters import (
     unit_wrenches,
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import learned_wrench, rotor_weights
+from cpfls_cli.playback.table import Airflow, learned_wrench, rotor_weights
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, dot
+from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, traced
+from cpfls_cli.vehicle.values import ARRAYS, Each, Functions, Tangent, Value, Vector, dot, times
 
 _TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
@@ -242,59 +243,107 @@ class VehicleAt:
     @cached_property
     def flown(self) -> Flown:
         """The vehicle as runs fly it."""
-        return self._flown(lambda _, value: value, np.zeros((0, 3, 3)))
+        airflow = self.free.airflow
+        key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
+        function, given = traced_wrench(*key), tuple(self.values.tolist())
+        return replace(
+            self._flown(*acting_at(self.free, lambda name: self.get(name, 0.0)), np.zeros((0, 3, 3))),
+            traced=lambda *motion: function(*motion, given),
+        )
 
     @cached_property
     def differentiated(self) -> Flown:
         """The same with the derivatives by all numbers."""
 
-        def number(name: str, value: float) -> Value:
-            place = self.free.index.get(name)
-            return value if place is None else Tangent(value, {MOTION + place: 1.0})
+        def number(name: str) -> Value:
+            return Tangent(self.get(name, 0.0), {MOTION + self.free.index[name]: 1.0})
 
-        return self._flown(number, inertia_derivatives(self))
+        return self._flown(*acting_at(self.free, number), inertia_derivatives(self))
 
-    def _flown(self, number: Callable[[str, float], Value], inertia_by: Array) -> Flown:
-        free, stated = self.free, self.free.vehicle
-        thrust, drag = number(THRUST, self.get(THRUST, 1.0)), number(DRAG, self.get(DRAG, 1.0))
-        hover = scales.hover_speed(stated)
-        numbers = {
-            "linear": number(LAW, self.get(LAW, 0.0)) * hover,
-            "slow_roll_pitch": number(SLOW_SHARES[0], self.get(SLOW_SHARES[0], 0.0)),
-            "slow_yaw": number(SLOW_SHARES[1], self.get(SLOW_SHARES[1], 0.0)),
-        }
+    def _flown(self, acting: tuple[Acting, ...], drag_scale: Value, inertia_by: Array) -> Flown:
+        body = Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
+        vehicle = Vehicle(self.free.vehicle, acting)
+        return Flown(vehicle, body, inertia_by, self.free.index.get(LOG_MASS), drag_scale)
 
-        def rotors(see: Instant, p: Numbers) -> Wrench:
-            return rotor_wrench(see.moved(thrust_scale=thrust, drag_scale=drag), p)
 
-        counted = [number(name, float(value)) for name, value in zip(free.counting, self.log_counted, strict=True)]
+def acting_at(
+    free: FreeNumbers, number: Callable[[str], Value], functions: Functions = ARRAYS
+) -> tuple[tuple[Acting, ...], Value]:
+    """List what acts on a vehicle of free numbers, and the ratio of the drag factors that effects share.
 
-        def coefficient(name: str) -> Value:
-            size = ARRAYS.exp(dot(free.shares[name].tolist(), counted))
-            return number(name, float(self.values[free.index[name]])) * size
+    Parameters
+    ----------
+    number : callable
+        Gives each free number by name, of any kind.
+    """
+    index, hover = free.index, scales.hover_speed(free.vehicle)
 
-        acting = [Acting("rotors", rotors, numbers)]
-        for block in free.effects:
-            known = CATALOGUE[block]
-            assert known.acts is not None, "blocks have it"
-            acts = of_thrust(known.acts) if known.of_all_forces else known.acts
-            own = {each.name.split(".")[1]: coefficient(each.name) for each in free.of_block(block)}
-            acting.append(Acting(block, acts, own))
-        learned = [block for block in free.blocks if block in LEARNED]
-        if learned:
-            values = [coefficient(each.name) for block in learned for each in free.of_block(block)]
-            filled = np.empty(len(values), dtype=object)
-            filled[:] = values
-            remainder = free.remainder(learned, np.zeros(len(values)))
-            shaped = filled.reshape(remainder.coefficients.shape)
-            acting.append(Acting("remainder", learned_wrench(remainder, shaped)))
-        return Flown(
-            Vehicle(stated, tuple(acting)),
-            Body.of(replace(stated, mass_kg=self.mass), self.inertia),
-            inertia_by,
-            free.index.get(LOG_MASS),
-            drag / thrust,
-        )
+    def given(name: str, otherwise: float) -> Value:
+        return number(name) if name in index else otherwise
+
+    thrust, drag = given(THRUST, 1.0), given(DRAG, 1.0)
+    numbers = {
+        "linear": times(given(LAW, 0.0), hover),
+        "slow_roll_pitch": given(SLOW_SHARES[0], 0.0),
+        "slow_yaw": given(SLOW_SHARES[1], 0.0),
+    }
+
+    def rotors(see: Instant, p: Numbers) -> Wrench:
+        return rotor_wrench(see.moved(thrust_scale=thrust, drag_scale=drag), p)
+
+    counted = [given(name, 0.0) for name in free.counting]
+
+    def coefficient(name: str) -> Value:
+        return number(name) * functions.exp(dot(free.shares[name].tolist(), counted))
+
+    acting = [Acting("rotors", rotors, numbers)]
+    for block in free.effects:
+        known = CATALOGUE[block]
+        assert known.acts is not None, "blocks have it"
+        acts = of_thrust(known.acts) if known.of_all_forces else known.acts
+        own = {each.name.split(".")[1]: coefficient(each.name) for each in free.of_block(block)}
+        acting.append(Acting(block, acts, own))
+    learned = [block for block in free.blocks if block in LEARNED]
+    if learned:
+        names = [each.name for block in learned for each in free.of_block(block)]
+        values = np.empty(len(names), dtype=object)
+        values[:] = [coefficient(name) for name in names]
+        remainder = free.remainder(learned, np.zeros(len(names)))
+        acting.append(Acting("remainder", learned_wrench(remainder, values.reshape(remainder.coefficients.shape))))
+    return tuple(acting), drag / thrust
+
+
+@lru_cache(maxsize=256)
+def traced_wrench(
+    vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int
+) -> Callable[..., tuple[Vector, Vector]]:
+    """Make one function of torque and force of vehicles with these numbers.
+
+    It takes air velocity, body rate, speeds, accelerations and slow squares of the rotors, arrays by component, and the
+    values of the numbers.
+    """
+    free, graph, count = (
+        FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)),
+        Graph(),
+        len(vehicle.rotors),
+    )
+    symbols = dict(zip(free.index, graph.inputs("number", len(free.numbers)), strict=True))
+    air, rate = (graph.inputs(name, 3) for name in ("air", "rate"))
+    speed, turning, slow = (graph.inputs(name, len(vehicle.rotors)) for name in ("speed", "turning", "slow"))
+    acting, drag_scale = acting_at(free, symbols.__getitem__, SYMBOLS)
+    see = Instant(
+        vehicle,
+        Each(speed),
+        air_velocity=air,
+        body_rate=rate,
+        rotor_acceleration=Each(turning),
+        slow_square=Each(slow),
+        drag_scale=drag_scale,
+    )
+    arguments = {"air": air, "rate": rate, "speed": speed, "turning": turning, "slow": slow}
+    return traced(
+        graph, {**arguments, "number": (*symbols.values(),)}, Vehicle(vehicle, acting).wrench(see), arrays=True
+    )
 
 
 def inertia_derivatives(at: VehicleAt) -> Array:

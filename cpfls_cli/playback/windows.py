@@ -87,6 +87,9 @@ class Flown:
         Ratio of the drag factors that effects share to those stated.
     turning : Turning or None
         In the place of a constant inertia.
+    traced : callable or None
+        Torque and force of the same vehicle as one function of air velocity, body rate, speeds, accelerations and slow
+        squares, which takes a part of the time.
     """
 
     vehicle: Vehicle
@@ -95,6 +98,7 @@ class Flown:
     log_mass: int | None = None
     drag_scale: Value = 1
     turning: Turning | None = None
+    traced: Callable[[Vector, Vector, Value, Value, Value], tuple[Vector, Vector]] | None = None
 
     @cached_property
     def _at_rest(self) -> Instant:
@@ -107,7 +111,10 @@ class Flown:
 
     def wrench(self, air: Vector, rate: Vector, rotors: Rotors) -> tuple[Vector, Vector]:
         """Compute torque and force, N m and N, body frame, without weight."""
-        torque, force = self.vehicle.wrench(self._instant(air, rate, rotors))
+        if self.traced is None:
+            torque, force = self.vehicle.wrench(self._instant(air, rate, rotors))
+        else:
+            torque, force = self.traced(air, rate, *rotors[:3])
         push = rotors.push
         return (torque, force) if push is None else (add(torque, push[:3]), add(force, push[3:]))
 
@@ -259,12 +266,14 @@ class _Path(NamedTuple):
         return _Path(position, velocity, rotation, rate, stages, self.diverged[part])
 
 
-def exponential(turn: Array) -> tuple[Array, Array]:
+def exponential(turn: Array, *, rotation_alone: bool = False) -> tuple[Array, Array]:
     """Compute rotations ``exp [a]_x`` and their right Jacobians, ``exp [a + d]_x = exp [a]_x exp [J d]_x``.
 
     Parameters
     ----------
     turn : array, shape (3, ...), rad
+    rotation_alone : bool
+        Give the rotations twice, for who needs no Jacobians.
 
     Returns
     -------
@@ -276,37 +285,44 @@ def exponential(turn: Array) -> tuple[Array, Array]:
     angle = np.sqrt(safe)
     first = np.where(small, 1.0 - square / 6.0, np.sin(angle) / angle)
     second = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(angle)) / safe)
+    rotation = _turn(turn, second, 1.0 - second * square, first)
+    if rotation_alone:
+        return rotation, rotation
     third = np.where(small, 1.0 / 6.0 - square / 120.0, (1.0 - first) / safe)
-    pairs = turn[:, None] * turn
-    rotation, right = second * pairs, third * pairs
+    return rotation, _turn(turn, third, 1.0 - third * square, -second)
+
+
+def _turn(turn: Array, pairs: Array, diagonal: Array, skew: Array) -> Array:
+    """Sum ``pairs a a' + diagonal 1 + skew [a]_x``, shape (3, 3, ...)."""
+    out = turn[:, None] * (pairs * turn)
+    across = skew * turn
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        rotation[i, i] += 1.0 - second * square
-        right[i, i] += 1.0 - third * square
-        rotation[k, j] += first * turn[i]
-        rotation[j, k] -= first * turn[i]
-        right[k, j] -= second * turn[i]
-        right[j, k] += second * turn[i]
-    return rotation, right
+        out[i, i] += diagonal
+        out[k, j] += across[i]
+        out[j, k] -= across[i]
+    return np.asarray(out)
 
 
 def _product(first: Array, second: Array) -> Array:
-    """Multiply matrices, shapes (3, k, ...) and (k, n, ...)."""
-    return np.asarray(sum(first[:, k, None] * second[k] for k in range(first.shape[1])))
+    """Multiply matrices, shapes (3, 3, ...)."""
+    return np.asarray(first[:, 0, None] * second[0] + first[:, 1, None] * second[1] + first[:, 2, None] * second[2])
 
 
 def _applied(matrix: Array, vector: Array) -> Array:
-    return np.asarray(sum(matrix[:, k] * vector[k] for k in range(3)))
+    return np.asarray(matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2])
 
 
 def _back(matrix: Array, vector: Array) -> Array:
     """Multiply with the transposed matrix."""
-    return np.asarray(sum(matrix[k] * vector[k] for k in range(3)))
+    return np.asarray(matrix[0] * vector[0] + matrix[1] * vector[1] + matrix[2] * vector[2])
 
 
 def _crossed(first: Array, second: Array) -> Array:
     (a, b, c), (u, v, w) = first, second
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+    out = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    out[0], out[1], out[2] = b * w - c * v, c * u - a * w, a * v - b * u
+    return out
 
 
 def _filled(components: Vector, count: int) -> Array:
@@ -337,7 +353,7 @@ def _moved(
     torque, force = flown.wrench(tuple(_back(here.rotation, here.velocity)), tuple(turned.rate), rotors)
     count = turned.rate.shape[1]
     momentum = start.momentum + interval * (_filled(torque, count) - turned.direct)
-    rotation = _product(start.rotation, exponential(interval * turned.rate)[0])
+    rotation = _product(start.rotation, exponential(interval * turned.rate, rotation_alone=True)[0])
     if not translates:
         return _State(start.position, start.velocity, rotation, momentum)
     acceleration = _applied(here.rotation, _filled(force, count)) / flown.body.mass
@@ -586,7 +602,7 @@ def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates
     parts = (np.moveaxis(each, (0, 1), (-3, -2)) for each in path.stages)
     velocity, rotation, rate = (each.reshape(*each.shape[:-3], -1) for each in parts)
     by = _accelerations_by(flown, velocity, rotation, rate, steps.for_both_stages(), translates)
-    by = by.reshape(2, samples, 6, -1)
+    by = np.moveaxis(by.reshape(6, -1, 2, samples), (2, 3), (0, 1))
     rates = rate.reshape(3, 2, samples)
     first, rest = np.zeros((2, samples, STATES, STATES + numbers))
     second = np.zeros((samples, STATES, STATES))
@@ -595,9 +611,9 @@ def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates
         (by[0], 0.5 * period, first[..., :STATES], first[..., STATES:]),
         (by[1], period, second, rest[..., STATES:]),
     ):
-        for row, component in enumerate(diagonal):
-            into_state[:, component] = half * own[:, row, :STATES]
-            into_number[:, component] = half * own[:, row, STATES:]
+        for rows, components in ((slice(3), slice(3)), (slice(3, 6), slice(6, 9))):
+            np.multiply(half, own[:, rows, :STATES], out=into_state[:, components])
+            np.multiply(half, own[:, rows, STATES:], out=into_number[:, components])
     for stage, interval, by_turn, by_rate in ((0, 0.5 * period, first, first), (1, period, rest, second)):
         turn, right = exponential(interval * rates[:, stage])
         by_turn[:, 3:6, 3:6] = turn.transpose(2, 1, 0)
@@ -611,7 +627,7 @@ def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates
 def _accelerations_by(
     flown: Flown, velocity: Array, rotation: Array, rate: Array, rotors: Rotors, translates: bool
 ) -> Array:
-    """Differentiate accelerations, world and body frame, by state and numbers, shape (samples, 6, STATES + number).
+    """Differentiate accelerations, world and body frame, by state and numbers, shape (6, STATES + number, samples).
 
     ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
     ``I d omega' = dM - d omega x I omega - omega x I d omega``.
@@ -620,35 +636,36 @@ def _accelerations_by(
     seen = [Tangent(own, {place: 1.0}) for place, own in enumerate((*air, *rate))]
     torque, force = flown.wrench(tuple(seen[:3]), tuple(seen[3:]), rotors)
     samples = rate.shape[1]
-    wrench = np.zeros((samples, 6, MOTION + numbers))
+    by = np.zeros((6, STATES + numbers, samples))
+    of_air, places = np.zeros((6, 3, samples)), [*range(6, 9), *range(STATES, STATES + numbers)]
     for row, value in enumerate((*torque, *force)):
         for place, change in value.by.items() if isinstance(value, Tangent) else ():
-            wrench[:, row, place] = change
+            (of_air if place < 3 else by)[row, place if place < 3 else places[place - 3]] = change
     turned, pushed = _filled(torque, samples), _filled(force, samples)
-    by = np.empty((samples, 6, STATES + numbers))
-    by[..., STATES:] = wrench[..., MOTION:]
-    by[..., :6] = wrench[..., :3] @ np.concatenate([rotation.transpose(2, 1, 0), _skew(air)], axis=2)
-    by[..., 6:9] = wrench[..., 3:6]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        by[:, i] = of_air[:, 0] * rotation[i, 0] + of_air[:, 1] * rotation[i, 1] + of_air[:, 2] * rotation[i, 2]
+        by[:, 3 + i] = of_air[:, j] * air[k] - of_air[:, k] * air[j]
     momentum = body.inertia @ rate
-    by[:, :3, 6:9] -= _skew(rate) @ body.inertia - _skew(momentum)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        # - F x dphi
+        by[3 + k, 3 + j] -= pushed[i]
+        by[3 + j, 3 + k] += pushed[i]
+        # - omega x I d omega - d omega x I omega
+        by[i, 6:9] -= rate[j] * body.inertia[k][:, None] - rate[k] * body.inertia[j][:, None]
+        by[k, 6 + j] += momentum[i]
+        by[j, 6 + k] -= momentum[i]
     accelerated = body.inverse @ (turned - _crossed(rate, momentum))
     for place, change in enumerate(flown.inertia_by):
         if change.any():
-            by[:, :3, STATES + place] -= (change @ accelerated + _crossed(rate, change @ rate)).T
-    by[:, 3:, 3:6] -= _skew(pushed)
+            by[:3, STATES + place] -= change @ accelerated + _crossed(rate, change @ rate)
     if flown.log_mass is not None:
-        by[:, 3:, STATES + flown.log_mass] -= pushed.T
-    # Accelerations of the state's order: world, then body.
-    out = np.empty_like(by)
-    out[:, :3] = rotation.transpose(2, 0, 1) @ by[:, 3:] / body.mass if translates else 0.0
-    out[:, 3:] = body.inverse @ by[:, :3]
-    return out
-
-
-def _skew(vectors: Array) -> Array:
-    """Arrange vectors, shape (3, samples), as matrices of their cross product, shape (samples, 3, 3)."""
-    out = np.zeros((vectors.shape[1], 3, 3))
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        out[:, k, j], out[:, j, k] = vectors[i], -vectors[i]
+        by[3:, STATES + flown.log_mass] -= pushed
+    # In the order of the state: world, then body.
+    out = np.zeros_like(by)
+    if translates:
+        for i in range(3):
+            out[i] = (rotation[i, 0] * by[3] + rotation[i, 1] * by[4] + rotation[i, 2] * by[5]) / body.mass
+    out[3:] = (body.inverse @ by[:3].reshape(3, -1)).reshape(3, *by.shape[1:])
     return out

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from cpfls_cli.vehicle.values import Each, Functions, Value, plus
 
 _LONGEST = 160
@@ -157,9 +159,9 @@ SYMBOLS = Functions(
 
 
 def traced(
-    graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]
+    graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]], *, arrays: bool = False
 ) -> Callable[..., Any]:
-    """Make a function of what was recorded.
+    """Make a function of what was recorded, of floats or of arrays.
 
     Parameters
     ----------
@@ -168,12 +170,13 @@ def traced(
     results : sequence of sequence of value
         What it gives: a tuple of tuples.
     """
-    return _compiled(python_source(graph, arguments, results))
+    return _compiled(python_source(graph, arguments, results, ARRAYS if arrays else PYTHON), arrays)
 
 
 @lru_cache(maxsize=32)
-def _compiled(source: str) -> Callable[..., Any]:
-    names: dict[str, Any] = {**_FUNCTIONS, "inf": math.inf, "nan": math.nan}
+def _compiled(source: str, arrays: bool) -> Callable[..., Any]:
+    functions = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, "where")} if arrays else _FUNCTIONS
+    names: dict[str, Any] = {**functions, "inf": math.inf, "nan": math.nan}
     exec(compile(source, "<traced>", "exec"), names)
     return names["step"]  # type: ignore[no-any-return]
 
@@ -203,6 +206,9 @@ class Language(NamedTuple):
 
 _OPERATORS = {name: f"({{}} {name} {{}})" for name in ("+", "-", "*", "/", "<", ">", "**")} | {"negative": "(-{})"}
 PYTHON = Language({"where": "({1} if {0} else {2})"})
+ARRAYS = Language({})
+_NUMPY = {"atan2": "arctan2"}
+"""Functions that NumPy has by another name."""
 C = Language(
     {"where": "({} ? {} : {})", "**": "MATH(pow)({}, {})", "abs": "MATH(fabs)({})"},
     line="const real {} = {};",
@@ -215,10 +221,15 @@ LIBRARY = Language({"sqrt": "_length({})", "atan2": "_direction({}, {})"}, funct
 """JAX or CasADi, by functions of the export that hide which, and have derivatives where there is no airflow."""
 
 
-def python_source(graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]) -> str:
+def python_source(
+    graph: Graph,
+    arguments: Mapping[str, Sequence[Symbol]],
+    results: Sequence[Sequence[Value]],
+    language: Language = PYTHON,
+) -> str:
     """Write what `traced` makes as text: a function called ``step``."""
     flat = [x for group in results for x in group]
-    lines, texts = written(graph, flat, PYTHON)
+    lines, texts = written(graph, flat, language)
     named = {name: [graph.nodes[x.place][1] for x in group] for name, group in arguments.items()}
     unpacked = [f"{', '.join(names)}, = {name}" for name, names in named.items() if names]
     text = iter(texts)
