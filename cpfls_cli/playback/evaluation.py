@@ -322,11 +322,7 @@ def traced_wrench(
     It takes air velocity, body rate, speeds, accelerations and slow squares of the rotors, arrays by component, and the
     values of the numbers.
     """
-    free, graph, count = (
-        FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)),
-        Graph(),
-        len(vehicle.rotors),
-    )
+    free, graph = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)), Graph()
     symbols = dict(zip(free.index, graph.inputs("number", len(free.numbers)), strict=True))
     air, rate = (graph.inputs(name, 3) for name in ("air", "rate"))
     speed, turning, slow = (graph.inputs(name, len(vehicle.rotors)) for name in ("speed", "turning", "slow"))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
-from cpfls_cli.playback.windows import Loss, Runs, Steps, losses_of_runs, sums_of_runs
+from cpfls_cli.playback.windows import MOST_RUNS, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
 
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
 """Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
@@ -327,6 +327,7 @@ class _SideBySide:
 
     places: IntArray
     windows: tuple[FitWindows, ...]
+    _last: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def owner(self) -> IntArray:
@@ -360,12 +361,22 @@ class _SideBySide:
 
     def losses(self, at: VehicleAt) -> Array:
         """Weigh the errors of each run."""
-        return losses_of_runs(at.flown, self.runs, self.steps(at), self.loss)
+        return losses_of(self._legs(at), self.loss)
 
     def sums(self, at: VehicleAt, groups: IntArray) -> tuple[Array, Array]:
         """Sum gradient and Hessian by the numbers, by group of each run."""
-        steps = self.steps(at, at.times)
-        return sums_of_runs(at.differentiated, self.runs, steps, self.loss, groups)
+        return sums_of(self._legs(at), at.differentiated, self.steps(at, at.times), self.loss, groups)
+
+    def _legs(self, at: VehicleAt) -> Iterable[Leg]:
+        """Fly all runs, or give them as last flown where there are not many: derivatives follow the loss."""
+        flown = legs(at.flown, self.runs, self.steps(at))
+        if len(self.owner) > MOST_RUNS:
+            return flown
+        key = (at.free.chosen, at.values.tobytes())
+        if self._last.get("key") != key:
+            self._last.update(key=key, legs=list(flown))
+        found: list[Leg] = self._last["legs"]
+        return found
 
 
 @dataclass(frozen=True)

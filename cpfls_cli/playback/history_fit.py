@@ -25,7 +25,7 @@ from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
-from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs, losses_of_runs, sums_of_runs
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs, legs, losses_of, sums_of
 
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""
@@ -108,7 +108,7 @@ def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWind
     at, found = _vehicle(fitted), []
     for each in _chunks([windows]):
         begun = _Begun.of(at, each, observer.past_s)
-        found.append(losses_of_runs(at.flown, begun.runs, begun.steps(begun.pushed(observer)), each.loss))
+        found.append(losses_of(legs(at.flown, begun.runs, begun.steps(begun.pushed(observer))), each.loss))
     return np.concatenate(found)
 
 
@@ -184,20 +184,18 @@ def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array)
     count = len(values)
     moved = [_observer(values + step, past_s) for step in _STEP * np.eye(count)]
     pushed = [each.pushed(_observer(values, past_s)) for each in begun]
+    flights = [[*legs(at.flown, each.runs, each.steps(push))] for each, push in zip(begun, pushed, strict=True)]
     total = sum(len(each.window.starts) for each in begun)
-    loss = sum(
-        losses_of_runs(at.flown, each.runs, each.steps(push), each.window.loss).sum()
-        for each, push in zip(begun, pushed, strict=True)
-    )
+    loss = sum(losses_of(own, each.window.loss).sum() for own, each in zip(flights, begun, strict=True))
 
     def derivatives() -> tuple[Array, Array]:
         gradient, hessian = np.zeros(count), np.zeros((count, count))
-        flown = replace(at.flown, inertia_by=np.zeros((count, 3, 3)))
-        for each, push in zip(begun, pushed, strict=True):
+        flown = replace(at.flown, inertia_by=np.zeros((count, 3, 3)), traced=None)
+        for each, own, push in zip(begun, flights, pushed, strict=True):
             by = {place: (each.pushed(observer) - push) / _STEP for place, observer in enumerate(moved)}
             group = np.zeros(len(each.window.starts), dtype=np.int64)
-            own = sums_of_runs(flown, each.runs, each.steps(push, by), each.window.loss, group)
-            gradient, hessian = gradient + own[0][0], hessian + own[1][0]
+            sums = sums_of(own, flown, each.steps(push, by), each.window.loss, group)
+            gradient, hessian = gradient + sums[0][0], hessian + sums[1][0]
         return gradient / total, hessian / total
 
     believed = Believed(_FIRST.ravel(), np.ones(count), np.full(count, _SPREAD))

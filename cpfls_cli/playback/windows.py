@@ -11,9 +11,10 @@ with derivatives at all states that the runs passed, which are then composed ste
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, Vector, add, zero
 _SAMPLES = 4_000
 """States at a time of which derivatives are taken, so that they stay in the cache."""
 
-_RUNS = 1_200
+MOST_RUNS = 1_200
 """Runs side by side."""
 
 MOTION = 6
@@ -507,17 +508,37 @@ def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntAr
     diverged : array of int, shape (run,)
         Step at which a run diverged; -1 for those that did not.
     """
-    found = [(own.fly(flown, part), own) for _, own, part in runs.blocks(steps, _RUNS)]
+    found = [(own.fly(flown, part), own) for _, own, part in runs.blocks(steps, MOST_RUNS)]
     errors = [own.errors(path).transpose(3, 1, 0, 2) for path, own in found]
     return np.concatenate(errors), np.concatenate([path.diverged for path, _ in found])
 
 
-def losses_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss) -> Array:
+class Leg(NamedTuple):
+    """Some of the runs, flown.
+
+    Attributes
+    ----------
+    part : slice
+        Which of all they are.
+    """
+
+    part: slice
+    runs: Runs
+    path: _Path
+
+
+def legs(flown: Flown, runs: Runs, steps: Steps) -> Iterator[Leg]:
+    """Fly runs, some at a time."""
+    for part, own, of_steps in runs.blocks(steps, MOST_RUNS):
+        yield Leg(part, own, own.fly(flown, of_steps, stages=True))
+
+
+def losses_of(flown: Iterable[Leg], loss: Loss) -> Array:
     """Weigh the errors of runs, shape (run,)."""
     found = []
-    for some, own, part in runs.blocks(steps, _RUNS):
-        path, weighed = own.fly(flown, part), loss.of_runs(some)
-        found.append(_lost(path.diverged, weighed, weighed.of(_squares(own.errors(path)))).sum(axis=(0, 1)))
+    for part, runs, path in flown:
+        weighed = loss.of_runs(part)
+        found.append(_lost(path.diverged, weighed, weighed.of(_squares(runs.errors(path)))).sum(axis=(0, 1)))
     return np.concatenate(found)
 
 
@@ -538,7 +559,7 @@ def _gone(diverged: IntArray, horizon: int) -> BoolArray:
     return np.asarray((diverged >= 0) & (np.arange(horizon)[:, None] >= diverged))
 
 
-def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
+def sums_of(legs: Iterable[Leg], flown: Flown, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
     """Sum the gradient and the Gauss-Newton Hessian of the loss of runs by the numbers.
 
     The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
@@ -546,6 +567,8 @@ def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntA
 
     Parameters
     ----------
+    flown : Flown
+        That flew them, with derivatives.
     group : array of int, shape (run,)
         Which sum a run is added to.
 
@@ -556,25 +579,40 @@ def sums_of_runs(flown: Flown, runs: Runs, steps: Steps, loss: Loss, group: IntA
     """
     numbers, groups, horizon = len(flown.inertia_by), int(group.max(initial=0)) + 1, len(loss.weight)
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
-    for part, own, of_steps in runs.blocks(steps, _RUNS) if numbers else ():
-        path = own.fly(flown, of_steps, stages=True)
-        errors = own.errors(path)[1:]
-        weight, delta = (each[:, 1:] for each in loss.of_runs(part))
-        share = np.sqrt(weight / np.sqrt(1.0 + _squares(errors) / delta**2))
-        share[np.broadcast_to(_gone(path.diverged, horizon)[:, None], share.shape)] = 0.0
-        # By run, step and component.
-        shares = np.repeat(share.transpose(2, 0, 1), 3, axis=2)
-        residual = shares * errors.transpose(3, 1, 0, 2).reshape(-1, horizon, STATES)
-        for some in _slices(len(own.starts), max(1, _SAMPLES // (2 * horizon))):
-            rows = _tangents(flown, path.of_runs(some), of_steps.of_runs(some), own.motion.period, own.translates)
-            rows *= shares[some, :, :, None]
-            owners = group[part][some]
-            ends = [0, *(np.flatnonzero(np.diff(owners)) + 1).tolist(), len(owners)]
-            for kept in map(slice, ends[:-1], ends[1:]):
-                jacobian, place = rows[kept].reshape(-1, numbers), owners[kept.start]
-                gradient[place] += residual[some][kept].reshape(-1) @ jacobian
-                hessian[place] += jacobian.T @ jacobian
+    for leg in legs if numbers else ():
+        shares, residual = _shares(leg, loss.of_runs(leg.part))
+        found = partial(_products, leg, flown, steps.of_runs(leg.part), shares, residual, group[leg.part])
+        # NumPy lets go of Python for most of it.
+        with ThreadPoolExecutor(2) as threads:
+            for products in threads.map(found, _slices(len(leg.runs.starts), max(1, _SAMPLES // (2 * horizon)))):
+                for place, by_number, square in products:
+                    gradient[place] += by_number
+                    hessian[place] += square
     return gradient, hessian
+
+
+def _products(
+    leg: Leg, flown: Flown, steps: Steps, shares: Array, residual: Array, group: IntArray, some: slice
+) -> list[tuple[int, Array, Array]]:
+    """Multiply rows of the Jacobian of some runs with each other, by group."""
+    rows = _tangents(flown, leg, steps, some)
+    rows *= shares[some, :, :, None]
+    own, found = group[some], []
+    ends = [0, *(np.flatnonzero(np.diff(own)) + 1).tolist(), len(own)]
+    for kept in map(slice, ends[:-1], ends[1:]):
+        jacobian = rows[kept].reshape(-1, rows.shape[-1])
+        product = residual[some][kept].reshape(-1) @ jacobian
+        found.append((int(own[kept.start]), product, np.asarray(jacobian.T @ jacobian)))
+    return found
+
+
+def _shares(leg: Leg, loss: Loss) -> tuple[Array, Array]:
+    """Give by what rows of the Jacobian are multiplied, and what they come to, shapes (run, step, STATES)."""
+    errors, (weight, delta) = leg.runs.errors(leg.path)[1:], (each[:, 1:] for each in loss)
+    share = np.sqrt(weight / np.sqrt(1.0 + _squares(errors) / delta**2))
+    share[np.broadcast_to(_gone(leg.path.diverged, len(share))[:, None], share.shape)] = 0.0
+    shares = np.repeat(share.transpose(2, 0, 1), 3, axis=2)
+    return shares, shares * errors.transpose(3, 1, 0, 2).reshape(shares.shape)
 
 
 def _slices(count: int, most: int) -> Iterator[slice]:
@@ -582,9 +620,10 @@ def _slices(count: int, most: int) -> Iterator[slice]:
         yield slice(first, min(first + most, count))
 
 
-def _tangents(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
-    """Compose the derivatives of the states by the numbers, shape (run, step, STATES, number)."""
-    moved = _steps_by(flown, path, steps, period, translates)
+def _tangents(flown: Flown, leg: Leg, steps: Steps, some: slice) -> Array:
+    """Compose the derivatives of the states of some runs by the numbers, shape (run, step, STATES, number)."""
+    path = leg.path.of_runs(some)
+    moved = _steps_by(flown, path, steps.of_runs(some), leg.runs.motion.period, leg.runs.translates)
     horizon, count, _, width = moved.shape
     changes, change = np.empty((count, horizon, STATES, width - STATES)), np.zeros((count, STATES, width - STATES))
     with np.errstate(all="ignore"):
