@@ -14,8 +14,6 @@ import numpy as np
 
 from cpfls_cli.vehicle.values import Each, Functions, Value, plus
 
-_LONGEST = 160
-"""Characters of an expression, beyond which it gets a line of its own."""
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
     "exp": math.exp,
@@ -190,6 +188,8 @@ class Language(NamedTuple):
         By the name of what is no function of the same name.
     line, number, function, comment : str
         A statement with a name and an expression, a number, a function with its name, a remark.
+    longest : int
+        Characters of an expression, beyond which it gets a line of its own.
     """
 
     operations: Mapping[str, str]
@@ -197,6 +197,7 @@ class Language(NamedTuple):
     number: str = "({!r})"
     function: str = "{}"
     comment: str = "# {}"
+    longest: int = 160
 
     def written(self, name: str, arguments: Sequence[str]) -> str:
         """Write an operation."""
@@ -215,9 +216,10 @@ C = Language(
     number="R({!r})",
     function="MATH({})",
     comment="/* {} */",
+    longest=80,
 )
 """With the macros of the export: ``R`` of a number, ``MATH`` of a function."""
-LIBRARY = Language({"sqrt": "_length({})", "atan2": "_direction({}, {})"}, function="_{}")
+LIBRARY = Language({"sqrt": "_length({})", "atan2": "_direction({}, {})"}, function="_{}", longest=80)
 """JAX or CasADi, by functions of the export that hide which, and have derivatives where there is no airflow."""
 
 
@@ -260,7 +262,7 @@ def written(
             text[place] = inner[0] if name == "input" else language.number.format(inner[0])
             continue
         text[place] = language.written(name, [text[each] for each in inner])
-        if uses[place] > 1 or len(text[place]) > _LONGEST:
+        if uses[place] > 1 or len(text[place]) > language.longest:
             lines += [language.comment.format(said)] if said else []
             lines.append(language.line.format(f"t{place}", text[place]))
             text[place], said = f"t{place}", ""
