@@ -97,7 +97,5 @@ def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks)
     for place, scale in enumerate(free.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (
-            WindowSums(free, windows, values + sign * step).mean().objective for sign in (1, -1)
-        )
+        ahead, behind = (WindowSums(free, windows, values + sign * step).mean().objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)
