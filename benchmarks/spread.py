@@ -43,7 +43,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.lack import Lack
-from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.spread import Estimates, drawn
@@ -132,7 +132,7 @@ def fleet(
     """Export a vehicle once, and take the samples as they are."""
     sheet = sheet_of_vehicle(replace(nominal, gusts=None))
     module = executed(exported(sheet, "jax", "v.py").text)
-    none, parts, count = Gusts(np.zeros(6), np.ones(6)), tuple(one.name for one in acting_of(nominal)), len(models)
+    none, parts, count = Gusts(np.zeros(6), np.ones(6)), tuple(one.name for one in nominal.parts), len(models)
     gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
     share, rest, memory = np.zeros((len(parts), 6)), np.zeros(6), np.ones(6)
     if lack is not None:

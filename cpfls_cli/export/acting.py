@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
-from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.motion import Acting, Instant, about_centre
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, Language, Symbol, used, written
@@ -61,7 +61,7 @@ def parts_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> d
     motion = (tuple(air.T), tuple(rate.T), speed, turning, slow + square)
     return {
         name: np.stack([np.broadcast_to(np.asarray(x, dtype=float), len(air)) for x in wrench], axis=1)
-        for name, wrench in parts_of(acting_of(model), model.vehicle, motion, ARRAYS)
+        for name, wrench in parts_of(model.parts, model.vehicle, motion, ARRAYS)
     }
 
 
@@ -77,7 +77,7 @@ def numbers_of(model: VehicleModel) -> dict[str, float]:
         for place, rotor in enumerate(model.vehicle.rotors, 1)
         for name, (field, _) in _FACTORS.items()
     }
-    found |= {f"{one.name}_{name}": float(value) for one in acting_of(model) for name, value in one.numbers.items()}
+    found |= {f"{one.name}_{name}": float(value) for one in model.parts for name, value in one.numbers.items()}
     learned = () if model.remainder is None else np.ravel(model.remainder.coefficients).tolist()
     return found | {LEARNED.format(place): value for place, value in enumerate(learned)}
 
@@ -150,9 +150,7 @@ def traced_wrench(model: VehicleModel, *, shares: bool = False) -> Traced:
         learned = [named(LEARNED.format(place)) for place in range(model.remainder.coefficients.size)]
         symbols = np.array(learned, dtype=object).reshape(shape)
         model = replace(model, remainder=replace(model.remainder, coefficients=symbols))
-    acting = [
-        replace(one, numbers={name: number(f"{one.name}_{name}") for name in one.numbers}) for one in acting_of(model)
-    ]
+    acting = [replace(one, numbers={name: number(f"{one.name}_{name}") for name in one.numbers}) for one in model.parts]
     total: Vector = (0,) * 6
     places = {len(graph.nodes): "rotors"}
     for name, wrench in parts_of(acting, _by_name(model.vehicle, named), motion):

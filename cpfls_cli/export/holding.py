@@ -20,7 +20,7 @@ from cpfls_cli.export.numbers import Numbers
 from cpfls_cli.export.polynomials import motion_terms, weights_of, weights_of_model
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.model import VehicleModel, acting_of, turning_by_attitude
+from cpfls_cli.playback.model import VehicleModel, turning_by_attitude
 from cpfls_cli.playback.motion import Body, MeasuredMotion
 from cpfls_cli.playback.player import in_the_air, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
@@ -149,7 +149,7 @@ class Held:
     @classmethod
     def whole(cls, model: VehicleModel) -> Self:
         """Hold everything."""
-        acting = acting_of(model)
+        acting = model.parts
         parts = weights_of(acting, model.vehicle)
         others = tuple(one for one in acting if one.name not in parts)
         levers = tuple(one for one in acting if one.of_all_forces)
@@ -283,8 +283,8 @@ def _left(model: VehicleModel, whole: Held, holds: Holds) -> Iterator[tuple[str,
     rotors = model.rotors
     columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
     columns[_SLOW] = slice(1 + 3 * rotors, None)
-    parts = weights_of(acting_of(model), model.vehicle)
-    for name in (one.name for one in acting_of(model)):
+    parts = weights_of(model.parts, model.vehicle)
+    for name in (one.name for one in model.parts):
         title = CATALOGUE[name].title if name in CATALOGUE else _LEARNED
         if name == "rotors":
             pieces = {title: np.zeros_like(whole.weights) for title in columns}

@@ -15,7 +15,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.acting import parts_of
-from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS
@@ -171,7 +171,7 @@ _MOVING = {each for factors in TERMS for each in factors}
 
 def weights_of_model(model: VehicleModel) -> Array:
     """Weigh the terms of all that is a sum of weights, shape (6, terms, 1 + 4 rotors)."""
-    return np.asarray(sum(weights_of(acting_of(model), model.vehicle).values()))
+    return np.asarray(sum(weights_of(model.parts, model.vehicle).values()))
 
 
 def motion_terms(air: Array, rate: Array) -> Array:

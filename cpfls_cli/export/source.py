@@ -18,7 +18,7 @@ from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, Reference
 from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
-from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.vehicle.tracing import LIBRARY, C
 
@@ -168,7 +168,7 @@ def _learned(model: VehicleModel) -> list[float]:
 
 
 def _shares(sheet: Sheet) -> list[str]:
-    return [one.name for one in acting_of(sheet.model)]
+    return [one.name for one in sheet.model.parts]
 
 
 def _named(sheet: Sheet, model: VehicleModel, parts: Sequence[str] | None = None) -> Iterator[tuple[str, float]]:

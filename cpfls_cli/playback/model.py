@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
@@ -31,11 +31,13 @@ from cpfls_cli.playback.table import (
     wrench_of_numbers,
 )
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
-from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.motion import Acting, Acts, Vehicle, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Tangent, Vector
+
+if TYPE_CHECKING:
+    from cpfls_cli.regressor.regressor import InertiaValues
 
 
 class ModelEffect(NamedTuple):
@@ -148,6 +150,26 @@ class VehicleModel:
     def rotors(self) -> int:
         """Number of rotors."""
         return len(self.vehicle.rotors)
+
+    @property
+    def parts(self) -> tuple[Acting, ...]:
+        """What acts on it in any state: rotors, effects, and what is learned."""
+        response = self.response
+        numbers = {
+            "linear": self.thrust_linear * scales.hover_speed(self.vehicle),
+            "slow_roll_pitch": response.slow_roll_pitch,
+            "slow_yaw": response.slow_yaw,
+        }
+        parts = [Acting("rotors", rotor_wrench, numbers)]
+        for one in self.effects:
+            if one.name not in self.beside_table:
+                acts, known = one.known.acts, one.known
+                assert acts is not None, "what is simulated with the state has it"
+                own = of_thrust(acts) if known.of_all_forces and not one.is_lever else acts
+                parts.append(Acting(one.name, own, one.values, one.is_lever))
+        if self.remainder is not None:
+            parts.append(Acting("remainder", learned_wrench(self.remainder)))
+        return tuple(parts)
 
     @property
     def along(self) -> tuple[ModelEffect, ...]:
@@ -293,7 +315,7 @@ class VehicleModel:
     def flown(self) -> Flown:
         """The vehicle as runs fly it."""
         turning = None if self.fuzzy is None else turning_by_attitude(self.fuzzy)
-        return Flown(Vehicle(self.vehicle, acting_of(self)), self.body, turning=turning)
+        return Flown(Vehicle(self.vehicle, self.parts), self.body, turning=turning)
 
     @cached_property
     def feels_air(self) -> bool:
@@ -325,28 +347,6 @@ class VehicleModel:
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
         return Body.of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
-
-
-def acting_of(model: VehicleModel) -> tuple[Acting, ...]:
-    """List what acts on a model in any state: rotors, effects, and what is learned."""
-    response, vehicle = model.response, model.vehicle
-    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
-    hover = float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift))
-    numbers = {
-        "linear": model.thrust_linear * hover,
-        "slow_roll_pitch": response.slow_roll_pitch,
-        "slow_yaw": response.slow_yaw,
-    }
-    parts = [Acting("rotors", rotor_wrench, numbers)]
-    for one in model.effects:
-        if one.name not in model.beside_table:
-            acts, known = one.known.acts, one.known
-            assert acts is not None, "what is held has it"
-            own = of_thrust(acts) if known.of_all_forces and not one.is_lever else acts
-            parts.append(Acting(one.name, own, one.values, one.is_lever))
-    if model.remainder is not None:
-        parts.append(Acting("remainder", learned_wrench(model.remainder)))
-    return tuple(parts)
 
 
 def of_thrust(lever: Acts) -> Acts:

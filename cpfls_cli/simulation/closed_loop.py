@@ -13,7 +13,6 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.model import acting_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
 from cpfls_cli.simulation.autopilot import Autopilot, PlanPilot, plan_of
@@ -191,7 +190,7 @@ class Loop:
         instant = self.vehicle.instant(middle, rotors.speed, rotors.acceleration, rotors.slow)
         push = given["push"] or None
         if self.lacking is not None:
-            lacking = self.lacking.at(given["unit"], wrench_by_part(acting_of(self.lacking.model), _evenly(instant)))
+            lacking = self.lacking.at(given["unit"], wrench_by_part(self.lacking.model.parts, _evenly(instant)))
             push = lacking if push is None else add(push, lacking)
         turning = given_turning(given["turning"]) if given["turning"] else None
         now = self.vehicle.derivative(instant, middle, push, turning)

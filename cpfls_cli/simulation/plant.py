@@ -10,7 +10,6 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.model import acting_of
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.motion import (
     ATTITUDE,
@@ -37,7 +36,7 @@ TURNING_NUMBERS = 12
 def flown_vehicle(vehicle: VehicleSettings, model: VehicleModel | None, effects: SimulatedEffects) -> Vehicle:
     """Set up a vehicle, or the model in its place, with effects on top of those of the model."""
     flown = vehicle if model is None else model.vehicle
-    own = (Acting("rotors", rotor_wrench),) if model is None else acting_of(model)
+    own = (Acting("rotors", rotor_wrench),) if model is None else model.parts
     winds = [one.effect.air(one.values) for one in effects.listed if one.effect.air is not None]
     return Vehicle(
         flown,

@@ -90,10 +90,11 @@ def test_what_the_model_lacks_is_in_the_file_with_the_parameters_of_its_parts(cp
         assert arrays["lack_part"].tolist() == ["rotors", "linear_damping"]
         assert arrays["lack_share"].tolist() == [[0.3] * 3 + [0.0] * 3, [0.2] * 3 + [0.0] * 3]
         assert arrays["gust_torque_white_n_m_sqrt_s"].min() > 0
-        # Each weight is that of one part: side by side they are the estimate.
+        # Each part is the whole vehicle with the shares of the others at 0: side by side they are the estimate.
         rotors, damping = arrays["lack_parameters"]
         apart = rotors != damping
-        assert apart.sum() > 12
+        assert apart.sum() == 2
+        assert (rotors + damping)[apart].tolist() == [1.0, 1.0]
         assert not (rotors * damping)[apart].any()
         facts = {name: arrays[f"lack_{name}"].tolist() for name in ("rest", "memory_s")}
     document = json.loads(written(cpfls, vehicle, "json")[1].read_text())["lack"]

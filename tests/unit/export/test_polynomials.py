@@ -6,7 +6,6 @@ import pytest
 from cpfls_cli.export.acting import parts_along
 from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.polynomials import NoPolynomialError, Polynomial, motion_terms, weights_of
-from cpfls_cli.playback.model import acting_of
 from tests.builders.vehicle_models import HEXA, QUAD, whole
 
 
@@ -14,7 +13,7 @@ from tests.builders.vehicle_models import HEXA, QUAD, whole
 def test_weights_are_those_of_the_parts(vehicle):
     model = whole(vehicle)
     points = reference_points(model, np.random.default_rng(2), 40)
-    weights = weights_of(acting_of(model), vehicle)
+    weights = weights_of(model.parts, vehicle)
     parts = parts_along(model, points.air, points.rate, points.rotor)
     assert [*parts] == [*weights, "remainder"]
     terms = motion_terms(points.air, points.rate)

@@ -16,7 +16,7 @@ from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, made_ready, player_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders import vehicle_models
@@ -86,7 +86,7 @@ def test_what_is_not_simulated_with_the_state_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
     assert whole.beside_table == ("battery_sag", "wind")
-    assert [each.name for each in acting_of(whole)] == ["rotors", "torque_bias"]
+    assert [each.name for each in whole.parts] == ["rotors", "torque_bias"]
 
 
 def test_height_of_the_mass_and_wind_are_those_of_the_effects():

@@ -5,7 +5,6 @@ import pytest
 
 from cpfls_cli.estimation.whittle import GaussMarkov
 from cpfls_cli.playback.lack import Lack, lack_of
-from cpfls_cli.playback.model import acting_of
 from tests.builders.playback_flights import truth
 
 PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
@@ -65,7 +64,7 @@ def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     model, nothing = truth(), [np.nan] * 3
     share = np.array([[0.3, 0.1, 0.2], [0.0, 2.0, 0.4], [0.1, 0.0, 0.0], *[nothing] * 3])
     lack = Lack(
-        tuple(one.name for one in acting_of(model))[:3],
+        tuple(one.name for one in model.parts)[:3],
         share,
         np.array([0.01, 0.02, 0.0, *nothing]),
         np.array([0.5, 0.1, 2, *nothing]),
