@@ -6,22 +6,17 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
-from typing import Any
 
 from markupsafe import Markup
 
 from cpfls_cli import page
-from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
-from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
-from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
-from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks
+from cpfls_cli.pages.comparison import compared_vehicles_section
+from cpfls_cli.pages.identification import WORDS
+from cpfls_cli.pages.identified_figures import COMPARED
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
-from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.uncertainty import uncertainty_blocks
+from cpfls_cli.pages.source import Sources
+from cpfls_cli.pages.summary import summary_section
+from cpfls_cli.report.canvas import pictures
 from cpfls_cli.report.content import (
     Block,
     Box,
@@ -43,29 +38,17 @@ from cpfls_cli.report.source import Document
 from cpfls_cli.stage import stage_named
 
 
-def _of_each(
-    name: str,
-    title: str,
-    given: Callable[[Sources], Sequence[Source[Any]]],
-    blocks: Callable[..., Iterable[Block]],
-    *,
-    holds: Callable[[Any], object] = lambda _: True,
-    among: bool = False,
-) -> Callable[[Sources], Section | None]:
-    """Make a section of all artifacts of one kind, or of those that hold what it shows, each numbered from 1.
-
-    Parameters
-    ----------
-    blocks : callable
-        What is shown of an artifact with its number and, if it has to know what is shown beside it, of all.
-    """
-
-    def section(sources: Sources) -> Section | None:
-        shown, others = [source for source in given(sources) if holds(source.record)], [sources] if among else []
-        parts = (blocks(source, number, *others) for number, source in enumerate(shown, start=1))
-        return Section(name, title, [block for part in parts for block in part]) if shown else None
-
-    return section
+def _compared_models(sources: Sources) -> Section | None:
+    """Compare identified models with each other; None for fewer than two."""
+    models = sources.models
+    if len(models) < 2:
+        return None
+    text = page.words("identify_compared", models, added=WORDS)
+    return Section(
+        "comparison",
+        "The models side by side",
+        page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-"),
+    )
 
 
 def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
@@ -83,12 +66,10 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
 
 
 _HASH_SHOWN = 12
-_MODELS = attrgetter("models")
 _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     summary_section,
-    comparison_section,
-    models_section,
-    _of_each("model", "What the model is", _MODELS, model_blocks, among=True),
+    _compared_models,
+    _of_stage("identify"),
     _of_stage("diagnose"),
     _of_stage("extend"),
     compared_vehicles_section,
@@ -99,20 +80,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("simulate"),
     _of_stage("import"),
     _of_stage("reduce"),
-    identification_section,
-    _of_each("validation", "How far to trust it", _MODELS, validation_blocks),
-    _of_each("residuals", "What the model leaves unexplained", _MODELS, residual_blocks, holds=attrgetter("residuals")),
-    _of_each(
-        "uncertainty",
-        "How sure the inertia is",
-        _MODELS,
-        uncertainty_blocks,
-        holds=lambda record: record.uncertainty or record.curves,
-    ),
-    _of_each("steps", "Prediction by horizon", _MODELS, steps_blocks, holds=attrgetter("steps")),
     _of_stage("sweep"),
-    _of_each("search", "Search", _MODELS, search_blocks),
-    _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_stage("predict"),
     _of_stage("twin"),
     _of_stage("response"),
@@ -121,7 +89,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("trend"),
     _of_stage("changed"),
     _of_stage("_flight_numbers"),
-    _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )
 
