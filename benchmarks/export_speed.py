@@ -13,12 +13,15 @@ import numpy as np
 from benchmarks.shared.measure import in_turn, program, table
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
+from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.source import c_source
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.exported_models import sheet_of
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.vehicle_models import HEXA, whole
 
 BATCH, PASSES, SINGLES = 4096, 50, 50
 BUDGET_NS = 10_000
@@ -44,6 +47,30 @@ void torque(const m_real *in, long n, m_real *sink) {
 }
 """
 
+VEHICLE_LOOPS = """
+#include "m.h"
+#include <string.h>
+enum { COLUMNS = 24 + M_ROTOR_TERMS };
+void wrench(const m_real *in, long n, m_real *sink) {
+    m_real t[3], f[3];
+    for (long i = 0; i < n; ++i, in += COLUMNS) { m_wrench(in, in + 3, in + 24, t, f); *sink += t[0] + f[2]; }
+}
+void step(const m_real *in, long n, m_real *sink) {
+    m_state s;
+    for (long i = 0; i < n; ++i, in += COLUMNS) {
+        memcpy(&s, in + 6, sizeof s);
+        m_step(&s, in + 24, 0.01);
+        *sink += s.rate[0];
+    }
+}
+"""
+VEHICLES = {
+    "rotors alone": whole(effects=(), remainder=None),
+    "all effects": whole(remainder=None),
+    "all effects, learned part": whole(),
+    "all effects, learned part, six rotors": whole(HEXA, order=0),
+}
+
 
 def main() -> None:
     rows, sizes = [], []
@@ -62,6 +89,26 @@ def main() -> None:
     print("\nWhat is stored:\n")
     columns = "structure | parameters | tables, bytes | the same, float | object file, bytes"
     table("export_size", columns, sizes)
+    print("\nA whole vehicle in C, one evaluation:\n")
+    table("export_vehicle_speed", "vehicle | torque and force, ns | step, ns | lines", map(vehicle_row, VEHICLES))
+
+
+def vehicle_row(name: str) -> tuple[str, float, float, int]:
+    """Time torque and force, and a step, of an exported vehicle, at states at random."""
+    model, rng = VEHICLES[name], np.random.default_rng(1)
+    points, still = reference_points(model, rng, BATCH), np.tile(np.eye(3).ravel(), (BATCH, 1))
+    motion = rng.normal(0.0, 1.0, (BATCH, 9))
+    states = np.hstack([points.air, points.rate, motion[:, :6], still, motion[:, 6:], points.rotor])
+    with tempfile.TemporaryDirectory() as folder:
+        source = c_source(sheet_of_vehicle(model, name="m"), "m")
+        (Path(folder) / "m.c").write_text(source.source)
+        (Path(folder) / "m.h").write_text(source.header)
+        (Path(folder) / "loops.c").write_text(VEHICLE_LOOPS)
+        gcc("-shared", "-fPIC", Path(folder) / "m.c", Path(folder) / "loops.c", "-lm", "-o", Path(folder) / "m.so")
+        calls = [compiled(Path(folder) / "m.so", call, states) for call in ("wrench", "step")]
+        found = in_turn(calls[1], calls[0])
+    lines = len(source.source.splitlines())
+    return name, *(1e9 * each / (PASSES * BATCH) for each in (found.fast_s, found.slow_s)), lines
 
 
 def random_model(settings: StructureSettings) -> InertiaFunctions:

@@ -125,15 +125,15 @@ def rows_of_repeats(training: Sequence[PlaybackFlight]) -> Iterator[list[object]
             yield [name, len(flown), *["not identified"] * 5]
             continue
         moments = [number for number in found_numbers(found.fitted, found.spread) if number.name in MOMENTS]
-        bands = [hz for hz, used in zip(found.explained.bands_hz, found.explained.used, strict=True) if used]
+        used, bands = found.used, [band for band in found.used.bands if band.used]
         values = [
             f"{1e5 * each.value:.2f} ({1e5 * each.low:.2f} to {1e5 * each.high:.2f})"
             if each.determined
             else f"{1e5 * each.value:.2f}, not determined"
             for each in moments
         ]
-        explained = [f"{found.explained.total[axis]:.2f} ± {found.explained.error[axis]:.2f}" for axis in range(2)]
-        yield [name, len(flown), *values, f"{bands[-1][0]:g} to {bands[0][1]:g}", *explained]
+        explained = [f"{used.explained[axis]:.2f} ± {used.explained_error[axis]:.2f}" for axis in range(2)]
+        yield [name, len(flown), *values, f"{bands[-1].low_hz:g} to {bands[0].high_hz:g}", *explained]
 
 
 def rows_of(name: str, test: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> list[list[object]]:

@@ -43,7 +43,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.lack import Lack
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, acting_of
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.spread import Estimates, drawn
@@ -81,7 +81,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     given = instruments(flights)
     constants = find_constants(vehicle, flights, given, PlaybackSettings().leave_out)
     assert constants is not None
-    assert constants.tells, "instruments tell the body of these flights"
+    assert constants.identified, "instruments identify the body of these flights"
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
@@ -132,7 +132,7 @@ def fleet(
     """Export a vehicle once, and take the samples as they are."""
     sheet = sheet_of_vehicle(replace(nominal, gusts=None))
     module = executed(exported(sheet, "jax", "v.py").text)
-    none, parts, count = Gusts(np.zeros(6), np.ones(6)), tuple(nominal.parts), len(models)
+    none, parts, count = Gusts(np.zeros(6), np.ones(6)), tuple(one.name for one in acting_of(nominal)), len(models)
     gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
     share, rest, memory = np.zeros((len(parts), 6)), np.zeros(6), np.ones(6)
     if lack is not None:
@@ -377,7 +377,7 @@ def law_of(model: VehicleModel, given: Instruments) -> Law:
     """
     before, after = [], []
     for number, run in enumerate(given.flown):
-        for other, place in given.repeats.beside[number].items():
+        for other, place in given.repeats.places[number].items():
             known = np.isfinite(place)
             there = known[1:] & known[:-1]
             rows = np.hstack([answers(model, run.speed), states(run)]) - given.repeats.at(

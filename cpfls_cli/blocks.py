@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 FEWEST_BLOCKS = 4
-"""That tell an error, if a wide one: Student's t of three is 4.3."""
+"""That give an error, if a wide one: Student's t of three is 4.3."""
 
 _CONFIDENCE = 0.975
 """Two-sided 95 %."""
 
 
+BLOCK_S = 4.0
+"""Length of blocks: longer than what noise, gusts and motion remember."""
+
+
+def block_length(seconds: float, longest: float = BLOCK_S, shortest: float = 2.0, wanted: int = 9) -> float:
+    """Choose how long the blocks of so many seconds are, s: of short flights they are shorter, so that some remain."""
+    return min(longest, max(seconds / wanted, shortest))
+
+
 def contiguous(samples: int, blocks: int) -> IntArray:
     """Cut samples into blocks of about equal length: the number of the block of each, shape (samples,)."""
     return np.arange(samples, dtype=np.int64) * blocks // max(samples, 1)
+
+
+def leaving_out(compute: Callable[[BoolArray], Array], samples: int, blocks: int) -> tuple[Array, Array]:
+    """Compute numbers from the samples that are kept: from all, and without each of so many contiguous blocks."""
+    block = contiguous(samples, blocks)
+    without = [compute(np.asarray(block != number)) for number in range(blocks)]
+    return compute(np.ones(samples, dtype=bool)), np.array(without)
 
 
 def jackknife_covariance(left_out: Array) -> Array:
@@ -51,7 +69,7 @@ def mean_error(values: Array) -> Array:
 
 
 def half_width(error: Array, blocks: int | IntArray, confidence: float = _CONFIDENCE) -> Array:
-    """Compute half of an interval, 95 % two-sided, from a standard error that so many blocks tell, by Student's t.
+    """Compute half of an interval, 95 % two-sided, from a standard error of so many blocks, by Student's t.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.filters import recursion
 
 Between = Literal["cubic", "linear", "previous"]
@@ -63,6 +63,30 @@ def delayed(values: Numbers, steps: Any, between: Between = "cubic") -> Numbers:
     moved[: max(whole + (steps != whole), 0)] = values[0]
     moved[max(length + whole, 0) :] = values[-1]
     return moved
+
+
+def best_delay(delays: Array, misfit: Array) -> tuple[Array, BoolArray]:
+    """Find the delays of the least misfit, between those that were tried by a parabola.
+
+    Parameters
+    ----------
+    delays : array, shape (delay,)
+        Evenly spaced.
+    misfit : array, shape (delay, ...)
+
+    Returns
+    -------
+    array, shape (...)
+    array of bool, shape (...)
+        Whether it is neither the first nor the last that was tried.
+    """
+    best = misfit.argmin(axis=0)
+    inside = (best > 0) & (best < len(delays) - 1)
+    middle = np.clip(best, 1, len(delays) - 2)
+    before, least, after = (np.take_along_axis(misfit, (middle + step)[None], 0)[0] for step in (-1, 0, 1))
+    bend = before - 2 * least + after
+    step = np.where(inside & (bend > 0), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
+    return np.asarray(delays[best] + step * (delays[1] - delays[0])), np.asarray(inside)
 
 
 class Lagged(NamedTuple):

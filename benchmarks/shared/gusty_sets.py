@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.shared.measure import count, mean_and_ends
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import half_width
-from cpfls_cli.playback.constants import constants_of_past, find_constants
+from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments, Repeats, instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
@@ -67,7 +67,7 @@ def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFli
     moments = tuple(2 * moment for moment in vehicle.inertia_kg_m2[:3])
     begun = replace(vehicle, inertia_kg_m2=(*moments, 0.0, 0.0, 0.0), unknown=("inertia",))
     given = instruments_of(kind, flights)
-    found = (constants_of_past if kind == "past" else find_constants)(begun, flights, given)
+    found = find_constants(begun, flights, given, past=kind == "past")
     if found is None:
         return np.ones(2), np.ones(2), np.zeros(2, dtype=bool)
     places = [found.fitted.free.index[name] for name in LOG_INERTIA[:2]]

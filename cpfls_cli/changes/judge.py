@@ -283,7 +283,7 @@ class _Space:
         """
         total = np.zeros(rows.shape[1])
         for kinds, columns in self._parts(directions):
-            own, lost = directions[:, columns], np.flatnonzero(np.isin(columns, losses, assume_unique=True))
+            own, lost = directions[:, columns], np.flatnonzero((columns[:, None] == losses).any(axis=1))
             key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
             if key not in known:
                 known[key] = _total(self._posterior(rows, own, kinds, lost)[0])
@@ -320,16 +320,20 @@ class _Space:
         Result `mean`: shape (node, size, row).
         Result `covariance`: shape (node, size, size).
         """
-        scales, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
-        precision = np.eye(directions.shape[1]) + np.tensordot(
-            1 / scales, [directions[own].T @ directions[own] for own in kinds], axes=1
-        )
-        shown = np.tensordot(1 / scales, [directions[own].T @ rows[own] for own in kinds], axes=1)
-        covariance = np.linalg.inv(precision)
+        precise, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
+
+        def over_kinds(each: Sequence[Array]) -> Array:
+            return np.asarray((precise @ np.reshape(each, (len(each), -1))).reshape(len(precise), *each[0].shape))
+
+        moves = [directions[own] for own in kinds]
+        precision = np.eye(directions.shape[1]) + over_kinds([own.T @ own for own in moves])
+        shown = over_kinds([own.T @ rows[numbers] for own, numbers in zip(moves, kinds, strict=True)])
+        covariance = np.asarray(np.linalg.inv(precision), dtype=float)
         mean = covariance @ shown
-        square = np.tensordot(1 / scales, [(rows[own] ** 2).sum(axis=0) for own in kinds], axes=1)
-        size = np.log(scales) @ [len(own) for own in kinds] - np.linalg.slogdet(covariance)[1]
-        logarithm = weights[:, None] - 0.5 * (square - (shown * mean).sum(axis=1) + size[:, None])
+        logarithm = over_kinds([(rows[own] ** 2).sum(axis=0) for own in kinds])
+        logarithm -= (shown * mean).sum(axis=1)
+        size = np.linalg.slogdet(precision)[1] - np.log(precise) @ [len(own) for own in kinds]
+        logarithm = (weights - 0.5 * size)[:, None] - 0.5 * logarithm
         if len(losses):
             logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
         return logarithm, mean, covariance
@@ -388,12 +392,13 @@ class _Held(NamedTuple):
 def _total(logarithm: Array) -> Array:
     """Add up densities over nodes, shape (row,)."""
     most = logarithm.max(axis=0)
-    return np.asarray(most + np.log(np.exp(logarithm - most).sum(axis=0)))
+    share = logarithm - most
+    return np.asarray(most + np.log(np.exp(share, out=share).sum(axis=0)))
 
 
 @cache
 def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
-    """Give nodes of the variance of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
+    """Give nodes of the precision of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
 
     Inverse chi-squared distributions of so many degrees of freedom, by the trapezoidal rule over their logarithms, from
     three deviations below what was learned to the scatter that numbers far off ask for.
@@ -404,9 +409,9 @@ def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
         near = 3 * np.sqrt(2 / own)
         logarithms = np.linspace(-np.log1p(near), np.log1p(max(near, _FARTHEST**2 / own)), count)
         weights = -own / 2 * (logarithms + np.expm1(-logarithms))
-        each.append((np.exp(logarithms), weights - np.log(np.exp(weights).sum())))
-    scales, weights = (np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1) for nodes in zip(*each, strict=True))
-    return scales.reshape(-1, len(freedom)), weights.sum(axis=-1).ravel()
+        each.append((np.exp(-logarithms), weights - np.log(np.exp(weights).sum())))
+    precise, weights = (np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1) for nodes in zip(*each, strict=True))
+    return precise.reshape(-1, len(freedom)), weights.sum(axis=-1).ravel()
 
 
 def _losing(mean: Array, variance: Array) -> Array:
@@ -419,7 +424,7 @@ def _losing(mean: Array, variance: Array) -> Array:
     from scipy.special import ndtr
 
     above = ndtr(mean / np.sqrt(variance)[:, :, None])
-    return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
+    return np.asarray(np.log(2 * (1 - _LOSES) + 2 * (2 * _LOSES - 1) * above).sum(axis=1))
 
 
 def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]]:

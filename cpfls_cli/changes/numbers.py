@@ -9,13 +9,13 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.blocks import contiguous, jackknife_error
+from cpfls_cli.blocks import contiguous, jackknife_error, leaving_out
 from cpfls_cli.consistency.check import flown
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.lag import delayed
+from cpfls_cli.lag import best_delay, delayed
 from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
 
@@ -465,14 +465,9 @@ def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     cross = products[:, :drives, drives:] / size.transpose(0, 2, 1)
     found = np.linalg.solve(among + _COLLINEAR * np.eye(drives), cross)
     left = np.maximum(squares[:, drives:] - (cross * found).sum(axis=1), 0.0)
-    best = np.argmin(left, axis=0)
-    axis = np.arange(left.shape[1])
-    inner = np.clip(best, 1, len(left) - 2)
-    before, there, after = (left[inner + step, axis] for step in (-1, 0, 1))
-    bend = before - 2 * there + after
-    step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
+    best, axis = np.argmin(left, axis=0), np.arange(columns)
     gain = found[best, axis, axis] / size[best, 0, axis]
-    late = np.where(best < len(left) - 1, best + step, np.nan)
+    late = np.where(best < len(left) - 1, best_delay(np.arange(len(left), dtype=float), left)[0], np.nan)
     return np.array([gain, late, np.sqrt(left[best, axis] / count)])
 
 
@@ -497,12 +492,14 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
         return [], np.zeros(0), np.zeros(0)
     x, y = (own.average(each)[inside] for each in (signals.body_rate, turns))
     x = x - x.mean(axis=0)
-    block = contiguous(len(x), _BLOCKS)
-    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
+
+    def ratio(kept: BoolArray) -> Array:
+        return np.asarray((x[kept] * y[kept]).sum(axis=0) / (x[kept] ** 2).sum(axis=0))
+
     with np.errstate(invalid="ignore"):
-        ratios = np.array([(x[rows] * y[rows]).sum(axis=0) / (x[rows] ** 2).sum(axis=0) for rows in kept])
-        scale = -_logarithms(ratios)
-        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), ratios[0]
+        whole, left_out = leaving_out(ratio, len(x), _BLOCKS)
+        scale = -_logarithms(np.vstack([whole, left_out]))
+        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
@@ -523,9 +520,6 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
     left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
-    block = contiguous(len(left), _BLOCKS)
-    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
-
     columns = _LOAD.columns
     assert columns is not None, "the load pulls"
 
@@ -545,8 +539,10 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     )
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)
-    share = np.array([_pulled(left[rows], drag[rows], pulls[rows])[0] for rows in kept])
-    return float(length), (["swing"], share[:1], jackknife_error(share[1:, None]))
+    share, left_out = leaving_out(
+        lambda kept: np.array(_pulled(left[kept], drag[kept], pulls[kept])[:1]), len(left), _BLOCKS
+    )
+    return float(length), (["swing"], share, jackknife_error(left_out))
 
 
 def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, float]:

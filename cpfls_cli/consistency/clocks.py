@@ -13,6 +13,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.importing import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
+from cpfls_cli.lag import best_delay
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import capitalised
@@ -177,9 +178,9 @@ def _shifts(half: _Half) -> Iterator[float]:
             continue
         near = np.linspace(-1.0, 1.0, _FINER) * (coarse[1] - coarse[0]) + coarse[best]
         fine = np.array([left(delay)[axis] for delay in near])
-        closest = int(np.argmin(levelled(fine)))
-        sure = 0 < best < _TELEMETRY_STEPS - 1 and 0 < closest < _FINER - 1 and fine[closest] < _HALF * as_logged[axis]
-        yield _vertex(near, fine, closest) if sure else 0.0
+        delay, inside = best_delay(near, levelled(fine))
+        sure = 0 < best < _TELEMETRY_STEPS - 1 and inside and fine.min() < _HALF * as_logged[axis]
+        yield float(delay) if sure else 0.0
 
 
 def _behind(half: _Half) -> float | None:
@@ -187,13 +188,5 @@ def _behind(half: _Half) -> float | None:
     delays = np.linspace(-LONGEST_DELAY_S, LONGEST_DELAY_S, _STEPS)
     shares = [half.explained(-delay, 3) for delay in delays]
     explained = np.array([float(np.mean(own[~np.isnan(own)])) if np.isfinite(own).any() else 0.0 for own in shares])
-    best = int(np.argmin(levelled(-explained)))
-    if explained[best] < _SMALLEST_R2 or best in (0, _STEPS - 1):
-        return None
-    return _vertex(delays, explained, best)
-
-
-def _vertex(delays: Array, values: Array, best: int) -> float:
-    """Give the extremum of a parabola through the best of some values and its neighbours."""
-    below, top, above = values[best - 1 : best + 2]
-    return float(delays[best] + 0.5 * (delays[1] - delays[0]) * (below - above) / (below - 2 * top + above))
+    delay, inside = best_delay(delays, levelled(-explained))
+    return float(delay) if inside and explained.max() >= _SMALLEST_R2 else None

@@ -10,12 +10,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import polar
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.blocks import block_length, jackknife_error
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.rounding import levelled
-from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of, folds
+from cpfls_cli.weak_form.resampling import blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     whole = sum(float(np.ptp(flight.centres)) for flight in flights)
-    length_s = min(BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS))
+    length_s = block_length(whole, shortest=_SHORTEST_BLOCK_S, wanted=_WANTED_BLOCKS)
     block = blocks_of(index, np.concatenate([flight.centres for flight in flights]), length_s)
     if block.max() + 1 < FEWEST_BLOCKS:
         return None

@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.blocks import BLOCK_S, jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
-from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
+from cpfls_cli.weak_form.resampling import blocks_of
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import joined
 

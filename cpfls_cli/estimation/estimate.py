@@ -83,10 +83,20 @@ class Prior(NamedTuple):
         """Know nothing."""
         return cls(np.zeros(numbers), np.full(numbers, np.inf))
 
+    @classmethod
+    def about_zero(cls, precision: Array) -> Prior:
+        """Expect numbers near 0, by their inverse variances."""
+        with np.errstate(divide="ignore"):
+            return cls(np.zeros(len(precision)), precision**-0.5)
+
     @property
     def precision(self) -> Array:
         """Inverse variance, shape (number,)."""
         return np.asarray(self.spread**-2.0)
+
+    def pull(self, values: Array) -> Array:
+        """Give the score of the prior at values, shape (number,)."""
+        return np.where(self.precision > 0, self.mean - values, 0.0) * self.precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,12 +157,15 @@ def solve(
     bounds: Bounds | None = None,
     leave_out: int | None = None,
     steps: int = _STEPS,
+    settled: float = _SETTLED,
 ) -> Solved:
     """Solve equations by Gauss-Newton steps, all blocks or all but one.
 
     Parameters
     ----------
     start : array, shape (number,)
+    settled : float
+        Length of a step that is none any more.
     """
     values, share, before = np.asarray(start, dtype=float), 1.0, np.zeros(len(start))
     for _ in range(steps):
@@ -161,14 +174,13 @@ def solve(
         if leave_out is not None:
             information = information - normal.information[leave_out]
             score = score - normal.score[leave_out]
-        known = np.where(prior.precision > 0, prior.mean - values, 0.0) * prior.precision
-        step = np.linalg.solve(information + np.diag(prior.precision + _RIDGE), score + known)
+        step = np.linalg.solve(_invertible(information + np.diag(prior.precision)), score + prior.pull(values))
         # One that turns back has gone too far.
         share = max(share / 2, _LEAST_SHARE) if step @ before < 0 else min(1.5 * share, 1.0)
         before, moved = step, values + step * min(share, _FARTHEST / max(float(np.abs(step).max()), _TINY))
         moved = moved if bounds is None else np.clip(moved, *bounds)
         step, values = moved - values, moved
-        if np.abs(step).max() < _SETTLED:
+        if np.abs(step).max() < settled:
             break
     return Solved(values, normal, bool(np.abs(step).max() < _NEARLY))
 
@@ -189,7 +201,7 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         [solve(equations, values, prior, bounds, block, _STEPS_LEFT_OUT).values for block in range(len(normal.score))]
     )
     total = normal.information.sum(axis=0)
-    inverse = np.linalg.inv(total + np.diag(prior.precision + _RIDGE))
+    inverse = np.asarray(np.linalg.inv(_invertible(total + np.diag(prior.precision))), dtype=float)
     held = inverse @ np.diag(prior.precision) @ inverse.T
     return Fit(
         values=values,
@@ -200,6 +212,24 @@ def estimate(equations: Equations, start: Array, prior: Prior | None = None, bou
         inverse=inverse,
         settled=settled,
     )
+
+
+def one_step(normal: Normal, prior: Prior, values: Array) -> tuple[Array, Array]:
+    """Step once from values, which solves linear equations: of all blocks, and without each, (block, number)."""
+
+    def kept(each: Array) -> Array:
+        return np.asarray(each.sum(axis=0) - np.concatenate([np.zeros_like(each[:1]), each]))
+
+    information = kept(normal.information) + np.diag(prior.precision)
+    score = kept(normal.score) + prior.pull(values)
+    moved = values + np.linalg.solve(_invertible(information), score[..., None])[..., 0]
+    return moved[0], moved[1:]
+
+
+def _invertible(information: Array) -> Array:
+    """Add a little information, so that nothing is divided by 0, in any units."""
+    own = np.diagonal(information, axis1=-2, axis2=-1)
+    return information + _RIDGE * np.where(own == 0, 1.0, own)[..., None] * np.eye(information.shape[-1])
 
 
 def conditional_strength(normal: Normal, prior: Prior) -> Array:
@@ -213,7 +243,7 @@ def conditional_strength(normal: Normal, prior: Prior) -> Array:
     ----------
     Sanderson and Windmeijer 2016; Stock and Yogo 2005 (below 10 the estimate falls back to least squares).
     """
-    inverse = np.linalg.inv(normal.information.sum(axis=0) + np.diag(prior.precision + _RIDGE))
+    inverse = np.linalg.inv(_invertible(normal.information.sum(axis=0) + np.diag(prior.precision)))
     alone = np.where(np.diag(inverse) == 0, _TINY, np.diag(inverse))
     # Columns: the rest of each number when the others have moved with it.
     cleared = inverse / alone

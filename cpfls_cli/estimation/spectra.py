@@ -46,13 +46,26 @@ class BlockSpectra:
         """Give the share of one signal that another explains, less what chance explains, shape (frequency,)."""
         total, windows = self.total, max(int(self.windows.sum()), 2)
         power = np.maximum((total[:, first, first] * total[:, second, second]).real, _TINY)
-        raw = np.abs(total[:, first, second]) ** 2 / power
-        return np.asarray(np.clip(1 - (1 - raw) * windows / (windows - 1), 0.0, 1.0))
+        return coherence(total[:, first, second], power, windows)
 
     def gain(self, instrument: int, first: int, second: int) -> Numbers:
         """Estimate second over first by an instrument, shape (frequency,); by least squares if it is the first."""
         below = self.total[:, instrument, first]
         return np.asarray(self.total[:, instrument, second] / np.where(below == 0, _TINY, below))
+
+
+def coherence(cross: Numbers, power: Array, windows: Array | float) -> Array:
+    """Compute the share that one signal explains of another, less what chance explains with so few windows.
+
+    Parameters
+    ----------
+    power : array, shape (frequency,)
+        Product of both.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        raw = np.abs(cross) ** 2 / power
+        found = 1 - (1 - raw) * windows / (windows - 1)
+    return np.asarray(np.clip(np.where(np.asarray(windows) > 1, found, 0.0), 0.0, 1.0))
 
 
 def smoothed(values: Numbers, width: int = SMOOTHED_BINS, axis: int = -1) -> Numbers:

@@ -8,23 +8,27 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import vertical
-from cpfls_cli.effects.polynomial import STATE_TERMS
+from cpfls_cli.dynamics.rigid_body import positive_definite, vertical
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.acting import parts_of
 from cpfls_cli.export.numbers import Numbers
+from cpfls_cli.export.polynomials import motion_terms, weights_of, weights_of_model
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.model import VehicleModel, acting_of
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.player import in_the_air, less_measured, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import WrenchTable, body_of
-from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.rotations import euler_angles, multiply, rotation_matrix, turns
+from cpfls_cli.vehicle.motion import Acting
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import ARRAYS
 
 HORIZON_S = 0.5
 """How far ahead the size of what is missing is told."""
@@ -33,6 +37,9 @@ HORIZON_S = 0.5
 # velocities in m/s, rates in rad/s and tilts in rad of a vehicle that is flown gently.
 _RUNS, _PERIOD, _FREQUENCIES = 24, 0.01, (0.7, 2.0, 5.0)
 _SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
+
+_FASTEST = 300.0
+"""Body rate in rad/s, and speed in m/s, at which a run is called diverged."""
 
 NOTHING, _ROUNDING = 1e-9, 1e-12
 """Distance in SI that half a second without a part may end off, and torque or force: below both are rounding."""
@@ -112,31 +119,60 @@ class Missing:
         )
 
 
+class _Turned(NamedTuple):
+    """Rates that have a momentum, the torque that they take beyond its change, and whether a body has the inertia."""
+
+    rate: Array
+    direct: Array
+    exists: BoolArray
+
+
 @dataclass(frozen=True)
 class Held:
     """What a target flies.
 
     Attributes
     ----------
+    weights : array, shape (6, terms, 1 + 4 rotors)
+        Torque and force by terms of the motion and of the rotors.
     squares : bool
         Whether the lag acts on speeds and on squared speeds each, and not on the speeds alone.
     fuzzy : InertiaModel or None
         In the place of the inertia of `body`.
     numbers : mapping of str to float
         Of a target that has numbers of its own.
+    beyond : tuple of Acting
+        What is no sum of weights, and levers for its forces.
+    wind : tuple of float, m/s, world frame
+        That it is flown in.
     """
 
-    table: WrenchTable
+    vehicle: VehicleSettings
+    weights: Array
     response: RotorResponse
     body: Body
     squares: bool = False
     fuzzy: InertiaModel | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
+    beyond: tuple[Acting, ...] = ()
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def whole(cls, model: VehicleModel) -> Self:
         """Hold everything."""
-        return cls(model.table, model.response, model.body, fuzzy=model.fuzzy)
+        acting = acting_of(model)
+        parts = weights_of(acting, model.vehicle)
+        others = tuple(one for one in acting if one.name not in parts)
+        levers = tuple(one for one in acting if one.of_all_forces)
+        return cls(
+            model.vehicle,
+            np.asarray(sum(parts.values())),
+            model.response,
+            model.body,
+            fuzzy=model.fuzzy,
+            beyond=(*others, *levers) if others else (),
+            wind=model.wind,
+        )
 
     def rotor(self, flight: PlaybackFlight) -> Array:
         """Evaluate the terms of the rotors over each step of a flight, shape (time, 1 + 4 rotors)."""
@@ -147,9 +183,81 @@ class Held:
             terms[:, 1 + rotors : 1 + 2 * rotors] = squared[:, 1 : 1 + rotors]
         return terms
 
-    def player(self, flight: PlaybackFlight) -> Player:
-        """Make it ready for a flight."""
-        return Player(self.table, self.rotor(flight), self.body, fuzzy=self.fuzzy)
+    def wrench(self, air: Array, rate: Array, rotor: Array) -> Array:
+        """Compute torque and force, shape (samples, 6), N m and N, body frame."""
+        terms = motion_terms(air, rate)
+        total = np.stack([np.einsum("tu,tu->t", terms @ own, rotor) for own in self.weights], axis=1)
+        speed, square, turning, slow = rotor[:, 1:].T.reshape(4, len(self.vehicle.rotors), -1)
+        motion = (tuple(air.T), tuple(rate.T), speed, turning, slow + square)
+        for _, wrench in parts_of(self.beyond, self.vehicle, motion, ARRAYS):
+            for column, component in enumerate(wrench):
+                total[:, column] += component
+        return total
+
+    def along(self, flight: PlaybackFlight) -> Array:
+        """Compute torque and force along a measured motion, shape (time, 6), N m and N, body frame."""
+        motion = flight.motion
+        air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
+        return self.wrench(air, motion.rate, self.rotor(flight))
+
+    def errors(self, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
+        """Fly from samples of a flight by the midpoint rule, as playback does, shape (run, horizon, 4, 3).
+
+        Runs that diverge, or meet an attitude at which no body has the inertia, stand still from there on.
+        """
+        motion, rotor = in_the_air(flight, self.wind).motion, self.rotor(flight)
+        state = State(*(part[starts] for part in motion[:4]))
+        momentum, going = self._momentum(state), np.ones((len(starts), 1), dtype=bool)
+        now, found = self._turned(state.rotation, momentum), []
+        with np.errstate(all="ignore"):
+            for step in range(horizon):
+                row, moves = rotor[starts + step], (motion.period, flight.translates)
+                middle, half = self._moved(state, momentum, state, now.direct, row, 0.5 * moves[0], moves[1])
+                there = self._turned(middle.rotation, half)
+                at = middle._replace(rate=there.rate)
+                end, after = self._moved(state, momentum, at, there.direct, row, *moves)
+                turned = self._turned(end.rotation, after)
+                end = end._replace(rate=turned.rate)
+                fast = np.maximum(np.abs(end.rate).max(axis=1), np.abs(end.velocity).max(axis=1)) < _FASTEST
+                going &= (fast & now.exists & there.exists & turned.exists)[:, None]
+                state = State(*(_kept(going, new, old) for new, old in zip(end, state, strict=True)))
+                momentum, now = _kept(going, after, momentum), turned
+                found.append(less_measured(state, motion, starts + step + 1))
+        return np.stack(found, axis=1)
+
+    def _momentum(self, state: State) -> Array:
+        if self.fuzzy is None:
+            return state.rate @ self.body.inertia
+        return multiply(np.nan_to_num(body_inertia(self.fuzzy, euler_angles(state.rotation))[1]), state.rate)
+
+    def _turned(self, rotation: Array, momentum: Array) -> _Turned:
+        if self.fuzzy is None:
+            rate = np.asarray(momentum @ self.body.inverse)
+            return _Turned(rate, np.cross(rate, momentum), np.ones(len(rate), dtype=bool))
+        attitude = euler_angles(np.nan_to_num(rotation))
+        values, matrices = body_inertia(self.fuzzy, attitude)
+        exists = positive_definite(matrices)
+        safe = np.where(exists[:, None, None], matrices, np.eye(3))
+        rate = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
+        return _Turned(rate, momentum_form(attitude, rate, values)[1], exists)
+
+    def _moved(
+        self, start: State, momentum: Array, at: State, direct: Array, rotor: Array, interval: float, translates: bool
+    ) -> tuple[State, Array]:
+        """Move a state and its momentum for an interval with the derivatives at another state."""
+        air = np.einsum("nji,nj->ni", at.rotation, at.velocity)
+        wrench = self.wrench(air, at.rate, rotor)
+        moved = start._replace(rotation=start.rotation @ turns(interval * at.rate))
+        if translates:
+            faster = multiply(at.rotation, wrench[:, 3:]) / self.body.mass - [0.0, 0.0, self.body.gravity]
+            moved = moved._replace(
+                position=start.position + interval * at.velocity, velocity=start.velocity + interval * faster
+            )
+        return moved, momentum + interval * (wrench[:, :3] - direct)
+
+
+def _kept(good: BoolArray, new: Array, old: Array) -> Array:
+    return np.where(good.reshape(-1, *[1] * (new.ndim - 1)), new, old)
 
 
 def held_by(
@@ -162,9 +270,9 @@ def held_by(
     squares: bool = False,
 ) -> Held:
     """Take what a target of these rotors, this body, or the model's, and numbers of its own holds of a vehicle."""
-    weights = model.table.weights
-    table = WrenchTable(holds(weights)[:, : len(STATE_TERMS)])
-    return Held(table, response, body or model.body, squares, numbers={} if numbers is None else numbers.of(weights))
+    weights = weights_of_model(model)
+    found = {} if numbers is None else numbers.of(weights)
+    return Held(model.vehicle, holds(weights), response, body or model.body, squares, numbers=found)
 
 
 def constant_body(model: VehicleModel) -> Body:
@@ -179,7 +287,7 @@ def constant_body(model: VehicleModel) -> Body:
     mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
     if not np.linalg.eigvalsh(mean).min() > 0:
         raise InputError("its inertia, averaged where training went, is not that of any body; identify it again")
-    return body_of(model.vehicle, mean)
+    return _with_inertia(model.body, mean)
 
 
 def of_a_body(body: Body, margin: float = 0.0) -> Body:
@@ -187,6 +295,10 @@ def of_a_body(body: Body, margin: float = 0.0) -> Body:
     inertia = nearest_body(body.inertia, margin)
     if inertia is body.inertia:
         return body
+    return _with_inertia(body, inertia)
+
+
+def _with_inertia(body: Body, inertia: Array) -> Body:
     return body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float))
 
 
@@ -194,45 +306,60 @@ def missing(
     model: VehicleModel, held: Held, holds: Holds, floor: Array, wind: tuple[float, float, float]
 ) -> list[Missing]:
     """List what a target does not hold, each with its size beside noise floors, shape (6,), N m and N."""
-    flight = probe_flight(model)
-    whole = player_of(model, flight)
-    found = [_of_table(name, left, whole, flight, floor) for name, left in _left(model, holds) if left.any()]
-    found += [_of_player(name, other, whole, flight, floor) for name, other in _others(model, held, whole, flight)]
+    flight, whole = probe_flight(model), replace(Held.whole(model), wind=(0.0, 0.0, 0.0))
+    others = [*_left(model, whole, holds), *_others(held, whole)]
     if any(wind):
-        blown = replace(whole, wind=wind)
-        found.append(_of_player(_WIND.format(*wind), whole, blown, flight, floor))
+        others.append((_WIND.format(*wind), replace(whole, wind=wind)))
+    if not others:
+        return []
+    known, wrench = _ends(whole, flight), whole.along(flight)
+    found = []
+    for title, other in others:
+        size = np.sqrt(((wrench - other.along(flight)) ** 2).mean(axis=0))
+        found.append(sized(title, size, floor, _apart(known, _ends(other, flight))))
     return [each for each in found if each.off is None or max(each.off) > NOTHING]
 
 
 def together(model: VehicleModel, held: Held) -> Off:
     """Tell how far a target ends from the whole model after half a second about hover."""
     flight = probe_flight(model)
-    return _apart(player_of(model, flight), held.player(flight), flight)
+    return _apart(*(_ends(each, flight) for each in (Held.whole(model), held)))
 
 
-def _left(model: VehicleModel, holds: Holds) -> Iterator[tuple[str, Array]]:
-    """Give the rests of the parts of the table."""
+def _left(model: VehicleModel, whole: Held, holds: Holds) -> Iterator[tuple[str, Held]]:
+    """Give the whole model but for what is not held of each part."""
     rotors = model.rotors
     columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
     columns[_SLOW] = slice(1 + 3 * rotors, None)
-    for name, weights in model.parts.items():
+    parts = weights_of(acting_of(model), model.vehicle)
+    for name in (one.name for one in acting_of(model)):
+        title = CATALOGUE[name].title if name in CATALOGUE else _LEARNED
         if name == "rotors":
+            pieces = {title: np.zeros_like(whole.weights) for title in columns}
             for title, own in columns.items():
-                part = np.zeros_like(weights)
-                part[:, :, own] = weights[:, :, own]
-                yield title, part - holds(part)
+                pieces[title][:, :, own] = parts[name][:, :, own]
         else:
-            yield CATALOGUE[name].title if name in CATALOGUE else _LEARNED, weights - holds(weights)
+            pieces = {title: parts[name]} if name in parts else {}
+        for piece, weights in pieces.items():
+            if (left := weights - holds(weights)).any():
+                yield piece, replace(whole, weights=whole.weights - left)
+        if name not in parts and holds is not everything:
+            yield title, replace(whole, beyond=tuple(one for one in whole.beyond if one.name != name))
 
 
-def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlight) -> Iterator[tuple[str, Player]]:
-    """Give the whole model but for what a target has otherwise beside the table."""
-    own, other = model.response, held.response
+def everything(weights: Array) -> Array:
+    """Hold all weights, and what is no sum of them."""
+    return weights
+
+
+def _others(held: Held, whole: Held) -> Iterator[tuple[str, Held]]:
+    """Give the whole model but for what a target has otherwise than torque and force."""
+    own, other = whole.response, held.response
     if own.delay_s != other.delay_s:
-        yield _DELAY, replace(whole, rotor=rotor_terms_along(flight, replace(own, delay_s=other.delay_s)))
+        yield _DELAY, replace(whole, response=replace(own, delay_s=other.delay_s))
     if own.lag_s != other.lag_s or (held.squares and own.lag_s):
-        late = replace(held, response=replace(own, lag_s=other.lag_s))
-        yield f"{_LAG}: it acts on squared speeds" if held.squares else _LAG, replace(whole, rotor=late.rotor(flight))
+        title = f"{_LAG}: it acts on squared speeds" if held.squares else _LAG
+        yield title, replace(whole, response=replace(own, lag_s=other.lag_s), squares=held.squares)
     if whole.fuzzy is not None and held.fuzzy is None:
         yield FUZZY, replace(whole, fuzzy=None, body=held.body)
     elif np.any(held.body.inertia != whole.body.inertia):
@@ -242,19 +369,14 @@ def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlig
         yield "gravity", replace(whole, body=whole.body._replace(gravity=held.body.gravity))
 
 
-def _of_table(name: str, left: Array, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
-    alone = replace(whole, table=replace(whole.table, weights=left))
-    without = replace(whole, table=replace(whole.table, weights=whole.table.weights - left))
-    return _sized(name, alone.wrench(flight), floor, _apart(whole, without, flight))
+def _ends(held: Held, flight: PlaybackFlight) -> Array:
+    """Fly each stretch of a flight to its end, shape (run, 4, 3)."""
+    horizon = len(flight) // len(flight.stretches) - 1
+    return held.errors(flight, flight.starts(horizon, 1), horizon)[:, -1]
 
 
-def _of_player(name: str, other: Player, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
-    difference = whole.wrench(flight) - other.wrench(flight)
-    return _sized(name, difference, floor, _apart(whole, other, flight))
-
-
-def _sized(name: str, wrench: Array, floor: Array, off: Off) -> Missing:
-    return sized(name, np.sqrt((wrench**2).mean(axis=0)), floor, off)
+def _apart(first: Array, second: Array) -> Off:
+    return Off.of(np.linalg.norm(second - first, axis=2).mean(axis=0))
 
 
 def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
@@ -263,12 +385,6 @@ def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
     torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))
     return Missing(title, torque, force, largest, off, where)
-
-
-def _apart(first: Player, second: Player, flight: PlaybackFlight) -> Off:
-    horizon = len(flight) // len(flight.stretches) - 1
-    starts = flight.starts(horizon, 1)
-    return Off.of(apart(*(free_runs(player, flight, starts, horizon) for player in (first, second))))
 
 
 def probe_flight(model: VehicleModel) -> PlaybackFlight:

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL
-from cpfls_cli.effects.polynomial import FACTORS
+from cpfls_cli.export.acting import traced_wrench, units_of
 from cpfls_cli.export.points import PERIOD
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
@@ -25,9 +25,10 @@ from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
+from cpfls_cli.vehicle.tracing import PYTHON
 
 _WHITE = ("torque_white_n_m_sqrt_s", "force_white_n_sqrt_s")
-FORMAT, VERSION = "cpfls/model-json", 2
+FORMAT, VERSION = "cpfls/model-json", 3
 _ANGLES = ("roll", "pitch")
 
 _CONVENTIONS = {
@@ -71,17 +72,10 @@ HOW_TO_EVALUATE_INERTIA = (
 )
 
 HOW_TO_EVALUATE = (
-    "Row k of (torque x y z in N m, force x y z in N) is the sum over all weights of that row of weight * term of the "
-    "motion * term of the rotors, both by their index from 0 in the lists of their names.",
-    "Terms of the motion are 1; u v w p q r, the components of air and rate; their products; |u| u, |u| v, |u| w with "
-    "the length |u| of air; |p| p, |q| q, |r| r; then for each column c of the learned part c U and c U^2, U = "
-    "sqrt(u^2 + v^2).",
-    "Columns of the learned part: with the angle a = atan2(v, u) and x = (a mod 2 pi) / 2 pi, the membership functions "
-    "have their peaks at the breakpoints b. Between two, u = (x - b1) / (b2 - b1): the left function falls by "
-    f"{Z_FUNCTION}, the right one is 1 minus that. Rule 1 fires by the first function plus the last, the others by "
-    "their own; one breakpoint alone is one rule that fires by 1. Columns run over rules, then over features: 1 and "
-    "sin a .. sin n a, cos a .. cos n a with n = harmonic_order, or where that is 0 the triangle wave s with s(0) = 0, "
-    "s(pi/2) = 1, s(pi) = 0, s(3 pi/2) = -1. Column times firing.",
+    "wrench gives torque in N m and force in N, x y z, of air, rate and rotor: its lines in their order, then its six "
+    "components, in arithmetic of Python with sqrt, exp, sin, cos, atan2, floor and abs, indices from 0. Names are "
+    "those of numbers, and learned are the coefficients of the learned part; rotor are the terms of the rotors, in the "
+    "order of terms_of_rotors. A line that begins with # names the part that the next ones are of.",
     "Terms of the rotors over the step from sample k to k + 1 of length h: 1; mean w of the speed that acts; w^2; its "
     "change over the step / h; z - w^2. The logged speed, late by delay_s with straight lines between samples, is x; "
     "before the first sample it is the first. lag_s > 0: tau w' + w = x, exactly, for x a straight line between "
@@ -98,7 +92,7 @@ HOW_TO_EVALUATE = (
 
 def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
     """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
-    found, vehicle, learned = sheet.identified, sheet.model.vehicle, sheet.model.remainder
+    found, vehicle = sheet.identified, sheet.model.vehicle
     points, runs, attitudes = sheet.references
     document = {
         "format": FORMAT,
@@ -122,19 +116,14 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "rotors": sheet.model.rotors,
         "response": response_of(sheet),
         "effects": {
-            effect.name: {"coefficients": effect.coefficients, "shape": dict(effect.shape)}
+            effect.name: {"coefficients": effect.coefficients, "shape": dict(effect.shape), "values": effect.values}
             for effect in sheet.model.effects
         },
-        "terms_of_motion": sheet.terms,
         "terms_of_rotors": sheet.rotor_terms,
-        "factors_of_products": FACTORS.tolist(),
         "gusts": None
         if sheet.model.gusts is None
         else {**_gusts(sheet.model.gusts), "frame": BODY, "how_to_play": GUST_RECIPE},
-        "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
-        "learned": None
-        if learned is None
-        else {"breakpoints": learned.breakpoints, "harmonic_order": learned.harmonic_order},
+        **_wrench(sheet),
         "judged": None,
         "provenance": _provenance(sheet),
         "period_s": PERIOD,
@@ -143,6 +132,24 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "reference_runs": [run_of(run) for run in runs],
     }
     return strict_json({**document, **sheet.evidence})
+
+
+def _wrench(sheet: Sheet) -> dict[str, Any]:
+    """Give the numbers of what acts, their units, and what it makes of them."""
+    traced, learned = traced_wrench(sheet.model), sheet.model.remainder
+    lines, components = traced.written(PYTHON)
+    units = units_of(sheet.model)
+    return {
+        "numbers": {name: {"value": value, "unit": units[name]} for name, value in sheet.needed(traced).items()},
+        "learned": None
+        if learned is None
+        else {
+            "breakpoints": learned.breakpoints,
+            "harmonic_order": learned.harmonic_order,
+            "coefficients": np.ravel(learned.coefficients),
+        },
+        "wrench": {"lines": lines, "components": components},
+    }
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:

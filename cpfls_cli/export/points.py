@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from math import ceil
 from typing import NamedTuple
@@ -14,13 +14,13 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import body_inertia, coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque
-from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.effects.scales import arm, hover_speed
+from cpfls_cli.export.acting import parts_along
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import Hold
-from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 
@@ -30,6 +30,7 @@ POINTS = 8
 PERIOD = 0.01
 """Length of the steps of the runs that an export tests itself with, s."""
 
+_TORQUE, _FORCE = slice(0, 3), slice(3, 6)
 # Rates in rad/s and accelerations in rad/s^2 of a lively flight; |cos(pitch)| from which on single precision agrees.
 _RATE, _ACCELERATION, _UPRIGHT = 3.0, 10.0, 0.2
 # Steps behind the delay, share that speeds differ from hover by, and seconds in which they change by their own size.
@@ -167,12 +168,17 @@ def reference_points(model: VehicleModel, rng: np.random.Generator, count: int =
     turning = rng.normal(0.0, speed.mean() / _SECOND, speed.shape)
     slow = _speeds(model, rng, count) ** 2 - speed**2
     rotor = np.hstack([np.ones((count, 1)), speed, speed**2, turning, slow])
-    return ReferencePoints(air, rate, rotor, model.table.wrench(air, rate, rotor), term_sizes(model, air, rate, rotor))
+    parts = parts_along(model, air, rate, rotor).values()
+    return ReferencePoints(air, rate, rotor, np.asarray(sum(parts)), part_sizes(model, parts))
 
 
-def term_sizes(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Array:
-    """Sum the sizes of the terms of torque and force, shape (samples, 6), which rounding errors are relative to."""
-    sizes = wrench_of(np.abs(model.table.weights), np.abs(model.table.terms(air, rate)), np.abs(rotor))
+def part_sizes(model: VehicleModel, parts: Collection[Array]) -> Array:
+    """Sum the sizes of parts, shape (samples, 6), which rounding errors of torque and force are relative to.
+
+    Forces of rotors cancel in a torque, so that its size is also that of the forces at the end of the arm.
+    """
+    torque, force = (np.asarray(sum(np.abs(part[:, own]).max(axis=1) for part in parts)) for own in (_TORQUE, _FORCE))
+    sizes = np.repeat(np.stack([torque + arm(model.vehicle) * force, force], axis=1), 3, axis=1)
     return np.where(sizes > 0.0, sizes, 1.0)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing, probe_flight, together
+from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, everything, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators import ardupilot
@@ -73,8 +73,8 @@ class Target(Form):
 
 
 def _whole(model: VehicleModel) -> tuple[Held, Holds]:
-    """Take what code holds of a vehicle: everything that is a sum of weights, and an inertia over attitude."""
-    return Held.whole(model), lambda weights: weights
+    """Take what code holds of a vehicle: everything that follows from its motion and its rotors."""
+    return Held.whole(model), everything
 
 
 def _c(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:

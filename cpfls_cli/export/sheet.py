@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.export.acting import Traced, numbers_of
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
 from cpfls_cli.version import __version__
@@ -44,25 +44,6 @@ LACK_RECIPE = (
 
 _SEED = 1
 _ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
-
-
-class Weights(NamedTuple):
-    """The weights that are not zero: entry by entry its row, its term of the motion, its term of the rotors.
-
-    Attributes
-    ----------
-    row, term, rotor : array of int, shape (entry,)
-        Row 0 to 2 of torque, 3 to 5 of force.
-    weight : array, shape (entry,), SI
-    """
-
-    row: IntArray
-    term: IntArray
-    rotor: IntArray
-    weight: Array
-
-    def __len__(self) -> int:
-        return len(self.weight)
 
 
 class References(NamedTuple):
@@ -152,16 +133,16 @@ class Sheet:
         return self.stopped is None
 
     @cached_property
-    def weights(self) -> Weights:
-        """The weights that are not zero."""
-        row, term, rotor = (places.astype(np.int64) for places in np.nonzero(self.model.table.weights))
-        return Weights(row, term, rotor, self.model.table.weights[row, term, rotor])
+    def numbers(self) -> dict[str, float]:
+        """Numbers of all that acts that are not 0, by name."""
+        return {name: value for name, value in numbers_of(self.model).items() if value}
 
-    @property
-    def terms(self) -> list[str]:
-        """Names of the terms of the motion."""
-        columns = range((self.model.table.weights.shape[1] - len(STATE_TERMS)) // 2)
-        return [*STATE_TERMS, *(f"{name} c{column}" for column in columns for name in ("U", "U^2"))]
+    def needed(self, traced: Traced) -> dict[str, float]:
+        """Give the numbers that torque and force need, by name, but for the learned part."""
+        used, vehicle = traced.used, self.model.vehicle
+        known = {"mass": vehicle.mass_kg, "gravity": vehicle.gravity_m_s2}
+        known |= dict(zip(INERTIA_PARAMETERS, self.rigid_body.tolist(), strict=True)) | self.numbers
+        return {name: value for name, value in known.items() if name in used and "[" not in name}
 
     @property
     def rotor_terms(self) -> list[str]:
@@ -209,7 +190,7 @@ class Sheet:
             f"Vehicle: {model.vehicle.mass_kg:.6g} kg, {model.rotors} rotors; delay {response.delay_s:.4g} s, "
             f"lag {response.lag_s:.4g} s, slow actuation {response.slow_roll_pitch:.4g} (roll, pitch) and "
             f"{response.slow_yaw:.4g} (yaw) within {response.slow_s:.4g} s; law of the rotors w^2 + "
-            f"{model.thrust_linear:.4g} w_hover w; {len(self.weights)} coefficients of torque "
+            f"{model.thrust_linear:.4g} w_hover w; {len(self.numbers)} numbers of torque "
             "and force."
         )
         if model.effects:

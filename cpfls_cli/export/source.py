@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal
@@ -10,17 +10,17 @@ from typing import Any, Literal
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
-from cpfls_cli.effects.polynomial import FACTORS
+from cpfls_cli.export.acting import LEARNED, numbers_of, share_of, traced_wrench, units_of
 from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
 from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
-from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.table import airflow_of
+from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
+from cpfls_cli.playback.model import VehicleModel, acting_of
 from cpfls_cli.regressor.structure import ModelStructure
+from cpfls_cli.vehicle.tracing import LIBRARY, C
 
 _OUTSIDE, _VERTICAL = 1, 4
 """Flags of the header of C."""
@@ -40,8 +40,8 @@ class CSource:
 def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     """Write a model as C99, with further paragraphs in its head."""
     points, runs, attitudes = sheet.references
-    peaks, order = airflow_of(sheet.model.remainder)
-    rows = zip(*(column.tolist() for column in sheet.weights), strict=True)
+    traced, units, learned = traced_wrench(sheet.model), units_of(sheet.model), _learned(sheet.model)
+    lines, wrench = traced.written(C)
     words = {
         **_common_words(sheet, told),
         "source": comment_text(f"{stem}.c"),
@@ -49,12 +49,11 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
         "verdict_text": literal_text(sheet.verdict or "none"),
         "history": int(sheet.model.response.delay_s / _FASTEST_PERIOD * (1 + 1e-9)) + 2,
         "rigid_rows": [c_row(row) for row in symmetric(sheet.rigid_body)],
-        "factor_rows": filled(", ".join(f"{{{first}, {second}}}" for first, second in FACTORS.tolist()), 4),
-        "weights": [f"{{{row}, {term}, {rotor}, R({number(weight)})}}," for row, term, rotor, weight in rows],
-        "peaks": len(peaks),
-        "rules_of_airflow": max(len(peaks) - 1, 1),
-        "features": 1 + (2 * order or 1),
-        "peak_rows": filled(c_row(peaks), 4),
+        "numbers": [(name, number(value), units[name]) for name, value in sheet.needed(traced).items()],
+        "learned_rows": filled(c_row(learned), 4) if learned else "",
+        "learned_count": len(learned),
+        "wrench_lines": lines,
+        "wrench": wrench,
         **({} if sheet.rules is None else _c_rules(sheet.rules)),
         **({} if sheet.identified is None else _c_visited(sheet.identified)),
         "points": [_c_braces(list(point.values()), 4) for point in points_of(points)],
@@ -133,48 +132,78 @@ def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
 
 def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], told: Sequence[str] = ()) -> str:
     """Write a model as a module of Python that computes with one library, with further paragraphs in its head."""
-    weights, rules = sheet.weights, sheet.rules
+    rules, traced = sheet.rules, traced_wrench(sheet.model, shares=True)
+    lines, wrench = traced.written(LIBRARY)
     coefficients = np.zeros(0) if rules is None else rules.coefficients
-    parameters = _parameters(sheet, weights.weight, delayed=library == "jax")
+    parameters = _parameters(sheet, sheet.model, delayed=library == "jax")
+    names = [*_KNOWN, *(name for name, _ in _named(sheet, sheet.model))]
+    first_learned = len(names) - len(_shares(sheet)) - len(_learned(sheet.model))
+    first_rule = len(names)
+    used = traced.used
+    needed = [(name, place) for place, name in enumerate(names) if name in used and "[" not in name]
     words = {
         **_common_words(sheet, told),
         "library": library,
         "source": comment_text(file),
         "verdict": None if sheet.verdict is None else ascii(sheet.verdict),
-        "row_rows": _whole(weights.row),
-        "term_rows": _whole(weights.term),
-        "rotor_rows": _whole(weights.rotor),
-        "first_rows": _whole(FACTORS[:, 0]),
-        "second_rows": _whole(FACTORS[:, 1]),
+        "parameter_names": filled(", ".join(f'"{name}"' for name in names), 4),
+        "first_learned": first_learned,
+        "first_share": first_rule - len(_shares(sheet)),
+        "first_rule": first_rule,
+        "needed": needed,
+        "wrench_lines": [*(["learned = p[_LEARNED]"] if _learned(sheet.model) else []), *lines],
+        "wrench": wrench,
         "rule_count": len(coefficients),
         "parameter_rows": filled(", ".join(map(number, parameters)), 4),
-        "peaks": airflow_of(sheet.model.remainder).breakpoints.tolist(),
         **({} if rules is None else _python_rules(rules)),
     }
     return fill_template("model.py.j2", words)
 
 
-def _parameters(sheet: Sheet, weights: Array, *, delayed: bool) -> list[float]:
+_KNOWN = ("mass", "gravity", *INERTIA_PARAMETERS, "lag", "slow")
+
+
+def _learned(model: VehicleModel) -> list[float]:
+    return [] if model.remainder is None else np.ravel(model.remainder.coefficients).tolist()
+
+
+def _shares(sheet: Sheet) -> list[str]:
+    return [one.name for one in acting_of(sheet.model)]
+
+
+def _named(sheet: Sheet, model: VehicleModel, parts: Sequence[str] | None = None) -> Iterator[tuple[str, float]]:
+    """Give the numbers of a vehicle like that of a sheet by name, those of the learned part, and shares of parts."""
+    values = numbers_of(model)
+    for name in numbers_of(sheet.model):
+        if name in sheet.numbers or name.startswith(_OF_LEARNED):
+            yield name, values.get(name, 0.0)
+    for part in _shares(sheet):
+        yield share_of(part), float(parts is None or part in parts)
+
+
+_OF_LEARNED = LEARNED.partition("{")[0]
+
+
+def _parameters(
+    sheet: Sheet, model: VehicleModel, parts: Sequence[str] | None = None, *, delayed: bool = True
+) -> list[float]:
     """List the parameters of a vehicle; for functions of JAX, of which many may fly side by side, its delay too."""
-    rules, vehicle = sheet.rules, sheet.model.vehicle
-    delay, *times = response_of(sheet).values()
+    own = replace(sheet, model=model)
+    rules, vehicle = own.rules, model.vehicle
+    delay, *times = response_of(own).values()
     rule = [] if rules is None else rules.coefficients.tolist()
-    known = [vehicle.mass_kg, vehicle.gravity_m_s2, *sheet.rigid_body.tolist(), *times]
-    return [*known, *weights.tolist(), *rule, *([delay] if delayed else [])]
+    known = [vehicle.mass_kg, vehicle.gravity_m_s2, *own.rigid_body.tolist(), *times]
+    return [*known, *(value for _, value in _named(sheet, model, parts)), *rule, *([delay] if delayed else [])]
 
 
 def jax_parameters(sheet: Sheet, models: Sequence[VehicleModel]) -> Array:
     """Give the parameters of vehicles like that of a sheet for its functions in JAX, shape (vehicle, parameter)."""
-    places = sheet.weights[:3]
-    return np.array(
-        [_parameters(replace(sheet, model=each), each.table.weights[places], delayed=True) for each in models]
-    )
+    return np.array([_parameters(sheet, each) for each in models])
 
 
 def jax_parts(sheet: Sheet, parts: Sequence[str]) -> Array:
     """Give the parameters with which the functions in JAX give parts of a model alone, shape (part, parameter)."""
-    places = sheet.weights[:3]
-    return np.array([_parameters(sheet, sheet.model.parts[name][places], delayed=True) for name in parts])
+    return np.array([_parameters(sheet, sheet.model, [name]) for name in parts])
 
 
 def _python_rules(model: InertiaFunctions) -> dict[str, Any]:
@@ -192,10 +221,6 @@ def _python_rules(model: InertiaFunctions) -> dict[str, Any]:
 def visited_rows(model: InertiaFunctions) -> list[str]:
     """Draw the region that training visited, ``#`` for a visited cell, ``.`` for another; a line for each roll."""
     return ["".join(row) for row in np.where(model.visited, "#", ".")]
-
-
-def _whole(values: Array | IntArray) -> str:
-    return filled(", ".join(map(str, values.tolist())), 4)
 
 
 def fill_template(template: str, words: dict[str, Any]) -> str:
@@ -228,18 +253,14 @@ def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
         "attitude": sheet.identified is not None,
         "fuzzy": rules is not None,
         "rigid": bool(sheet.rigid_body.any()),
-        "learned": sheet.model.remainder is not None,
         "vertical": VERTICAL,
         "cells": CELLS,
         "cell_deg": 360 // CELLS,
         "rotors": sheet.model.rotors,
-        "terms": sheet.terms,
-        "factors": FACTORS,
         "mass": number(vehicle.mass_kg),
         "gravity": number(vehicle.gravity_m_s2),
         **{name.removesuffix("_s"): number(value) for name, value in response_of(sheet).items()},
         "gusts": [[number(value) for value in values] for values in sheet.model.gusts or ()],
-        "order": airflow_of(sheet.model.remainder).order,
         "period": number(PERIOD),
         **({} if rules is None else _structure_words(rules)),
     }

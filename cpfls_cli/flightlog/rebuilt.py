@@ -28,6 +28,7 @@ from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors,
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
+from cpfls_cli.lag import best_delay
 
 _PX4_NEW: Final = tuple(f"vehicle_{name}_setpoint.xyz[{axis}]" for name in ("torque", "thrust") for axis in range(3))
 _PX4_OLD: Final = tuple(f"actuator_controls_0.control[{axis}]" for axis in range(4))
@@ -57,7 +58,7 @@ _NOTHING: Final = "it lacks logged commands to compare with, what they are mixed
 _FEWEST: Final = 30  # Logged samples in flight that are compared.
 _FLIES: Final = 0.35  # Share of the usual mean command from which on the vehicle flies.
 _LEAST_COMMAND: Final = 0.03
-_SHIFTS_S: Final = np.arange(-30, 31) * 2e-3
+_SHIFTS_S: Final = np.arange(-30.0, 31.0) * 2e-3
 # Of the standard atmosphere as ArduPilot has it: kg/m^3, J/(kg K), K, K/m.
 _DENSITY_AT_SEA, _GAS, _KELVIN, _LAPSE = 1.225, 287.26, 273.15, 0.0065
 
@@ -315,12 +316,12 @@ def _compared(found: Rebuilt, mixed: _Mixed, slow: Array, logged: Array) -> Rebu
     def off(shift_s: float) -> Array:
         return np.asarray(np.column_stack([np.interp(at - shift_s, time, column) for column in found.commands.T]) - own)
 
-    lost = [float((_between(off(shift)) ** 2).sum()) for shift in _SHIFTS_S]
+    lost = np.array([(_between(off(shift)) ** 2).sum() for shift in _SHIFTS_S])
     error = off(0.0)
     # Whether they are right is seen where both were logged at once; how near they come is that of all.
     near = np.abs(time[np.searchsorted(0.5 * (time[1:] + time[:-1]), at)] - at) <= _AT_ONCE_S
     near = near if near.sum() >= _FEWEST else np.ones(len(at), dtype=bool)
-    at_stamps = _explained(found, axes, own[near], error[near], _lowest(lost))
+    at_stamps = _explained(found, axes, own[near], error[near], float(best_delay(_SHIFTS_S, lost)[0]))
     at_stamps = at_stamps._replace(samples=len(at), error=float(np.sqrt((error**2).mean())))
     if not late_s or (np.fmin.reduce(at_stamps.by_axis) >= _LEAST_EXPLAINED and abs(at_stamps.lag) < _ON_TIME_S):
         return at_stamps
@@ -351,17 +352,6 @@ def _explained(found: Rebuilt, axes: Array, own: Array, error: Array, lag_s: flo
 
 def _between(values: Array) -> Array:
     return np.asarray(values - values.mean(axis=1, keepdims=True))
-
-
-def _lowest(lost: list[float]) -> float:
-    """Find the shift with the least error, between those that were tried by a parabola, s."""
-    best = int(np.argmin(lost))
-    if not 0 < best < len(lost) - 1:
-        return float(_SHIFTS_S[best])
-    before, least, after = lost[best - 1 : best + 2]
-    bend = before - 2 * least + after
-    step = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    return float(_SHIFTS_S[best] + step * (_SHIFTS_S[1] - _SHIFTS_S[0]))
 
 
 def _refusal(found: Rebuilt, late_s: float) -> str:

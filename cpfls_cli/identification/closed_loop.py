@@ -16,9 +16,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
-from cpfls_cli.blocks import half_width, jackknife_covariance
+from cpfls_cli.blocks import block_length, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.estimation.estimate import Normal, Prior, one_step
+from cpfls_cli.estimation.first_stage import FOLDS, first_stage_fit_by_run
 from cpfls_cli.identification.data import (
     Flights,
     OtherTorque,
@@ -29,10 +31,9 @@ from cpfls_cli.identification.data import (
     sample_times,
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
-from cpfls_cli.playback.balances import block_length
-from cpfls_cli.playback.constants import constants_of_past
+from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy, foretold_by_run, instruments, late, late_by
+from cpfls_cli.playback.instruments import Instruments, ToldBy, instruments, past_setpoints
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
@@ -122,7 +123,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
     Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
-    not about yaw (`constants_of_past`). The torque becomes what it was, and what that body takes more than the other.
+    not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the other.
 
     Parameters
     ----------
@@ -201,7 +202,7 @@ def _by_past(
 ) -> FreedTorque | None:
     """Free the torque of flights that show the loop by what was before."""
     rows = np.concatenate(_laid(parts, 1.0 / axis_scale(training)))
-    (least_squares,) = _parameters(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None], None)
+    least_squares, _ = _solved(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None])
     if why_unphysical(least_squares) is not None or not _shows_loop(training, least_squares):
         return None
     vehicle = VehicleSettings(inertia_kg_m2=tuple(least_squares.tolist()))
@@ -209,8 +210,8 @@ def _by_past(
     # Of effects those that take no rotors: these are nobody's.
     tried = (INERTIA, PRODUCTS, *(name for name, effect in CATALOGUE.items() if not effect.needs))
     others = [block for block in blocks_of(vehicle) if block not in tried]
-    found = constants_of_past(vehicle, flights, replace(given, flown=flights), others)
-    if found is None or not found.tells:
+    found = find_constants(vehicle, flights, replace(given, flown=flights), others, past=True)
+    if found is None or not found.identified:
         return None
     inertia, yaw = found.fitted.model.body.inertia, list(_OF_YAW)
     rigid_body = np.array([inertia[entry] for entry in INERTIA_ENTRIES])
@@ -345,10 +346,10 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     if given.kind == "repeats":
         repeated = sorted(number for path in given.repeats.paths() for number in path)
         return {number: given.repeats.others(number, values) for number in repeated}
-    lags, asked, known = late_by(period, max(1, round(_APART_S / period))), [], {}
+    apart, asked, known = max(1, round(_APART_S / period)), [], {}
     for number, setpoint in enumerate(given.setpoints):
         if setpoint is not None:
-            columns = np.hstack([late(setpoint, lag) for lag in lags])
+            columns = past_setpoints(setpoint, period, apart)
             asked.append(_fast(columns, period) if fast else columns)
             own = values[number].reshape(len(setpoint), -1)
             known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
@@ -357,7 +358,7 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     if told <= FOLDS * width or every * width > _MOST:
         return {}
     there_asked = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
-    predicted = foretold_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
+    predicted = first_stage_fit_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
     found = {number: np.full_like(values[number], np.nan) for number in known}
     for number, there in known.items():
         found[number][there] = predicted[number]
@@ -400,23 +401,15 @@ def _by_block(rows: Iterable[tuple[Array, Array, IntArray]]) -> Array:
 
 def _solved(crossed: Array, held: Array | None = None) -> tuple[Array, Array]:
     """Solve for inertia parameters but those held of yaw, with half of the 95 % intervals of log moments, (3,)."""
-    total = crossed.sum(axis=0)
-    found, without = (_parameters(each, held) for each in (total[None], total - crossed))
-    error = np.sqrt(np.diag(jackknife_covariance(without)))[:3]
-    moments = found[0, :3]
-    positive = np.where(moments > 0, moments, np.nan)
-    return found[0], np.nan_to_num(half_width(error, len(crossed)) / positive, nan=np.inf)
-
-
-def _parameters(crossed: Array, held: Array | None) -> Array:
-    gram, moment = crossed[:, :, :RIGID], crossed[:, :, RIGID]
-    found = np.zeros((len(crossed), RIGID)) if held is None else np.tile(held, (len(crossed), 1))
+    found, error = np.zeros(RIGID) if held is None else held.copy(), np.full(RIGID, np.nan)
     free = np.array([number for number in range(RIGID) if held is None or number not in _OF_YAW])
-    found[:, free] = 0.0
-    left = (moment - np.einsum("bpq,bq->bp", gram, found))[:, free]
-    # Where an axis does not move at all, of minimum norm.
-    found[:, free] = np.einsum("bpq,bq->bp", np.linalg.pinv(gram[:, free][:, :, free], _ROUNDING), left)
-    return found
+    found[free] = 0.0
+    rest = crossed[:, :, RIGID] - crossed[:, :, :RIGID] @ found
+    normal = Normal(crossed[:, free[:, None], free], rest[:, free])
+    found[free], without = one_step(normal, Prior.none(len(free)), np.zeros(len(free)))
+    error[free] = jackknife_error(without)
+    moments = np.where(found[:3] > 0, found[:3], np.nan)
+    return found, np.nan_to_num(half_width(error[:3], len(crossed)) / moments, nan=np.inf)
 
 
 def _told(half: Array) -> BoolArray:

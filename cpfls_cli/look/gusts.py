@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.estimation.spectra import transforms, window_starts
+from cpfls_cli.estimation.whittle import most_likely
 from cpfls_cli.look.effectiveness import PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.steady import FEWEST_WINDOWS, Known, jackknifed
@@ -69,40 +70,48 @@ def _about(flight: LogFlight, axis: int, plant: PlantModel) -> AxisGusts | None:
     return _described(AXES[axis], known, frequency[band], power.mean(axis=0), scale * np.abs(moved) ** 2)
 
 
-def _spectrum(frequency: Array, size: float, memory: float, noise: float) -> Array:
-    """Evaluate the spectrum of gusts and noise as windows under Hann's taper show it."""
+def _spectrum(frequency: Array, logs: Array) -> tuple[Array, Array]:
+    """Evaluate the spectrum of gusts and noise as windows under Hann's taper show it, and its slopes.
+
+    Parameters
+    ----------
+    logs : array, shape (3,)
+        Logarithms of size, memory and noise.
+    """
+    size, memory, noise = np.exp(logs)
     near = frequency + (frequency[1] - frequency[0]) * np.array(list(_NEIGHBOURS))[:, None]
     turning = 2 * np.pi * near
-    every = 4 * size**2 * memory / (1 + (turning * memory) ** 2) + noise * turning**2
-    return np.asarray(np.array(list(_NEIGHBOURS.values())) @ every)
+    late = (turning * memory) ** 2
+    gusts, sensor = 4 * size**2 * memory / (1 + late), noise * turning**2
+    shares = np.array(list(_NEIGHBOURS.values()))
+    slopes = [shares @ each for each in (2 * gusts, gusts * (1 - late) / (1 + late), sensor)]
+    return np.asarray(shares @ (gusts + sensor)), np.array(slopes)
 
 
 def _fitted(frequency: Array, power: Array) -> Array:
-    """Fit size, memory and noise by the likelihood of a spectrum (Whittle).
+    """Fit size, memory and noise to a spectrum.
 
     Returns
     -------
     array, shape (4,)
         Logarithms of them, and of the size within the band.
     """
-    from scipy.optimize import minimize
-
     spacing = frequency[1] - frequency[0]
     whole = float(power.sum() * spacing)
     floor = float(np.median(power / (2 * np.pi * frequency) ** 2))
-
-    def unlikely(logs: Array) -> float:
-        model = _spectrum(frequency, *np.exp(logs))
-        return float(np.sum(np.log(model) + power / model))
-
     begin = np.log([np.sqrt(whole), 0.3, 0.1 * floor])
-    memory = np.log(_MEMORY_S)
-    ends = [(begin[0] - 6, begin[0] + 3), (memory[0], memory[1]), (begin[2] - 12, begin[2] + 6)]
-    logs = minimize(unlikely, begin, bounds=ends, method="L-BFGS-B").x
+    shortest, longest = np.log(_MEMORY_S)
+    ends = [(begin[0] - 6, begin[0] + 3), (shortest, longest), (begin[2] - 12, begin[2] + 6)]
+
+    def spectrum(logs: Array) -> tuple[Array, Callable[[Array], Array]]:
+        expected, slopes = _spectrum(frequency, logs)
+        return expected, lambda slope: slopes @ slope[0]
+
+    logs = most_likely(spectrum, power[None], [begin], ends)
     size, memory = np.exp(logs[:2])
     # A sum over frequencies would begin below the band, where long gusts are largest.
-    ends = np.arctan(2 * np.pi * memory * np.array(_BAND_HZ))
-    return np.array([*logs, np.log(size) + 0.5 * np.log(2 / np.pi * (ends[1] - ends[0]))])
+    band = np.arctan(2 * np.pi * memory * np.array(_BAND_HZ))
+    return np.array([*logs, np.log(size) + 0.5 * np.log(2 / np.pi * (band[1] - band[0]))])
 
 
 def _described(axis: str, known: Known, frequency: Array, power: Array, moved: Array) -> AxisGusts:
@@ -119,5 +128,5 @@ def _described(axis: str, known: Known, frequency: Array, power: Array, moved: A
         unexplained=float(power.sum() / moved.mean(axis=0).sum()),
         frequency=frequency,
         power=power,
-        model=_spectrum(frequency, *np.exp(known.value[:3])),
+        model=_spectrum(frequency, known.value[:3])[0],
     )

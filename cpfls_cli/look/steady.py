@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_covariance
+from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, jackknife_covariance, leaving_out
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.result import Estimate
 
@@ -116,9 +116,7 @@ def jackknifed(compute: Callable[[BoolArray], Array], count: int) -> Known | Non
     if count < FEWEST_WINDOWS:
         return None
     blocks = min(max(count // PER_BLOCK, FEWEST_BLOCKS), MOST_BLOCKS)
-    group = contiguous(count, blocks)
-    value = compute(np.ones(count, dtype=bool))
-    left_out = np.array([compute(group != block) for block in range(blocks)])
+    value, left_out = leaving_out(compute, count, blocks)
     if not (np.isfinite(value).all() and np.isfinite(left_out).all()):
         return None
     covariance = jackknife_covariance(left_out)

@@ -1,9 +1,9 @@
-"""Balances of torque and force in bands of frequency, with derivatives by each number, beside those of other runs."""
+"""Balances of torque and force in bands of frequency, with derivatives by each number, and their instruments."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import ClassVar, NamedTuple
@@ -11,11 +11,14 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import block_length
 from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments, foretold_by_run, late, late_by
+from cpfls_cli.playback.innovations import innovations
+from cpfls_cli.playback.instruments import Instruments, past_setpoints
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
@@ -28,33 +31,39 @@ OVERLAP = 0.75
 """Share that neighbouring windows have in common."""
 _OF_FORCE = (*BANDS[2:4], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
-_BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
-"""Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
 _OF_WINDOW = 0.25
 """What was asked for is looked at every so often, share of a window."""
 _NEAR = 1e-4
 """Step of a derivative by what the rotors' response has, in natural sizes."""
+_WINDOW_S, _SLOW_S = 0.08, 0.25
+"""Windows, as short as samples allow: nothing within one is known when it begins. Predictions are averaged over the
+second, which leaves what is slow of them: most effects that a model lacks are in it."""
+_PARTED_HZ = 2.0
+"""Above predictions are fast, about."""
+_PER_WINDOW = round(1 / (1 - OVERLAP))
+_BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
+"""What was before ended a whole window before another begins: gusts that remember in more ways than one forget all but
+one of them, and logs that were filtered forward and backward what they know of what comes."""
 
 
 class Sums(NamedTuple):
-    """Products of balances with those of other runs, by block of the path, band and axis.
+    """Products of balances X and of what instruments know of them Z, by block of the path, band and axis.
 
     Attributes
     ----------
-    crossed, own, others : array, shape (block, band, 3, column, column)
-        With other runs, with itself, and of other runs.
+    ztx, xtx, ztz : array, shape (block, band, 3, column, column)
     windows : array, shape (block, band)
     """
 
-    crossed: Array
-    own: Array
-    others: Array
+    ztx: Array
+    xtx: Array
+    ztz: Array
     windows: Array
 
     def combined(self, columns: Array) -> Sums:
         """Combine columns, shape (axis, column, combination)."""
-        crossed, own, others = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
-        return Sums(crossed, own, others, self.windows)
+        ztx, xtx, ztz = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
+        return Sums(ztx, xtx, ztz, self.windows)
 
 
 class _Factors(NamedTuple):
@@ -86,7 +95,7 @@ class _Factors(NamedTuple):
         return {*other.torque} <= {*self.torque} and {*other.force} <= {*self.force}
 
     def columns(self, evaluated: Evaluated) -> tuple[Array, Array]:
-        """Give what is left of the balances of torque and force, its derivatives, and what the motion takes.
+        """Give the residual of the balances of torque and force, its derivatives, and what the motion takes.
 
         Returns
         -------
@@ -123,19 +132,19 @@ class Signals(NamedTuple):
     acting: Array
 
 
-class Laid(NamedTuple):
-    """How columns are laid.
+class WindowedColumns(NamedTuple):
+    """Columns of balances, made of averages over windows.
 
     Attributes
     ----------
     arranged : callable
         From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column).
-    left : array, shape (axis, column)
-        Weights of columns that give what is left.
+    residual : array, shape (axis, column)
+        Weights of columns that give the residual.
     """
 
     arranged: Callable[[Array, Array], Array]
-    left: Array
+    residual: Array
 
     def __call__(self, band: Windows, flight: PlaybackFlight, signals: Signals) -> Array:
         """Lay windows over what is balanced, shape (window, axis, column)."""
@@ -218,7 +227,7 @@ class Balances:
         return {
             number: asked
             for number, asked in enumerate(self.given.setpoints)
-            if asked is not None and not self.given.repeats.beside[number]
+            if asked is not None and not self.given.repeats.places[number]
         }
 
     @property
@@ -240,7 +249,7 @@ class Balances:
         Returns
         -------
         Sums
-            First column: what is left; then derivatives by each number; last what the motion takes.
+            First column: the residual; then derivatives by each number; last what the motion takes.
         """
         evaluated = Evaluated.of(free, values)
         wanted, response = _Factors.of(evaluated), evaluated.at.response
@@ -255,7 +264,7 @@ class Balances:
     def _summed(self, evaluated: Evaluated, factors: _Factors) -> tuple[Sums, Sums]:
         """Sum products of all columns of torque, and of force."""
         rotors = {number: _rotor_terms_by(evaluated, self.flights[number]) for number in self.path}
-        left_of_torque, left_of_force = (columns[..., 0] for columns in factors.columns(evaluated))
+        residual_torque, residual_force = (columns[..., 0] for columns in factors.columns(evaluated))
 
         def along(number: int, listed: Sequence[tuple[str, int, int]]) -> Array:
             terms = self.terms[number]
@@ -264,7 +273,7 @@ class Balances:
         turning = self.products(
             self.bands[: len(self.bands_hz)],
             {number: _of_torque(self.flights[number], along(number, factors.torque)) for number in self.path},
-            Laid(_turned, left_of_torque),
+            WindowedColumns(_turned, residual_torque),
         )
         pushing: list[ByBand] = []
         for axis in range(3 if self.translates else 0):
@@ -274,19 +283,21 @@ class Balances:
                 flight = self.flights[number]
                 pushes = flight.motion.rotation[:, axis, axes] * along(number, listed)
                 signals[number] = _of_force(flight, axis, evaluated.at.free.vehicle.gravity_m_s2, pushes)
-            pushing.append(self.products(self.bands[len(self.bands_hz) :], signals, Laid(_pushed, left_of_force)))
+            pushing.append(
+                self.products(self.bands[len(self.bands_hz) :], signals, WindowedColumns(_pushed, residual_force))
+            )
         names = sorted(set().union(*turning, *(each for by_band in pushing for each in by_band)))
         size = len(INERTIA_ENTRIES) + len(factors.torque), 1 + len(factors.force)
         return _arranged([turning], names, size[0]), _arranged(pushing, names, size[1])
 
-    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], laid: Laid) -> ByBand:
+    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], windowed: WindowedColumns) -> ByBand:
         """Sum products by band, path and block."""
-        beside = self._beside(signals)
-        return [self.of_band(self._rows(band, signals, beside, laid)) for band in bands]
+        others = self._of_other_runs(signals)
+        return [self.of_band(self._rows(band, signals, others, windowed)) for band in bands]
 
-    def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], _Products]:
+    def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], tuple[Array, int]]:
         """Sum products of rows of a band."""
-        found: dict[tuple[int, int], _Products] = {}
+        found: dict[tuple[int, int], tuple[Array, int]] = {}
         for number, own, known, middles in rows:
             first, path = self.path[number]
             place = path[middles]
@@ -294,13 +305,13 @@ class Balances:
             block = np.where(there, place * self.flights[number].motion.period // self.block_s, -1)
             for each in np.unique(block[there]):
                 mine, theirs = (taken(values, block == each) for values in (own, known))
-                sums = _Products(_product(theirs, mine), _product(mine, mine), _product(theirs, theirs), len(mine))
-                before = found.get((first, int(each)))
-                found[first, int(each)] = sums if before is None else before.plus(sums)
+                before, count = found.get((first, int(each)), (0.0, 0))
+                sums = np.stack([_product(theirs, mine), _product(mine, mine), _product(theirs, theirs)])
+                found[first, int(each)] = before + sums, count + len(mine)
         return found
 
-    def _beside(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
-        """Average what the other runs of its path have beside each flight."""
+    def _of_other_runs(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
+        """Average what the other runs of its path have at the places of each flight."""
         whole = [
             np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
             for number, flight in enumerate(self.flights)
@@ -314,63 +325,38 @@ class Balances:
         return found
 
     def _rows(
-        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], laid: Laid
+        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], windowed: WindowedColumns
     ) -> Iterator[Rows]:
-        own = {number: laid(band, self.flights[number], each) for number, each in signals.items()}
-        known = {number: laid(band, self.flights[number], each) for number, each in others.items()}
+        own = {number: windowed(band, self.flights[number], each) for number, each in signals.items()}
+        known = {number: windowed(band, self.flights[number], each) for number, each in others.items()}
         known |= self._expected(band, {number: own[number] for number in self.asked})
         for number in self.path:
             yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
-        """Predict balances from what was asked for; see `foretold`."""
-        lags = late_by(band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
+        """Predict balances from what was asked for."""
+        apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
         asked = {
-            number: averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
+            number: averaged(band, self.flights[number], past_setpoints(self.asked[number], band.period, apart))
             for number in own
         }
-        return foretold_by_run(asked, own)
+        return first_stage_fit_by_run(asked, own)
 
 
-class _Products(NamedTuple):
-    """Products of columns by axis, shape (axis, column, column), as in `Sums`, and how many windows."""
-
-    crossed: Array
-    own: Array
-    others: Array
-    windows: int
-
-    def plus(self, other: _Products) -> _Products:
-        """Add others."""
-        return _Products(
-            self.crossed + other.crossed,
-            self.own + other.own,
-            self.others + other.others,
-            self.windows + other.windows,
-        )
-
-
-ByBand = Sequence[Mapping[tuple[int, int], _Products]]
-"""By band: products by path and block."""
+ByBand = Sequence[Mapping[tuple[int, int], tuple[Array, int]]]
+"""By band: ZtX, XtX and ZtZ by path and block, shape (3, axis, column, column), and how many windows."""
 
 
 def _arranged(axes: Sequence[ByBand], names: Sequence[tuple[int, int]], size: int) -> Sums:
     """Arrange products of all axes at once, or of one after the other; 0 where there are none."""
     bands = len(axes[0]) if axes else 0
-    crossed, own, others = (np.zeros((len(names), bands, 3, size, size)) for _ in range(3))
-    counts = np.zeros((len(names), bands))
+    sums, counts = np.zeros((3, len(names), bands, 3, size, size)), np.zeros((len(names), bands))
     for axis, by_band in enumerate(axes):
         rows = slice(None) if len(axes) == 1 else slice(axis, axis + 1)
         for (band, found), (place, name) in product(enumerate(by_band), enumerate(names)):
             if name in found:
-                crossed[place, band, rows], own[place, band, rows], others[place, band, rows], count = found[name]
-                counts[place, band] = count
-    return Sums(crossed, own, others, counts)
-
-
-def block_length(seconds: float) -> float:
-    """Choose how long the blocks of paths of so many seconds are, s."""
-    return min(_BLOCK_S, max(seconds / _BLOCKS, _LEAST_BLOCK_S))
+                sums[:, place, band, rows], counts[place, band] = found[name]
+    return Sums(sums[0], sums[1], sums[2], counts)
 
 
 def fitting_bands(period: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
@@ -475,3 +461,71 @@ def _rotor_terms_by(evaluated: Evaluated, flight: PlaybackFlight) -> dict[str, A
         ahead[place] += step
         found[name] = (_rotor_terms(VehicleAt(at.free, ahead), flight) - found[""]) / step
     return found
+
+
+class PastBalances(Balances):
+    """Balances of innovations along flights, and what the past predicts of them.
+
+    They separate the vehicle from its loop where nothing is repeatable and nothing was asked: nobody knew the
+    innovations of a gust before, nor any loop.
+    """
+
+    of_past: ClassVar[bool] = True
+
+    @cached_property
+    def bands_hz(self) -> tuple[tuple[float, float], ...]:
+        """Bands of torque by frequency, about."""
+        (band, *_) = self.bands
+        return (_PARTED_HZ, 1 / (len(band.weight) * band.period)), (0.0, _PARTED_HZ)
+
+    @cached_property
+    def bands(self) -> tuple[Windows, ...]:
+        """Windows of torque, then of force; in all bands the same."""
+        period = self.flights[0].motion.period
+        one = band_windows(period, max(_WINDOW_S, FEWEST_SAMPLES * period), None)
+        return (one, one) * (2 if self.translates else 1)
+
+    @cached_property
+    def path(self) -> dict[int, tuple[int, Array]]:
+        """Each flight is a path of its own."""
+        return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
+
+    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], windowed: WindowedColumns) -> ByBand:
+        """Sum products of innovations with their predictions, fast ones and slow ones."""
+        band = bands[0]
+        rows = list(self._new(band, signals, windowed))
+        count = max(1, round(_SLOW_S / (band.hop * band.period)))
+        slow = [_mean_of_last(own.known, count) for own in rows]
+        fast = [own._replace(known=own.known - mean) for own, mean in zip(rows, slow, strict=True)]
+        return [
+            self.of_band(fast),
+            self.of_band(own._replace(known=mean) for own, mean in zip(rows, slow, strict=True)),
+        ]
+
+    def _new(self, band: Windows, signals: Mapping[int, Signals], windowed: WindowedColumns) -> Iterator[Rows]:
+        parts = [
+            (number, replace(self.flights[number], stretches=(part,)))
+            for number in self.path
+            for part in self.flights[number].stretches
+        ]
+        rows = [windowed(band, flight, signals[number]) for number, flight in parts]
+        residual = [np.einsum("wac,ac->wa", own, windowed.residual) for own in rows]
+        seen = [averaged(band, flight, _seen(flight)) for _, flight in parts]
+        new, known, _ = innovations(rows, residual, seen, _PER_WINDOW, _BEFORE)
+        for (number, flight), own, predicted in zip(parts, new, known, strict=True):
+            middles = middles_of(band, flight)
+            yield Rows(number, own, predicted, middles[len(middles) - len(own) :])
+
+
+def _seen(flight: PlaybackFlight) -> Array:
+    """Give what is measured and moves with torque and force, shape (time, signal)."""
+    columns = [flight.motion.rate, flight.speed**2]
+    return np.hstack([*columns, flight.motion.velocity] if flight.translates else columns)
+
+
+def _mean_of_last(values: Array, count: int) -> Array:
+    """Average over so many last windows, of the first over as many as there are, shape (window, ...)."""
+    sums = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    last = np.arange(1, len(values) + 1)
+    first = np.maximum(last - count, 0)
+    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None, None])

@@ -8,7 +8,7 @@ grow with frequency, and that of the rotor speeds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -19,15 +19,18 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.blocks import block_length, contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
+from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.balances import middles_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
 from cpfls_cli.playback.instruments import Instruments, ToldBy
-from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
+from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
 from cpfls_cli.result import about, part
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
@@ -50,8 +53,8 @@ _FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
 shorter than the last, which is what a piece mostly sees."""
 _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
-_LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
-"""What was asked for is answered within half a second; parts that are predicted by the others."""
+_LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
+"""What was asked for is answered within half a second."""
 _NEW_S, _RARE = 0.4, 0.01
 """Windows in which what was before is asked, and how surely what is new may grow with it."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
@@ -159,12 +162,6 @@ class _Band(NamedTuple):
         """Take what both sides of a balance differ by, shape (time, 2, axis) to (piece, axis, frequency)."""
         return -self.laid(flight, sides[:, 0], self.slope) - self.laid(flight, sides[:, 1], self.weight)
 
-    def starts(self, flight: PlaybackFlight) -> IntArray:
-        """Give the first sample of each piece."""
-        hop, counts = self.pieces.hop, [self.pieces.count(part.stop - part.start) for part in flight.stretches]
-        found = [part.start + np.arange(count) * hop for part, count in zip(flight.stretches, counts, strict=True)]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
-
 
 def find_gusts(
     model: VehicleModel,
@@ -243,10 +240,10 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     if not left:
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
-    newly = newly_left(seen, left, told, moving, found.noise)
-    foretold, without = newly.shares
-    foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
-    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_RARE)
+    new = residual_innovations(seen, left, told, moving, found.noise)
+    foretold, without = new.shares
+    little = foretold + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
+    gusty = np.isfinite(found.size) & little & ~new.grows(_RARE)
     if not blows(gusty, np.ones_like(gusty)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -301,7 +298,7 @@ def gusts_in(
     powers = _powers(sides, given, band, told_by)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
-    runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
+    runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
@@ -336,42 +333,36 @@ def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
 
 
 def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: ToldBy) -> _Powers:
-    """Take the power of what does not come again, by block of a run."""
+    """Take the power of the non-repeatable residual, by block of a run."""
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if told_by == "repeats":
-        beside = [
-            band.left(flight, given.repeats.others(number, sides)) if given.repeats.beside[number] else np.nan * own
-            for number, (flight, own) in enumerate(zip(given.flown, left, strict=True))
-        ]
+        beside = [band.left(flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
     elif told_by == "setpoints":
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
-    block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
-    power, whole, count, each_left = [], [], [], []
+    block_s = block_length(seen, _PIECE_S, _LEAST_BLOCK_S, _BLOCKS)
+    sums, count, each_left = [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
-        products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
-        block = band.starts(flight)[there] * period // block_s
-        each_left.append(squares)
-        for each in np.unique(block):
-            power.append(products[block == each].sum(axis=0))
-            whole.append(squares[block == each].sum(axis=0))
-            count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
+        both = np.stack([(own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2], axis=1)
+        block = (middles_of(band.pieces, flight)[there] - len(band.weight) // 2) * period // block_s
+        each_left.append(both[:, 1])
+        numbers, windows = np.unique(block, return_counts=True)
+        sums += [both[block == each].sum(axis=0) for each in numbers]
+        count += windows.tolist()
+    power, whole = np.reshape(sums, (len(count), 2, *left[0].shape[1:])).swapaxes(0, 1)
+    return _Powers(power, whole, np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
 def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: ToldBy) -> _Complex:
-    """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
+    """Give parts of a model as instruments predict them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]
     if told_by == "repeats":
-        flat = [
-            given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own
-            for number, own in enumerate(flat)
-        ]
+        flat = [given.repeats.others(number, flat) for number in range(len(flat))]
     laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
     if told_by == "setpoints":
         laid = _expected(given, laid, band)
@@ -409,19 +400,18 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     told = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
     told = told / np.maximum(np.sqrt((np.abs(told) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
     own = np.concatenate([left[number] for number in numbers])
-    expected, parts = np.zeros_like(own), contiguous(len(own), _FOLDS)
+    expected, part = np.zeros_like(own), contiguous(len(own), FOLDS)
+    parts = [part == fold for fold in range(FOLDS)]
     for axis in range(own.shape[1]):
         power = (np.abs(own[:, axis]) ** 2).mean(axis=0)
         # Of an axis that a flight does not know all is 0, and so is what is expected.
-        weight = 1 / np.where(power > 0, power, 1.0)
-        by_piece = np.einsum("pfc,f,pfd->pcd", np.conj(told), weight, told, optimize=True).real
-        right = np.einsum("pfc,f,pf->pc", np.conj(told), weight, own[:, axis], optimize=True).real
-        for fold in range(_FOLDS):
-            square = by_piece[parts != fold].sum(axis=0)
-            square += _RIDGE * np.trace(square) / len(square) * np.eye(len(square))
-            expected[parts == fold, axis] = told[parts == fold] @ np.linalg.solve(
-                square, right[parts != fold].sum(axis=0)
-            )
+        weighed = np.conj(told) / np.where(power > 0, power, 1.0)[:, None]
+        ztz = np.array([np.einsum("pfc,pfd->cd", weighed[at], told[at], optimize=True).real for at in parts])
+        ztx = np.array([np.einsum("pfc,pf->c", weighed[at], own[at, axis]).real for at in parts])[..., None]
+        size = np.trace(ztz, axis1=1, axis2=2)
+        ridge = _RIDGE * (size.sum() - size) / ztz.shape[1]
+        for at, fit in zip(parts, fits_of_others(ztz, ztx, ridge[:, None, None]), strict=True):
+            expected[at, axis] = told[at] @ fit[:, 0]
     ends = np.cumsum([len(left[number]) for number in numbers])[:-1]
     found = dict(zip(numbers, np.split(expected, ends), strict=True))
     return [found.get(number, np.nan * own) for number, own in enumerate(left)]
@@ -438,19 +428,16 @@ class _Axis:
     """What does not come again about one axis, and the process that has this power."""
 
     def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
-        weight, period = band.pieces.weight, band.pieces.period
-        self._period = period
+        self._period = band.pieces.period
         self._power, self._count = power, count
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
         self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
-        self._lags = np.asarray(period * np.arange(len(weight)), dtype=float)
-        alike = np.correlate(weight, weight, "full")[len(weight) - 1 :]
-        self._alike = np.cos(np.outer(band.turns, self._lags)) * alike * np.where(self._lags == 0, 1.0, 2.0)
+        self._process = GaussMarkov.seen_by(band.pieces.weight, self._period, band.turns)
 
     def bound(self) -> Array:
         """Give the size of all that is left, as columns of `FoundGusts`."""
-        scale = len(self._lags) * self._noise[0, 0]
+        scale = len(self._process.lags) * self._noise[0, 0]
         blocks = (self._power[:, 0] + 2 * self._power[:, 1:].sum(axis=1)) / self._count / scale
         largest = blocks.mean() + half_width(mean_error(blocks), len(blocks))
         return np.array([np.nan, 0.0, np.sqrt(max(largest, 0.0)), *[np.nan] * 5])
@@ -484,48 +471,32 @@ class _Axis:
         """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
         known = self._expected(self._fit.numbers)[0]
         both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
-        squares = np.abs(parts) ** 2 @ both / (len(self._lags) * self._noise[0, 0])
-        return lack_of(power, squares, known, Rest(self._alike, self._lags, _MEMORY_S))
+        squares = np.abs(parts) ** 2 @ both / (len(self._process.lags) * self._noise[0, 0])
+        return lack_of(power, squares, known, self._process, _MEMORY_S)
 
     @cached_property
     def _fit(self) -> _Fit:
         """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
-        from scipy.optimize import minimize
-
-        powers = self._mean.max() / self._alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
-        begin = np.log(np.maximum(powers, np.finfo(float).tiny))
+        powers = self._mean.max() / self._process.alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
+        # Of an axis that a flight does not know all is 0.
+        begin = np.log(np.maximum(powers, np.sqrt(np.finfo(float).tiny)))
         low = np.array([begin[0] - _FAR, np.log(_MEMORY_S[0]), *(begin[1:] - _FAR)])
         high = np.array([begin[0] + _FAR, np.log(_MEMORY_S[1]), *(begin[1:] + _NOISE)])
 
-        def unlikely(numbers: Array) -> tuple[float, Array]:
+        def spectrum(numbers: Array) -> tuple[Array, Callable[[Array], Array]]:
             expected, slopes = self._expected(numbers)
-            short = 1 - self._mean / expected
-            return float((self._mean / expected + np.log(expected)).sum()), (slopes / expected * short).sum(axis=1)
+            return expected, lambda slope: slopes @ slope[0]
 
-        found = [
-            minimize(
-                unlikely,
-                np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]),
-                jac=True,
-                bounds=list(zip(low, high, strict=True)),
-                method="L-BFGS-B",
-            )
-            for memory in _BEGIN_S
-        ]
-        best = min(found, key=lambda each: float(each.fun))
-        return _Fit(best.x, (best.x > low + _AT_END) & (best.x < high - _AT_END))
+        starts = [np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]) for memory in _BEGIN_S]
+        best = most_likely(spectrum, self._mean[None], starts, list(zip(low, high, strict=True)))
+        return _Fit(best, (best > low + _AT_END) & (best < high - _AT_END))
 
     def _expected(self, numbers: Array) -> tuple[Array, Array]:
         """Give the power by frequency, shape (frequency,), and its derivatives by the numbers, shape (4, frequency)."""
         size, memory, *noises = np.exp(numbers)
-        falls = np.exp(-self._lags / memory)
-        parts = np.array(
-            [
-                size * (self._alike @ falls),
-                size * (self._alike @ (falls * self._lags / memory)),
-                *(noise * shape for noise, shape in zip(noises, self._noise, strict=True)),
-            ]
-        )
+        shape, longer = self._process.power(memory)
+        white = (noise * each for noise, each in zip(noises, self._noise, strict=True))
+        parts = np.array([size * shape, size * longer, *white])
         return parts[[0, 2, 3]].sum(axis=0), parts
 
     def _errors(self, numbers: Array, free: BoolArray) -> Array:

@@ -1,4 +1,4 @@
-"""Gusts: a torque and a force that nothing tells, as random processes with a size and a memory by body axis."""
+"""Gusts: a torque and a force that nothing predicts, as random processes with a size and a memory by body axis."""
 
 from __future__ import annotations
 

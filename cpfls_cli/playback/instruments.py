@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import contiguous
+from cpfls_cli.lag import best_delay, delayed
 from cpfls_cli.playback.flight import PlaybackFlight
 
 _ALIKE = 0.7
@@ -34,20 +34,14 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 
 
 Told = Literal["repeats", "setpoints", "none"]
-"""What tells gusts and what a model lacks apart."""
+"""What separates gusts from what a model lacks."""
 ToldBy = Literal[Told, "past"]
-"""Where nothing moves a vehicle but its loop, what was before may tell."""
+"""Where nothing moves a vehicle but its loop, the past may separate them."""
 
-FOLDS = 5
-"""Parts of the flights that are kept aside in turn."""
 _ANSWERED_S = 0.5
 """What was asked for is answered within this time."""
 _HELD_M = 1.0
 """How far a vehicle that holds its place may be blown; where the setpoint is left over from before, it flies on."""
-_RIDGE = 1e-6
-"""Of predictions, so that setpoints that hardly differ from each other do no harm."""
-OF_MANY = 1e-3
-"""The same where many signals predict that go together, in flights that differ."""
 
 
 class Run(NamedTuple):
@@ -67,7 +61,7 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Instruments:
-    """What tells of each run how it was moved, apart from its gusts.
+    """What shows how each run was moved, apart from its gusts.
 
     Attributes
     ----------
@@ -91,7 +85,7 @@ class Instruments:
 
     @property
     def kind(self) -> Told:
-        """What most can be told from: runs of a path tell more than what was asked for."""
+        """What identifies most: runs of a path show more than what was asked for."""
         if self.repeats.likeness:
             return "repeats"
         return "setpoints" if self.names else "none"
@@ -103,7 +97,7 @@ class Instruments:
             return frozenset(self.runs[number].flight for path in self.repeats.paths() for number in path)
         return frozenset(run.flight for run, asked in zip(self.runs, self.setpoints, strict=True) if asked is not None)
 
-    def beside(self, values: Sequence[Array]) -> list[Array | None]:
+    def by_flight(self, values: Sequence[Array]) -> list[Array | None]:
         """Give the instruments of each flight: of repeats what other runs have there, else what was asked of it.
 
         Parameters
@@ -117,18 +111,16 @@ class Instruments:
             NaN where no other run is; None for a flight without instruments.
         """
         cut = [values[run.flight][run.part] for run in self.runs]
-        found: list[Array | None] = []
-        for flight, own in enumerate(values):
-            columns: Array | None = None
-            for number, run in enumerate(self.runs):
-                if run.flight != flight or flight not in self.flights:
-                    continue
-                asked = self.setpoints[number]
-                known = self.repeats.others(number, cut)[:, None] if self.kind == "repeats" else asked
-                if known is not None:
-                    columns = np.full((len(own), known.shape[1]), np.nan) if columns is None else columns
-                    columns[run.part] = known
-            found.append(columns)
+        found: list[Array | None] = [None] * len(values)
+        for number, run in enumerate(self.runs):
+            asked = self.setpoints[number]
+            known = self.repeats.others(number, cut)[:, None] if self.kind == "repeats" else asked
+            if known is not None and run.flight in self.flights:
+                columns = found[run.flight]
+                if columns is None:
+                    columns = np.full((len(values[run.flight]), known.shape[1]), np.nan)
+                columns[run.part] = known
+                found[run.flight] = columns
         return found
 
 
@@ -162,52 +154,10 @@ def held(flight: PlaybackFlight) -> bool:
     )
 
 
-def late_by(period: float, apart: int) -> range:
-    """List by how many samples setpoints are held back that predict what answers them, so many of them apart."""
-    return range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
-
-
-def late(values: Array, samples: int) -> Array:
-    """Hold signals back by whole samples, shape (time, column)."""
-    samples = min(samples, len(values))
-    return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
-
-
-def foretold(asked: Array, values: Array, ridge: float = _RIDGE) -> Array:
-    """Predict values from what was asked for, each part as the other parts tell.
-
-    What a part itself would tell of its gusts is thereby left out, however many numbers predict.
-
-    Parameters
-    ----------
-    asked : array, shape (time, column)
-    values : array, shape (time, ...)
-    ridge : float
-        Prior precision of the prediction, for columns as large as 1.
-
-    Returns
-    -------
-    array, shape (time, ...)
-    """
-    size = asked.std(axis=0)
-    asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
-    flat, parts = values.reshape(len(values), -1), contiguous(len(values), FOLDS)
-    found = np.empty_like(flat)
-    for fold in range(FOLDS):
-        rest, aside = asked[parts != fold], parts == fold
-        square = rest.T @ rest + ridge * len(rest) * np.eye(asked.shape[1])
-        found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
-    return found.reshape(values.shape)
-
-
-def foretold_by_run(
-    asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = _RIDGE
-) -> dict[int, Array]:
-    """Predict values of runs by their numbers, all runs together, from what was asked for; see `foretold`."""
-    if not asked:
-        return {}
-    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]), ridge)
-    return dict(zip(asked, np.split(told, np.cumsum([len(own) for own in asked.values()])[:-1]), strict=True))
+def past_setpoints(asked: Array, period: float, apart: int) -> Array:
+    """Stack setpoints and their past, so many samples apart, shape (time, column)."""
+    lags = range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
+    return np.hstack([delayed(asked, lag, "previous") for lag in lags])
 
 
 def _runs(flight: PlaybackFlight) -> list[slice]:
@@ -271,7 +221,7 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
 
 
 def _of_one_kind(flights: Sequence[PlaybackFlight], repeated: Collection[int]) -> list[tuple[str, ...]]:
-    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is foretold of all."""
+    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is predicted for all."""
     held = [{(name, flight.setpoints[name].shape[1]) for name in _outside(flight)} for flight in flights]
     voting = [number for number in range(len(flights)) if number not in repeated] or range(len(flights))
 
@@ -289,13 +239,13 @@ class Repeats:
 
     Attributes
     ----------
-    beside : tuple of mapping of int to array, shape (time,)
+    places : tuple of mapping of int to array, shape (time,)
         For each flight, by number of another: its sample, in parts of one, at each own sample; NaN where there is none.
     likeness : mapping of pair of int to float
         Correlation of flights of the same path, first the smaller number.
     """
 
-    beside: tuple[Mapping[int, Array], ...]
+    places: tuple[Mapping[int, Array], ...]
     likeness: Mapping[tuple[int, int], float]
 
     def paths(self) -> tuple[tuple[int, ...], ...]:
@@ -323,7 +273,7 @@ class Repeats:
         """
         own = values[number]
         total, count = np.zeros_like(own), np.zeros(len(own))
-        for other, place in self.beside[number].items():
+        for other, place in self.places[number].items():
             inside = np.isfinite(place)
             total[inside] += _between(values[other], place[inside])
             count += inside
@@ -345,7 +295,7 @@ class Repeats:
         array, shape (time, ...)
             At the samples of the flight; NaN where the other is not.
         """
-        place = self.beside[number][other]
+        place = self.places[number][other]
         inside = np.isfinite(place)
         found = np.full((len(place), *values.shape[1:]), np.nan)
         found[inside] = _between(values, place[inside])
@@ -367,7 +317,7 @@ class Repeats:
             NaN where the first is not.
         """
         first = next((group[0] for group in self.paths() if number in group), number)
-        return first, self.beside[number].get(first, np.arange(length, dtype=float))
+        return first, self.places[number].get(first, np.arange(length, dtype=float))
 
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
@@ -471,13 +421,11 @@ def _aligned(one: PlaybackFlight, other: PlaybackFlight, shift: float) -> Array:
             continue
         piece, around = mine[first : first + length], yours[begin : begin + length + 2 * far]
         products = np.array([np.sum(piece * around[late : late + length]) for late in range(2 * far + 1)])
-        best = int(np.argmax(products))
-        if products[best] <= 0 or not 0 < best < 2 * far:
-            continue
-        before, at, after = products[best - 1 : best + 2]
-        middles.append(first + length / 2)
-        shifts.append(int(shift) - far + best + 0.5 * (before - after) / (before - 2 * at + after))
-        weights.append(np.sqrt(at))
+        at, inside = best_delay(int(shift) - far + np.arange(2 * far + 1.0), -products)
+        if inside and products.max() > 0:
+            middles.append(first + length / 2)
+            shifts.append(float(at))
+            weights.append(np.sqrt(products.max()))
     samples = np.arange(len(mine))
     line = np.full(len(mine), shift)
     if len(middles) > 2:

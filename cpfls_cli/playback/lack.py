@@ -1,21 +1,22 @@
-"""What a model lacks, as it comes again: a torque and a force with a memory, as large as shares of the model's parts.
+"""What a model lacks that is repeatable: a torque and a force with a memory, as large as shares of the model's parts.
 
 A formula that is wrong is wrong in proportion to what it gives: little where little flows, much in a fast climb. So
 what a model lacks about or along an axis is a Gauss-Markov process whose size at an instant is the root of the sum of
 squares of a rest and of shares of what the flow does there to each part of the model, while the body does not turn and
 all rotors turn alike: a size in proportion to rates and commands, which answer it, would excite itself. Other runs of a
-path, or what was asked for, tell the parts, so that no gust is mistaken for them.
+path, or what was asked for, predict the parts, so that no gust is mistaken for them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about
@@ -26,32 +27,8 @@ _BEGIN_S = (0.15, 0.6)
 """Where the memory begins."""
 _FAR, _MORE = 14.0, 4.0
 """Logarithms of factors by which powers may be off where they begin, down and up."""
-
-_STEPS, _NOTHING = 500, 1e-12
-"""Of the search; and the mean square of a part, over that of what is left, below which it is rounding."""
-
-
-class Rest(NamedTuple):
-    """Spectra that a process of unit size has, by its memory.
-
-    Attributes
-    ----------
-    alike : array, shape (frequency, lag)
-        Power by frequency that unit correlation at a lag has.
-    lags : array, shape (lag,), s
-    memory : tuple of float, s
-        Shortest and longest.
-    """
-
-    alike: Array
-    lags: Array
-    memory: tuple[float, float]
-
-    def power(self, memory: float) -> tuple[Array, Array]:
-        """Give the power by frequency, and its derivative by the logarithm of the memory, shapes (frequency,)."""
-        ages = self.lags / memory
-        falls = np.exp(-ages)
-        return self.alike @ falls, self.alike @ (falls * ages)
+_NOTHING = 1e-12
+"""Mean square of a part, over that of the residual, below which it is rounding."""
 
 
 class AxisLack(NamedTuple):
@@ -135,55 +112,47 @@ class DrawnLack:
         return tuple(times(functions.sqrt(square), each) for square, each in zip(squares, unit, strict=True))
 
 
-def lack_of(power: Array, squares: Array, known: Array, rest: Rest) -> AxisLack:
-    """Find how large what a model lacks is, by Whittle's likelihood of what is left.
+def lack_of(
+    power: Array, squares: Array, known: Array, process: GaussMarkov, memory_s: tuple[float, float]
+) -> AxisLack:
+    """Find how large what a model lacks is, in the power of the residual.
 
-    The power of what is left on a piece is ``known(w) + (r^2 + sum_k s_k^2 q_k) G(w; m)``: gusts and noise, and a
-    Gauss-Markov process of memory m with shares s_k of the parts, whose mean squares on the piece are q_k, and a rest.
+    On a piece it is ``known(w) + (r^2 + sum_k s_k^2 q_k) G(w; m)``: gusts and noise, and a Gauss-Markov process of
+    memory m with shares s_k of the parts, whose mean squares on the piece are q_k, and a rest.
 
     Parameters
     ----------
     power : array, shape (piece, frequency)
-        Of what is left.
+        Of the residual.
     squares : array, shape (piece, part)
-        Mean square of each part as instruments foretell it.
+        Mean square of each part as instruments predict it.
     known : array, shape (frequency,)
-        Power of gusts and noise, which do not come again.
-    rest : Rest
+        Power of gusts and noise, which are not repeatable.
+    memory_s : tuple of float, s
+        Shortest and longest.
 
     References
     ----------
-    Whittle 1953; Kennedy and O'Hagan 2001 (discrepancy of a model).
+    Kennedy and O'Hagan 2001 (discrepancy of a model).
     """
-    from scipy.optimize import minimize
-
-    largest = np.log(power.mean(axis=0).max() / rest.alike.sum(axis=1).max())
+    largest = np.log(power.mean(axis=0).max() / process.alike.sum(axis=1).max())
     active = np.flatnonzero(squares.mean(axis=0) > _NOTHING * np.exp(largest))
     unit = squares[:, active].mean(axis=0)
     columns = np.column_stack([np.ones(len(squares)), squares[:, active] / unit])
+    count = columns.shape[1]
 
-    def unlikely(numbers: Array) -> tuple[float, Array]:
-        sizes, (shape, longer) = np.exp(numbers[:-1]), rest.power(float(np.exp(numbers[-1])))
+    def spectrum(numbers: Array) -> tuple[Array, Callable[[Array], Array]]:
+        sizes, (shape, longer) = np.exp(numbers[:-1]), process.power(float(np.exp(numbers[-1])))
         size = columns @ sizes
         expected = known + size[:, None] * shape
-        ratio = power / expected
-        slope = (1.0 - ratio) / expected
-        slopes = np.append(sizes * (columns.T @ (slope @ shape)), size @ (slope @ longer))
-        return float((ratio + np.log(expected)).sum()) / len(power), slopes / len(power)
+        return expected, lambda slope: np.append(sizes * (columns.T @ (slope @ shape)), size @ (slope @ longer))
 
-    count = columns.shape[1]
-    found = [
-        minimize(
-            unlikely,
-            np.array([*[largest - 1.0 - np.log(count)] * count, np.log(memory)]),
-            jac=True,
-            method="L-BFGS-B",
-            bounds=[*[(largest - _FAR, largest + _MORE)] * count, tuple(np.log(rest.memory))],
-            options={"maxiter": _STEPS},
-        )
-        for memory in _BEGIN_S
-    ]
-    best = min(found, key=lambda each: float(each.fun)).x
+    best = most_likely(
+        spectrum,
+        power,
+        [np.array([*[largest - 1.0 - np.log(count)] * count, np.log(memory)]) for memory in _BEGIN_S],
+        [*[(largest - _FAR, largest + _MORE)] * count, (np.log(memory_s[0]), np.log(memory_s[1]))],
+    )
     share = np.zeros(squares.shape[1])
     share[active] = np.sqrt(np.exp(best[1:-1]) / unit)
     return AxisLack(share, float(np.exp(0.5 * best[0])), float(np.exp(best[-1])))

@@ -15,9 +15,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
+from cpfls_cli.blocks import BLOCK_S, FEWEST_BLOCKS, contiguous, half_width, jackknife_error
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED
+from cpfls_cli.playback.balances import BANDS, band_windows
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -25,27 +26,21 @@ from cpfls_cli.playback.table import WrenchTable
 from cpfls_cli.result import About
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES
 
-_BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
-"""Windows in s; the longer average taken from the shorter leaves a band: about 2 to 6, 1 to 3, 0.5 to 1.5 Hz.
-
-Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth.
-"""
+_BANDS = BANDS[1:4]
+"""Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth."""
 _FASTER = (0.05, 0.15)
-"""Of the same kind, about 6 to 20 Hz: shown beside the others, and in no bound, for rotors and frames answer there."""
+"""Of the same kind, about 6 to 20 Hz: shown with the others, and in no bound, for rotors and frames answer there."""
 _LAGS = (0.0, 0.01, 0.02, 0.05, 0.1)
 """Lags of rotors that are tried where none is known, s."""
-_OVERLAP = 0.75
-_BLOCK_S = 4.0
-"""Longer than what rotors and rotation remember of each other."""
 ANY = 10.0
 """Factor either way from which on a body can be any."""
 _TINY = np.finfo(float).tiny
 _LEAVES_LESS = 0.5
 """Of what a model leaves unexplained: one without its effects that leaves less shows that it is wrong."""
 _MOST_NOISE = 0.1
-"""Of the power of a band that may be noise of the sensors: with more, what is left is the noise's error."""
+"""Of the power of a band that may be noise of the sensors: with more, the residual is the noise's error."""
 
 
 _BODY = "body (FLU)"
@@ -96,7 +91,7 @@ class LoopBounds(NamedTuple):
 
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
-    """Bound the moments of inertia that the flights of a closed loop allow, beside those of a model.
+    """Bound the moments of inertia that the flights of a closed loop allow, in those of a model.
 
     With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band,
     ``<t, h> / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want
@@ -151,7 +146,7 @@ def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight
     Parameters
     ----------
     told_hz : float, Hz
-        How often the logs tell the rotors.
+        How often the logs hold the rotors.
     """
     if told_hz >= SLOW_HZ:
         return False
@@ -239,7 +234,7 @@ def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Ar
     torque, momentum, direct, period = stretch
     if short_s < FEWEST_SAMPLES * period:
         return
-    band = windows(period, short_s, _OVERLAP).less(windows(period, long_s, _OVERLAP))
+    band = band_windows(period, short_s, long_s)
     count = band.count(len(torque))
     if not count:
         return
@@ -247,7 +242,7 @@ def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Ar
     seen, turning = band.average(torque), band.derivative(momentum) + band.average(direct)
     unseen, trembling = noise.average(torque), noise.derivative(momentum) + noise.average(direct)
     products = np.stack([seen**2, seen * turning, turning**2, unseen**2, trembling**2], axis=2)
-    blocks = max(1, round(count * band.hop * period / _BLOCK_S))
+    blocks = max(1, round(count * band.hop * period / BLOCK_S))
     number = contiguous(count, blocks)
     yield from (products[number == block].sum(axis=0) for block in range(blocks))
 

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
-from cpfls_cli.playback.constants import UsedInstruments, constants_of_past, find_constants, used_instruments
+from cpfls_cli.playback.constants import UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -152,12 +152,12 @@ def find_vehicle(
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
     loop, given = loop_beside_plain(fitted.model, begun, own), instruments(own)
     constants = find_constants(begun, own, given, settings.leave_out)
-    if loop.unexplained and (constants is None or not constants.tells):
-        constants = constants_of_past(begun, own, given, settings.leave_out) or constants
+    if loop.unexplained and (constants is None or not constants.identified):
+        constants = find_constants(begun, own, given, settings.leave_out, past=True) or constants
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
     if constants is not None and not (loop.unexplained or constants.contradict(fitted.model.body.inertia)):
         constants = None
-    if constants is not None and constants.tells:
+    if constants is not None and constants.identified:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
     else:
         solved, spread, forecast = fitted, uncertainty(fitted, windows), None
@@ -170,7 +170,7 @@ def find_vehicle(
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, told=forecast is not None)
     shares, airspeed = _shares(model, own)
-    used = None if forecast is None or constants is None else used_instruments(given, constants)
+    used = None if forecast is None or constants is None else constants.used
     return FoundVehicle(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,

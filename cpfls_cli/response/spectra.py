@@ -15,6 +15,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, runs
+from cpfls_cli.estimation.first_stage import fits_of_others
+from cpfls_cli.estimation.spectra import coherence
 from cpfls_cli.response.mismatch import clearness
 from cpfls_cli.result import about, result
 
@@ -302,9 +304,7 @@ def _instrument(stretches: Sequence[Stretch], analysis: _Analysis, u: Array) -> 
     blocks = int(number.max()) + 1
     power = np.array([np.einsum("nfk,nfl->fkl", z[number == b].conj(), z[number == b]) for b in range(blocks)])
     cross = np.array([np.einsum("nfk,nf->fk", z[number == b].conj(), u[number == b]) for b in range(blocks)])
-    apart = np.abs(np.subtract.outer(np.arange(blocks), np.arange(blocks))) > _BLOCKS_BESIDE
-    others = np.tensordot(apart.astype(float), power, 1) + _RIDGE * len(z) * np.eye(z.shape[2])
-    weights = np.linalg.solve(others, np.tensordot(apart.astype(float), cross, 1)[..., None])[..., 0]
+    weights = fits_of_others(power, cross[..., None], _RIDGE * len(z), _BLOCKS_BESIDE)[..., 0]
     return np.asarray(np.einsum("nfk,nfk->nf", z, weights[number]))
 
 
@@ -338,7 +338,7 @@ def _random_error(spectra: _Spectra) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         gain = spectra.zy / spectra.zu
         rest = spectra.yy - 2 * (gain.conj() * spectra.uy).real + np.abs(gain) ** 2 * spectra.uu
-        strength = spectra.uu * _coherence(spectra.zu, spectra.zz, spectra.uu, spectra.averages)
+        strength = spectra.uu * coherence(spectra.zu, spectra.zz * spectra.uu, spectra.averages)
         found = np.sqrt(np.maximum(rest, 0.0) / (2 * spectra.averages * np.abs(gain) ** 2 * strength))
     # Where nothing of the input is the instrument's anything is possible.
     return np.asarray(np.where(strength == 0.0, np.inf, found))
@@ -352,17 +352,9 @@ def _of_spectra(frequency: Array, spectra: _Spectra, instrumented: bool) -> Freq
         gain=gain,
         model=None if np.isnan(model).all() else model,
         direct=direct,
-        coherence_input=_coherence(spectra.zu, spectra.zz, spectra.uu, spectra.averages),
-        coherence_output=_coherence(spectra.zy, spectra.zz, spectra.yy, spectra.averages),
+        coherence_input=coherence(spectra.zu, spectra.zz * spectra.uu, spectra.averages),
+        coherence_output=coherence(spectra.zy, spectra.zz * spectra.yy, spectra.averages),
         random_error=_random_error(spectra),
         averages=spectra.averages,
         instrumented=instrumented,
     )
-
-
-def _coherence(cross: Numbers, first: Array, second: Array, averages: Array) -> Array:
-    """Compute the share that one signal explains of another, less what chance explains with so few windows."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        raw = np.abs(cross) ** 2 / (first * second)
-        found = 1 - (1 - raw) * averages / (averages - 1)
-    return np.asarray(np.clip(np.where(averages > 1, found, 0.0), 0.0, 1.0))

@@ -235,7 +235,7 @@ def twin_of(
     positions = [each.position for each in flight.parts if each.position is not None]
 
     def moves(given: Array) -> Array | None:
-        return moved_by.beside([given])[0]
+        return moved_by.by_flight([given])[0]
 
     return Twin(
         flight=flight.name,

@@ -71,7 +71,7 @@ class Model:
     cautions: tuple[str, ...] = about("what speaks against it", "caution")
     impossible: str | None = about("its numbers that no vehicle has")
     rotors: int = about("count of them")
-    weights: int = about("coefficients of torque and force that are not zero")
+    weights: int = about("numbers of torque and force that are not zero")
     effects: tuple[str, ...] = about("that it holds", "effect")
     learned: bool = about("whether a part of it has no name")
     parameters: int | None = about("of an identified model")
@@ -149,7 +149,7 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
         cautions=sheet.cautions,
         impossible=sheet.impossible or None,
         rotors=sheet.model.rotors,
-        weights=len(sheet.weights),
+        weights=len(sheet.numbers),
         effects=tuple(effect.name for effect in sheet.model.effects),
         learned=sheet.model.remainder is not None,
         parameters=None if identified is None else identified.structure.parameters,

@@ -182,7 +182,7 @@ def response(
         model=name,
         flights=tuple(flight.name for flight in given),
         instruments=moved_by.kind,
-        responses=vehicle_responses(judged, given, moved_by.beside),
+        responses=vehicle_responses(judged, given, moved_by.by_flight),
         warnings=(
             *seen_twice(inputs[role] for role in roles),
             *seen_warnings(name, learned_by(model), known_by(roles, inputs)),

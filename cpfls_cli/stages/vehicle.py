@@ -455,7 +455,7 @@ def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> Mappin
         return {}
     assert vehicle.sources is not None, "it was found just now"
     try:
-        return vehicle_responses(vehicle.model, own, vehicle.sources.beside)
+        return vehicle_responses(vehicle.model, own, vehicle.sources.by_flight)
     except InputError:
         # Stretches that are too short for a window; the flights' inputs were checked before.
         return {}

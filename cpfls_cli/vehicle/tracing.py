@@ -1,4 +1,4 @@
-"""Symbols that record what is computed with them, and write it as a function of plain Python.
+"""Symbols that record what is computed with them, and write it in a language: plain Python, C99, JAX, CasADi.
 
 What is computed twice is computed once, what no result needs is left out, and numbers that are known are folded in.
 """
@@ -8,13 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from cpfls_cli.vehicle.values import Each, Functions, Value, plus
 
-_LONGEST = 160
-"""Characters of an expression, beyond which it gets a line of its own."""
-_OPERATORS = ("+", "-", "*", "/", "<", ">", "**")
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
     "exp": math.exp,
@@ -39,6 +36,10 @@ class Graph:
         if place == len(self.nodes):
             self.nodes.append(operation)
         return Symbol(self, place)
+
+    def given(self, value: Symbol, *operation: Any) -> None:
+        """Say what an operation gives, before it is recorded."""
+        self._places[operation] = value.place
 
     def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
         """Make arguments of the function that is traced."""
@@ -175,36 +176,92 @@ def _compiled(source: str) -> Callable[..., Any]:
     return names["step"]  # type: ignore[no-any-return]
 
 
+class Language(NamedTuple):
+    """How operations are written.
+
+    Attributes
+    ----------
+    operations : mapping of str to str
+        By the name of what is no function of the same name.
+    line, number, function, comment : str
+        A statement with a name and an expression, a number, a function with its name, a remark.
+    longest : int
+        Characters of an expression, beyond which it gets a line of its own.
+    """
+
+    operations: Mapping[str, str]
+    line: str = "{} = {}"
+    number: str = "({!r})"
+    function: str = "{}"
+    comment: str = "# {}"
+    longest: int = 160
+
+    def written(self, name: str, arguments: Sequence[str]) -> str:
+        """Write an operation."""
+        form = self.operations.get(name) or _OPERATORS.get(name)
+        return form.format(*arguments) if form else f"{self.function.format(name)}({', '.join(arguments)})"
+
+
+_OPERATORS = {name: f"({{}} {name} {{}})" for name in ("+", "-", "*", "/", "<", ">", "**")} | {"negative": "(-{})"}
+PYTHON = Language({"where": "({1} if {0} else {2})"})
+C = Language(
+    {"where": "({} ? {} : {})", "**": "MATH(pow)({}, {})", "abs": "MATH(fabs)({})"},
+    line="const real {} = {};",
+    number="R({!r})",
+    function="MATH({})",
+    comment="/* {} */",
+    longest=80,
+)
+"""With the macros of the export: ``R`` of a number, ``MATH`` of a function."""
+LIBRARY = Language({"sqrt": "_length({})", "atan2": "_direction({}, {})"}, function="_{}", longest=80)
+"""JAX or CasADi, by functions of the export that hide which, and have derivatives where there is no airflow."""
+
+
 def python_source(graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]) -> str:
     """Write what `traced` makes as text: a function called ``step``."""
-    uses = _uses(graph, [x.place for group in results for x in group if isinstance(x, Symbol)])
-    text: dict[int, str] = {}
-    lines = []
-    for place, (name, *inner) in enumerate(graph.nodes):
-        if not uses[place]:
-            continue
-        if name in ("input", "number"):
-            text[place] = inner[0] if name == "input" else f"({inner[0]!r})"
-            continue
-        text[place] = _expression(name, [text[each] for each in inner])
-        if uses[place] > 1 or len(text[place]) > _LONGEST:
-            lines.append(f"t{place} = {text[place]}")
-            text[place] = f"t{place}"
+    flat = [x for group in results for x in group]
+    lines, texts = written(graph, flat, PYTHON)
     named = {name: [graph.nodes[x.place][1] for x in group] for name, group in arguments.items()}
     unpacked = [f"{', '.join(names)}, = {name}" for name, names in named.items() if names]
-    groups = (_tuple(text[x.place] if isinstance(x, Symbol) else repr(float(x)) for x in group) for group in results)
+    text = iter(texts)
+    groups = (_tuple(next(text) for _ in group) for group in results)
     body = "\n    ".join([*unpacked, *lines, f"return {_tuple(groups)}"])
     return f"def step({', '.join(arguments)}):\n    {body}\n"
 
 
-def _expression(name: str, arguments: Sequence[str]) -> str:
-    if name in _OPERATORS:
-        return f"({arguments[0]} {name} {arguments[1]})"
-    if name == "negative":
-        return f"(-{arguments[0]})"
-    if name == "where":
-        return f"({arguments[1]} if {arguments[0]} else {arguments[2]})"
-    return f"{name}({', '.join(arguments)})"
+def written(
+    graph: Graph, results: Sequence[Value], language: Language, parts: Mapping[int, str] | None = None
+) -> tuple[list[str], list[str]]:
+    """Write what was recorded: lines, and expressions of the results in terms of them.
+
+    Parameters
+    ----------
+    parts : mapping of int to str, optional
+        What is said before the operations that begin at a place.
+    """
+    uses = _uses(graph, [x.place for x in results if isinstance(x, Symbol)])
+    text: dict[int, str] = {}
+    lines: list[str] = []
+    said = ""
+    for place, (name, *inner) in enumerate(graph.nodes):
+        said = (parts or {}).get(place, said)
+        if not uses[place]:
+            continue
+        if name in ("input", "number"):
+            text[place] = inner[0] if name == "input" else language.number.format(inner[0])
+            continue
+        text[place] = language.written(name, [text[each] for each in inner])
+        if uses[place] > 1 or len(text[place]) > language.longest:
+            lines += [language.comment.format(said)] if said else []
+            lines.append(language.line.format(f"t{place}", text[place]))
+            text[place], said = f"t{place}", ""
+    return lines, [text[x.place] if isinstance(x, Symbol) else language.number.format(float(x)) for x in results]
+
+
+def used(graph: Graph, results: Sequence[Value]) -> set[str]:
+    """Name the inputs that results need."""
+    uses = _uses(graph, [x.place for x in results if isinstance(x, Symbol)])
+    return {node[1] for node, count in zip(graph.nodes, uses, strict=True) if count and node[0] == "input"}
 
 
 def _tuple(items: Iterable[str]) -> str:

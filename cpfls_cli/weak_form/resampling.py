@@ -8,8 +8,6 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous
 
-BLOCK_S = 4.0  # Length of the blocks that are left out in turn, s: longer than noise and motion remember.
-
 # Of blocks: the work grows with them, and intervals by Student's t are 6 % wider than for infinitely many.
 _LARGEST_NUMBER = 24
 _RIDGE = 1e-9  # Of columns brought to one length: far below noise, far above rounding.

@@ -1,6 +1,7 @@
 """Exported vehicles in all forms, each evaluated by the same calls: C is compiled with all checks, JSON as it says."""
 
 import json
+import math
 import subprocess
 
 import numpy as np
@@ -175,32 +176,14 @@ class InJson:
         return np.array([self._wrench(*row) for row in zip(air, rate, rotor, strict=True)])
 
     def _wrench(self, air, rate, rotor):
-        terms, total = self._terms(air, rate), np.zeros(6)
-        assert len(terms) == len(self.document["terms_of_motion"])
         assert len(rotor) == len(self.document["terms_of_rotors"])
-        for row, term, of_rotor, weight in zip(*self.document["weights"].values(), strict=True):
-            total[row] += weight * terms[term] * rotor[of_rotor]
-        return total
-
-    def _terms(self, air, rate):
-        motion, length = [*air, *rate], np.linalg.norm(air)
-        products = [motion[first] * motion[second] for first, second in self.document["factors_of_products"]]
-        terms = [1.0, *motion, *products, *(length * air), *(abs(rate) * rate)]
-        plane = np.hypot(air[0], air[1])
-        return [*terms, *(column * power for column in self.columns(air) for power in (plane, plane**2))]
-
-    def columns(self, air):
-        """Columns of the learned part."""
-        learned = self.document["learned"]
-        if learned is None:
-            return []
-        angle, peaks, order = np.arctan2(air[1], air[0]), learned["breakpoints"], learned["harmonic_order"]
-        saw = np.interp(np.mod(angle, 2 * np.pi), np.pi * np.array([0, 0.5, 1.5, 2]), [0, 1, -1, 0])
-        waves = [wave(k * angle) for wave in (np.sin, np.cos) for k in range(1, order + 1)]
-        features = np.array([1.0, *waves] if order else [1.0, saw])
-        return [
-            fired * feature for fired in firing(np.mod(angle, 2 * np.pi) / (2 * np.pi), peaks) for feature in features
-        ]
+        functions = {name: getattr(math, name) for name in ("sqrt", "exp", "sin", "cos", "atan2", "floor")}
+        names = functions | {name: each["value"] for name, each in self.document["numbers"].items()}
+        names |= {"air": air.tolist(), "rate": rate.tolist(), "rotor": rotor.tolist()}
+        if self.document["learned"]:
+            names["learned"] = self.document["learned"]["coefficients"]
+        exec("\n".join(self.document["wrench"]["lines"]), names)
+        return np.array([eval(component, names) for component in self.document["wrench"]["components"]])
 
     def motion(self, state, rotor, period):
         rows = [self._moved(*parts, period) for parts in zip(*state, rotor, strict=True)]
@@ -222,20 +205,6 @@ class InJson:
             rate + period * angular,
         )
         return np.concatenate(first), np.concatenate([part.ravel() for part in after])
-
-
-def firing(turn, peaks):
-    """How strongly each rule of a circle fires, by Zadeh's function alone."""
-    rules = max(len(peaks) - 1, 1)
-    degrees = np.zeros(rules)
-    if rules == 1:
-        return np.ones(1)
-    left = np.flatnonzero(np.array(peaks[:-1]) <= turn)[-1]
-    u = (turn - peaks[left]) / (peaks[left + 1] - peaks[left])
-    falling = 1 - 2 * u**2 if u < 0.5 else 2 * (1 - u) ** 2
-    degrees[left] += falling
-    degrees[(left + 1) % rules] += 1 - falling
-    return degrees
 
 
 def turn(vector):

@@ -8,8 +8,8 @@ import numpy as np
 from cpfls_cli import store
 from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.vehicle_model import Vehicle
-from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.export.polynomials import weights_of
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -17,6 +17,7 @@ from cpfls_cli.playback.structure import TriedStructure
 from cpfls_cli.playback.table import Remainder
 from cpfls_cli.playback.vehicle import FoundNumber, Share
 from cpfls_cli.report.source import source_of_result
+from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 QUAD = VehicleSettings(
@@ -54,16 +55,21 @@ SEVEN_RULES = (0.0, 0.1, 0.25, 0.4, 0.6, 0.7, 0.9, 1.0)
 @cache
 def polynomial_effects(vehicle):
     """Every effect of the catalogue that is a polynomial, with coefficients inside its range and of its size."""
-    rng, probe, found = np.random.default_rng(3), Probe.of(vehicle), []
+    rng, found = np.random.default_rng(3), []
     for known in CATALOGUE.values():
-        shape = {one.name: one.grid[len(one.grid) // 2] for one in known.shapes}
-        if known.carried is None and polynomial(known, probe, shape) is not None:
-            bounds = np.array([one.bounds(vehicle) for one in known.coefficients])
-            count = polynomial(known, probe, shape).shape[0]
-            lowest = np.abs(bounds).max(axis=1).min()
-            sizes = np.abs(bounds).max(axis=1) if len(bounds) == count else np.full(count, lowest)
-            found.append(ModelEffect(known.name, shape, 0.02 * sizes * rng.uniform(0.5, 1, count)))
+        if known.kind == "wrench" and known.acts is not None and is_held(known, vehicle):
+            sizes = np.abs([one.bounds(vehicle) for one in known.coefficients]).max(axis=1)
+            numbers = {one.name: size for one, size in zip(known.coefficients, sizes, strict=True)}
+            if weights_of([Acting(known.name, known.acts, numbers)], vehicle):
+                found.append(ModelEffect(known.name, {}, 0.02 * sizes * rng.uniform(0.5, 1, len(sizes))))
     return tuple(found)
+
+
+def is_held(known, vehicle):
+    """Say whether an effect follows from air velocity, body rate and rotors."""
+    shape = {one.name: one.grid[0] for one in known.shapes}
+    numbers = 0.1 * np.ones(0 if known.unit_coefficient else len(known.coefficients))
+    return not VehicleModel(vehicle=vehicle, effects=(ModelEffect(known.name, shape, numbers),)).beside_table
 
 
 def remainder(order, breakpoints=SEVEN_RULES, rows=(0, 2, 5), size=1e-7):

@@ -78,7 +78,7 @@ def verified(
     target, held, described = FLYING[form], exported.held, FORMS[form]
     course = Course(flight, starts, horizon, gravity=held.body.gravity)
     replayed = free_runs(model[1], model[0], starts, horizon).errors
-    same = free_runs(held.player(flight), flight, starts, horizon).errors
+    same = held.errors(flight, starts, horizon)
     otherwise = np.zeros_like(same)
     if not target.levels:
         flown = limit = course.errors(target.fly(exported.text, course))
@@ -132,6 +132,6 @@ def _fine(held: Held, course: Course) -> Array:
     found = []
     for steps in (_FINE, 2 * _FINE):
         flight = replace(course, finer=steps).finer_flight
-        runs = free_runs(held.player(flight), flight, course.starts * steps, course.horizon * steps)
-        found.append(runs.errors[:, steps - 1 :: steps])
+        errors = held.errors(flight, course.starts * steps, course.horizon * steps)
+        found.append(errors[:, steps - 1 :: steps])
     return np.asarray((4.0 * found[1] - found[0]) / 3.0)

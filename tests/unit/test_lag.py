@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.lag import best_delay, delayed, lagged
 
 BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
@@ -78,3 +78,11 @@ def test_a_complex_step_carries_the_derivative(noise, between, ratio):
         (delayed(noise, 1.3 + 1j * step, between), *(delayed(noise, 1.3 + d, between) for d in (wide, 0))),
     ):
         np.testing.assert_allclose(by_step.imag / step, (ahead - behind) / wide, atol=1e-4)
+
+
+def test_the_best_delay_lies_between_those_that_were_tried():
+    delays = np.linspace(-0.1, 0.1, 9)
+    misfit = (delays[:, None] - [0.013, -0.041, 0.2, -0.3]) ** 2
+    best, inside = best_delay(delays, misfit)
+    np.testing.assert_allclose(best, [0.013, -0.041, 0.1, -0.1], atol=1e-12)
+    assert inside.tolist() == [True, True, False, False]

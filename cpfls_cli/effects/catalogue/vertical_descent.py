@@ -27,7 +27,7 @@ def induced_velocity(see: Instant) -> Value:
     ----------
     Leishman, Principles of Helicopter Aerodynamics: momentum theory of the hovering rotor.
     """
-    thrust = scales.hover_speed(see.vehicle) ** 2 * see.thrust_factors
+    thrust = scales.weight(see.vehicle) / see.functions.total(see.thrust_factors) * see.thrust_factors
     return see.functions.sqrt(thrust / (2 * _AIR_DENSITY * np.pi * see.radii**2))
 
 

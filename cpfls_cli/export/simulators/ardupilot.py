@@ -23,18 +23,19 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
 from cpfls_cli.effects.scales import arm
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
+from cpfls_cli.export.polynomials import weights_of_model
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import scaled, times
 
 STEP_S = 1 / 1200
 OTHERWISE = (
@@ -69,7 +70,7 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
     body = body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float), gravity=_GRAVITY)
     numbers = numbers_of(model, _wrenches, alike=True)
     squares = slice(1 + model.rotors, 1 + 2 * model.rotors)
-    own = model.table.weights
+    own = weights_of_model(model)
     hover = _hover_speed(numbers.of(own), body.mass, model.rotors)
 
     def turned(weights: Array) -> Array:
@@ -93,13 +94,13 @@ def _without(numbers: Numbers, names: Sequence[str]) -> Numbers:
     return Numbers(tuple(numbers.names[place] for place in kept), numbers.tables[kept], numbers.size)
 
 
-def _wrenches(signals: Signals) -> Mapping[str, Array]:
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     """Write what is linear in the speeds, the drag of the motors and the damping, for a unit of each number."""
-    speed, moments = signals.speed, np.array(signals.vehicle.inertia_kg_m2[:3])
+    moments = see.vehicle.inertia_kg_m2[:3]
     return {
-        "thrust_linear": thrust_wrench(signals.hubs, speed),
-        "drag": hub_wrench(signals.hubs, -speed[..., None] * signals.hub_velocity),
-        "damping": wrench(-moments * signals.body_rate),
+        "thrust_linear": Wrench(at_hubs=(0, 0, see.rotor_speed)),
+        "drag": Wrench(at_hubs=scaled(-see.rotor_speed, see.hub_velocity)),
+        "damping": Wrench(tuple(times(-moment, rate) for moment, rate in zip(moments, see.body_rate, strict=True))),
     }
 
 

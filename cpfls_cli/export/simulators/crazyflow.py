@@ -17,9 +17,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import thrust_wrench, wrench
 from cpfls_cli.effects.scales import arm, hover_speed
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
@@ -27,6 +25,7 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
 
 STEP_S = 2.5e-3
 _FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
@@ -50,7 +49,7 @@ def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
             f"crazyflow and drone-models mix four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax "
             "and casadi take any number"
         )
-    numbers, hover = numbers_of(model, _wrenches(model), alike=True), hover_speed(model.vehicle)
+    numbers, hover = numbers_of(model, _wrenches, alike=True), hover_speed(model.vehicle)
 
     def holds(weights: Array) -> Array:
         held = numbers.holds(weights)
@@ -67,17 +66,10 @@ def _in_hover(weights: Array, hover: float) -> Array:
     return np.asarray(weights @ turning)
 
 
-def _wrenches(model: VehicleModel) -> Any:
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     """Give the part of the curves that is linear in the speed, for a unit of each number."""
-    turns = spins(model.vehicle)
-
-    def of(signals: Signals) -> Mapping[str, Array]:
-        speed = signals.speed
-        yaw = np.zeros((len(speed), 3))
-        yaw[:, 2] = speed @ turns
-        return {"thrust_linear": thrust_wrench(signals.hubs, speed), "yaw_linear": wrench(yaw)}
-
-    return of
+    yaw = -see.functions.total(see.spins * see.rotor_speed)
+    return {"thrust_linear": Wrench(at_hubs=(0, 0, see.rotor_speed)), "yaw_linear": Wrench((0, 0, yaw))}
 
 
 def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
@@ -95,7 +87,7 @@ def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) ->
         "rpm2torque": [0.0, found["yaw_linear"] / _RPM, found["yaw"] / _RPM**2],
         "rotor_dyn_coef": [rate, 0.0, rate, 0.0],
         "mixing_matrix": [(hubs[:, 1] / length).tolist(), (-hubs[:, 0] / length).tolist(), spins(vehicle).tolist()],
-        "drag_matrix": held.table.weights[_DRAG].tolist(),
+        "drag_matrix": held.weights[_DRAG].tolist(),
         "prop_inertia": 0.0,
         "thrust_min": 0.0,
         "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,

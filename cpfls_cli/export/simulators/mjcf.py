@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.polynomials import TERMS
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
@@ -27,7 +27,7 @@ STEP_S = 0.001
 
 # A sphere in a fluid so thin that nothing but its own drag, which is counted up by as much, feels it.
 _SPHERE_M, _DENSITY = 0.05, 1e-9
-_DRAG = tuple(STATE_TERMS.index(f"|u| {axis}") for axis in "uvw")
+_DRAG = tuple(TERMS.index(("|u|", axis)) for axis in "uvw")
 _LINEAR = slice(1, 7)
 _FORCE_FIRST = [3, 4, 5, 0, 1, 2]
 # Share of the largest eigenvalue up to which another one is rounding.
@@ -68,10 +68,10 @@ def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     """Write a vehicle as MJCF, with what it does not hold."""
     root = ElementTree.Element("mujoco", model=sheet.name)
     root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", *_USE])))
-    drag = -float(held.table.weights[3, _DRAG[0], 0])
+    drag = -float(held.weights[3, _DRAG[0], 0])
     option = {"timestep": number(STEP_S), "integrator": "RK4", "gravity": f"0 0 {number(-held.body.gravity)}"}
     ElementTree.SubElement(root, "option", option | ({"density": number(_DENSITY)} if drag else {}))
-    actuators = list(_actuators(sheet.model, held.table.weights))
+    actuators = list(_actuators(sheet.model, held.weights))
     custom = ElementTree.SubElement(root, "custom")
     for name, values in (("rotor", [a.rotor for a in actuators]), ("power", [a.power for a in actuators])):
         ElementTree.SubElement(custom, "numeric", name=f"ctrl_{name}", data=" ".join(map(str, values)))

@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
@@ -17,6 +12,8 @@ from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
+from cpfls_cli.vehicle.values import dot
 
 # What RotorPy's `Multirotor` allocates to, and has in its code.
 _ROTORS, _GRAVITY = 4, 9.81
@@ -38,17 +35,18 @@ def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
     return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
 
 
-def _wrenches(signals: Signals) -> Mapping[str, Array]:
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     """Write RotorPy's `compute_body_wrench` for a unit of each of its numbers."""
-    air, local, speed = signals.air_velocity, signals.hub_velocity, signals.speed[..., None]
-    drag = -np.linalg.norm(air, axis=1, keepdims=True) * air
-    x, y, _ = np.moveaxis((speed * local).sum(axis=1), 1, 0)
-    of_axis = {f"c_D{axis}": wrench(force=drag * np.eye(3)[k]) for k, axis in enumerate("xyz")}
-    return of_axis | {
-        "k_d": hub_wrench(signals.hubs, -speed * local * [1.0, 1.0, 0.0]),
-        "k_z": hub_wrench(signals.hubs, -speed * local * [0.0, 0.0, 1.0]),
-        "k_h": thrust_wrench(signals.hubs, (local[..., :2] ** 2).sum(axis=-1)),
-        "k_flap": wrench(-np.column_stack([y, -x, np.zeros_like(x)])),
+    (u, v, w), (x, y, z), speed, total = see.air_velocity, see.hub_velocity, see.rotor_speed, see.functions.total
+    fast = -see.functions.sqrt(dot(see.air_velocity, see.air_velocity))
+    return {
+        "c_Dx": Wrench(force=(fast * u, 0, 0)),
+        "c_Dy": Wrench(force=(0, fast * v, 0)),
+        "c_Dz": Wrench(force=(0, 0, fast * w)),
+        "k_d": Wrench(at_hubs=(-speed * x, -speed * y, 0)),
+        "k_z": Wrench(at_hubs=(0, 0, -speed * z)),
+        "k_h": Wrench(at_hubs=(0, 0, x**2 + y**2)),
+        "k_flap": Wrench((-total(speed * y), total(speed * x), 0)),
     }
 
 

@@ -16,8 +16,6 @@ from xml.etree import ElementTree
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import hub_wrench, wrench
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
@@ -25,6 +23,8 @@ from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
+from cpfls_cli.vehicle.values import Each, scaled
 
 _PLUGIN = {"filename": "gz-sim-multicopter-motor-model-system", "name": "gz::sim::systems::MulticopterMotorModel"}
 _ROTOR_SHARE = 1e-3
@@ -52,13 +52,14 @@ def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
 
 
-def _wrenches(signals: Signals) -> Mapping[str, Array]:
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     """Write drag and rolling moment for a unit of the coefficient of each rotor."""
-    across = signals.speed[..., None] * signals.hub_velocity * [1.0, 1.0, 0.0]
+    x, y, _ = scaled(-see.rotor_speed, see.hub_velocity)
     found = {}
-    for i in range(across.shape[1]):
-        found[f"drag_{i + 1}"] = hub_wrench(signals.hubs[[i]], -across[:, [i]])
-        found[f"rolling_{i + 1}"] = wrench(-across[:, i])
+    for i, pair in enumerate(zip(x, y, strict=True)):
+        alone = (Each(own if k == i else 0 for k in range(len(see.vehicle.rotors))) for own in pair)
+        found[f"drag_{i + 1}"] = Wrench(at_hubs=(*alone, 0))
+        found[f"rolling_{i + 1}"] = Wrench((*pair, 0))
     return found
 
 

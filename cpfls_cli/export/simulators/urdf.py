@@ -14,9 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.effect import wrench
 from cpfls_cli.effects.scales import arm
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
@@ -28,7 +26,9 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.values import scaled
 
 OTHERWISE = "drag along the axes of the world, where the vehicle has it along those of its body"
 _ROTORS, _RPM, _GRAVITY = 4, 30 / np.pi, 9.8
@@ -50,10 +50,10 @@ def urdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     return held_by(model, numbers.holds, RotorResponse(), body, numbers), numbers.holds
 
 
-def _wrenches(signals: Signals) -> Mapping[str, Array]:
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     """Write the drag of gym-pybullet-drones for a unit of its coefficients."""
-    drag = -signals.speed.sum(axis=1, keepdims=True) * signals.air_velocity
-    return {"drag_xy": wrench(force=drag * [1.0, 1.0, 0.0]), "drag_z": wrench(force=drag * [0.0, 0.0, 1.0])}
+    x, y, z = scaled(-see.functions.total(see.rotor_speed), see.air_velocity)
+    return {"drag_xy": Wrench(force=(x, y, 0)), "drag_z": Wrench(force=(0, 0, z))}
 
 
 def order_of(vehicle: VehicleSettings) -> IntArray:

@@ -20,7 +20,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.playback.newness import PER_WINDOW
+from cpfls_cli.playback.innovations import PER_WINDOW
 from cpfls_cli.weak_form.windows import Recording, Windows
 
 TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.

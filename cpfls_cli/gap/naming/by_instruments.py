@@ -12,6 +12,7 @@ from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, dense
@@ -20,8 +21,8 @@ from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import predicted_rows
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
+from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.newness import PER_WINDOW, news
 
 _Numbers = tuple[Estimate, ...]
 
@@ -66,17 +67,11 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
     values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers in sources:
-        kept = products[:, :-1][:, numbers]
+        ztx, score = products[:, :-1, :-1][:, numbers], products[:, :-1, -1][:, numbers]
         # Without what those before it explain.
-        right = kept[:, :, -1] - kept[:, :, :-1] @ change
-        kept = np.concatenate([kept[:, :, :-1][:, :, numbers], right[..., None]], axis=2)
-        # Of all blocks, and without each.
-        sums = np.concatenate([kept.sum(axis=0, keepdims=True), kept.sum(axis=0) - kept])
-        matrix, right = sums[:, :, :-1] + np.diag(prior[numbers]), sums[:, :, -1] - (prior * values)[numbers]
-        scale = np.sqrt(np.abs(np.diagonal(matrix, axis1=1, axis2=2)))
-        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
-        solved = np.linalg.solve(matrix, (right / scale)[..., None])[..., 0] / scale
-        change[numbers], without[:, numbers] = solved[0], solved[1:]
+        normal = Normal(ztx[:, :, numbers], score - ztx @ change)
+        step, left_out = one_step(normal, Prior.about_zero(prior[numbers]), values[numbers])
+        change[numbers], without[:, numbers] = step - values[numbers], left_out - values[numbers]
     # The only number of an effect may be 0: then there is none.
     shapes = [
         (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
@@ -204,13 +199,8 @@ def _strong(ztx: Array, numbers: BoolArray) -> BoolArray:
     alone = _strength(np.diagonal(ztx, axis1=1, axis2=2)[:, :-1])
     kept = np.flatnonzero(numbers & (alone > STRONG))
     while len(kept):
-        own = ztx[:, kept[:, None], kept]
-        scale = np.sqrt(np.diagonal(own.sum(axis=0)))
-        own = own / np.outer(scale, scale)
-        inverse = np.linalg.pinv(own.sum(axis=0))
-        diagonal = np.diag(inverse)
-        conditional = np.einsum("ij,bjk,ki->bi", inverse / diagonal[:, None], own, inverse / diagonal)
-        unclear = kept[_strength(conditional) <= STRONG]
+        normal = Normal(ztx[:, kept[:, None], kept], ztx[:, kept, -1])
+        unclear = kept[conditional_strength(normal, Prior.none(len(kept))) <= STRONG]
         if not len(unclear):
             break
         kept = kept[kept != unclear[np.argmin(alone[unclear])]]
@@ -269,7 +259,7 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
         of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
     known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
-    new, predicted, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
+    new, predicted, _ = innovations(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
     return _predicted(own, known, of_path), _predicted(new, predicted, of_run)
 
 
@@ -288,7 +278,7 @@ def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[
     known = []
     for number, (own, middle) in enumerate(zip(rows, middles, strict=True)):
         total, count = np.zeros_like(own), np.zeros(len(own))
-        for other, places in given.repeats.beside[number].items():
+        for other, places in given.repeats.places[number].items():
             place, flat = places[middle], rows[other].reshape(len(rows[other]), -1)
             inside = (place >= middles[other][0]) & (place <= middles[other][-1]) if len(flat) else place < 0
             moved = [np.interp(place[inside], middles[other], column) for column in flat.T]

@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
@@ -16,22 +17,26 @@ from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
+from cpfls_cli.playback.innovations import (
+    MOST_PREDICTED,
+    ResidualInnovations,
+    blows,
+    ranks,
+    residual_innovations,
+)
 from cpfls_cli.playback.instruments import (
     Instruments,
     Repeats,
     Told,
     ToldBy,
-    foretold_by_run,
     held,
     instruments,
-    late,
-    late_by,
+    past_setpoints,
 )
-from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, blows, newly_left, ranks
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_FORETOLD}
+_PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_PREDICTED}
 """Largest share of the residual, at 95 %, that instruments predict of the air. Other runs show all that is
 repeatable, a linear answer to setpoints about two thirds of it."""
 
@@ -92,7 +97,7 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
     known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}
-        for number, each in enumerate(given.repeats.beside)
+        for number, each in enumerate(given.repeats.places)
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
     return replace(given, repeats=Repeats(known, likeness))
@@ -175,10 +180,10 @@ class _Residual:
         """Mark channels that are gusts alone by a witness, jointly with those of `others`; add its shares."""
         witness, steady = found.told_by, np.ones(6, dtype=bool)
         if witness == "past":
-            newly = self._newly(found.noise)
-            share, without = newly.shares
+            new = self._innovations(found.noise)
+            share, without = new.shares
             found = replace(found, foretold=share, foretold_without=without)
-            steady = ~newly.grows(RARE)
+            steady = ~new.grows(RARE)
         only = np.isfinite(found.size) & _gusty(found, self.moved, _PREDICTED[witness])
         if witness == "repeats" or not only.any():
             return found, only
@@ -187,7 +192,7 @@ class _Residual:
         blown = only | others if witness == "past" else np.isfinite(found.size)
         return found, only & blows(blown, np.asarray(self.residual.any(axis=0)))
 
-    def _newly(self, noise: Array) -> NewlyLeft:
+    def _innovations(self, noise: Array) -> ResidualInnovations:
         """Take innovations of the residual, and what motion and rotors predict of them."""
         windows = dense(self.hypothesis.flights[0].windows)
         flights = [replace(flight, windows=windows, seen={}) for flight in self.hypothesis.flights]
@@ -197,7 +202,7 @@ class _Residual:
         residual = there.residual_at(self.linear)
         own = [residual[there.flight_index == number] for number in range(len(states))]
         moving = np.isin(names, list(without_actuation(states[0])))
-        return newly_left(windows, own, before, moving, noise, self.settings.block_s)
+        return residual_innovations(windows, own, before, moving, noise, self.settings.block_s)
 
     def _like_air(self, rng: np.random.Generator) -> BoolArray:
         """Mark channels of which the air is believed where setpoints do not predict them.
@@ -257,14 +262,16 @@ def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) 
 
     `rows`, each shape (window, ...): of each run.
     """
-    lags = late_by(windows.period, max(1, windows.hop // 2))
+    apart = max(1, windows.hop // 2)
     asked = {
         # What drifts, such as the charge of a battery, goes with the time, which knows nothing of gusts either.
-        number: windows.average(np.hstack([*(late(setpoint, lag) for lag in lags), np.c_[np.arange(len(setpoint))]]))
+        number: windows.average(
+            np.hstack([past_setpoints(setpoint, windows.period, apart), np.c_[np.arange(len(setpoint))]])
+        )
         for number, setpoint in enumerate(given.setpoints)
         if setpoint is not None and len(rows[number])
     }
-    found = foretold_by_run(asked, rows)
+    found = first_stage_fit_by_run(asked, rows)
     return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
 
 

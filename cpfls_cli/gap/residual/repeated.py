@@ -10,13 +10,13 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
-from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, jackknife_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
-from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
+from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.result import about, result
@@ -226,7 +226,7 @@ class RepeatedRuns:
             pair
             for path in given.repeats.paths()
             for pair in permutations(path, 2)
-            if pair[1] in given.repeats.beside[pair[0]] and all(runs[each].flight in different for each in pair)
+            if pair[1] in given.repeats.places[pair[0]] and all(runs[each].flight in different for each in pair)
         ]
         seen = len(recordings) - unseen
         judged = [pair for pair in pairs if any(runs[each].flight >= seen for each in pair)]

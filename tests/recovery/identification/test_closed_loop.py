@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.estimation.first_stage import first_stage_fit
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along
 from cpfls_cli.identification.data import gathered, joined, sample_times
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.playback.instruments import foretold
 from tests.builders.gusty_flights import CALM, GUSTS, SMALL, STORM, Flight, gusty_flights, torque_samples
 
 SLOW = 6.0
@@ -136,7 +136,7 @@ def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():
     """A setpoint that moves nothing tells nothing of a flight, however many columns predict."""
     rng = np.random.default_rng(4)
     gusts, asked = rng.standard_normal((2000, 1)).cumsum(axis=0) * 0.1, rng.standard_normal((2000, 60))
-    told = foretold(asked, gusts - gusts.mean())
+    told = first_stage_fit(asked, gusts - gusts.mean())
     assert np.sum(told * (gusts - gusts.mean())) < 0.05 * np.sum((gusts - gusts.mean()) ** 2)
 
 

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from cpfls_cli.blocks import half_width
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import band_windows
-from cpfls_cli.playback.constants import constants_of_past, find_constants
+from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, MEMORY_S, SMALL, Flight, gusty_flights
@@ -50,7 +50,7 @@ def _moments(found):
 def test_in_gusts_instruments_tell_the_body(constants, name):
     """Least squares finds 0.8 to 1.9 times the true moments in such gusts, with intervals of 5 %."""
     off, half = _moments(constants[name])
-    assert constants[name].tells
+    assert constants[name].identified
     assert np.abs(off).max() < 0.25
     # Of four intervals of 95 % some do not hold the truth at times.
     assert (np.abs(off) < 2 * half).all()
@@ -59,7 +59,7 @@ def test_in_gusts_instruments_tell_the_body(constants, name):
 def test_in_still_air_they_tell_it_to_a_per_cent(constants):
     off, _ = _moments(constants["calm"])
     assert np.abs(off).max() < 0.01
-    assert constants["calm"].explained.used.all()
+    assert all(band.used for band in constants["calm"].used.bands)
 
 
 def test_what_instruments_do_not_tell_is_not_determined(constants):
@@ -79,7 +79,7 @@ def _by_what_was_before(truth, leave_out=()):
     alone = [replace(flight, setpoints={}) for flight in _of_three_paths(truth)]
     twice = (*(2 * moment for moment in truth.inertia), 0.0, 0.0, 0.0)
     begun = replace(truth.vehicle, inertia_kg_m2=twice, unknown=("inertia",))
-    return constants_of_past(begun, alone, instruments(alone), leave_out)
+    return find_constants(begun, alone, instruments(alone), leave_out, past=True)
 
 
 @pytest.mark.parametrize("truth", [SMALL, LARGE], ids=["45 g", "1.5 kg"])
@@ -87,8 +87,8 @@ def test_in_gusts_what_was_before_tells_the_body(truth):
     """Least squares finds twice the true moments and more."""
     found = _by_what_was_before(truth)
     off, half = _moments(found)
-    assert found.tells
-    assert found.told_by == "past"
+    assert found.identified
+    assert found.used.kind == "past"
     assert np.abs(off).max() < 0.06
     assert (np.abs(off) < 2 * half).all()
 
@@ -96,8 +96,8 @@ def test_in_gusts_what_was_before_tells_the_body(truth):
 def test_what_was_before_tells_no_body_whose_damping_is_missing():
     """At 1 Hz the damping takes as much as the rotation; without it no moment about roll explains what was foretold."""
     damped = SMALL._replace(damping=2e-4)
-    assert not _by_what_was_before(damped, tuple(CATALOGUE)).tells
-    assert _by_what_was_before(damped).tells
+    assert not _by_what_was_before(damped, tuple(CATALOGUE)).identified
+    assert _by_what_was_before(damped).identified
 
 
 def test_flights_without_instruments_have_no_constants(flights):

@@ -27,13 +27,13 @@ def by_repeats(flights):
     """Take the same path flown again."""
     found = instruments([flight.playback for flight in flights])
     assert found.kind == "repeats"
-    return found.beside
+    return found.by_flight
 
 
 def by_setpoints(flights):
     """Take what the path asks for; no flight is held to repeat another."""
     found = instruments([flight.playback for flight in flights])
-    return replace(found, repeats=Repeats(({},) * len(flights), {})).beside
+    return replace(found, repeats=Repeats(({},) * len(flights), {})).by_flight
 
 
 @pytest.mark.parametrize("source", [by_repeats, by_setpoints])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from linearmodels.iv import IV2SLS
 
 from cpfls_cli.blocks import contiguous
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, estimate, of_rows, positive_ratio
@@ -97,3 +98,18 @@ def test_the_interval_of_a_ratio_is_what_a_test_does_not_refuse(size):
     assert ((tried[kept] >= low - 1e-9) & (tried[kept] <= high + 1e-9)).all()
     if np.isfinite(high):
         assert high - tried[kept].max() < 0.02
+
+
+def test_values_and_errors_are_those_of_another_package():
+    """Two-stage least squares with five instruments for two inputs, errors by clusters; those are 2 % narrower."""
+    rng, block = np.random.default_rng(8), contiguous(3000, 60)
+    more, disturbance = rng.standard_normal((3000, 5)), rng.standard_normal(3000) + rng.standard_normal(60)[block]
+    x = more @ rng.standard_normal((5, 2)) - 0.8 * disturbance[:, None]
+    y = x @ [2.0, -1.0] + disturbance
+    weight = rng.uniform(0.5, 2.0, 3000)
+    root = np.sqrt(weight)[:, None]
+    first = more @ np.linalg.lstsq(root * more, root * x, rcond=None)[0]
+    found = estimate(lambda d: of_rows(y - x @ d, x, first, weight, block), np.zeros(2))
+    other = IV2SLS(y, None, x, more, weights=weight).fit(cov_type="clustered", clusters=block)
+    np.testing.assert_allclose(found.values, other.params, rtol=1e-8)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), other.std_errors, rtol=0.06)

@@ -7,13 +7,15 @@ their value about pitch. Derivatives by the breakpoints are compared in `tests/u
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.export.json_form import HOW_TO_EVALUATE, HOW_TO_EVALUATE_INERTIA
+from cpfls_cli.export.acting import wrench_along
+from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
@@ -134,8 +136,8 @@ def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
         require_gcc()
     model, still = airflow.model, np.zeros_like(airflow.air)
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(len(still), axis=0)
-    vehicle = model.table if form == "library" else FORMS[form](tmp_path, model)
-    torque = vehicle.wrench(airflow.air, still, rotor)[:, 0]
+    wrench = partial(wrench_along, model) if form == "library" else FORMS[form](tmp_path, model).wrench
+    torque = wrench(airflow.air, still, rotor)[:, 0]
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
 
 
@@ -172,7 +174,6 @@ def formula(words):
 
 WORDS = {
     "json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line),
-    "json of a vehicle": next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line),
     "method.md": METHOD.read_text(),
 }
 

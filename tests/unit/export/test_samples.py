@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.export.acting import parts_along
+from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.registry import exported
-from cpfls_cli.export.source import jax_parameters, python_source
+from cpfls_cli.export.source import jax_parameters, jax_parts, python_source
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.spread import Estimates, drawn
-from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.exported_vehicles import on_numpy, sheet_of_vehicle
 from tests.builders.flown_exports import executed
 from tests.builders.playback_flights import flown, truth
 from tests.builders.spread_vehicles import found_record
+from tests.builders.vehicle_models import whole
 
 DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), thrust_linear=0.15)
 
@@ -32,6 +35,16 @@ def test_the_parameters_of_each_vehicle_are_those_of_its_own_export():
         alone = np.fromstring(text[start : text.index("]", start)].replace("\n", " "), sep=",")
         assert np.array_equal(row[:-1], alone)
         assert row[-1] == own.response.delay_s
+
+
+def test_the_parts_alone_are_those_of_the_model():
+    model = whole()
+    sheet, points = sheet_of_vehicle(model), reference_points(model, np.random.default_rng(1), 3)
+    wrench = on_numpy(python_source(sheet, "v.py", "jax"))["wrench"]
+    parts = parts_along(model, points.air, points.rate, points.rotor)
+    for own, row in zip(parts.values(), jax_parts(sheet, [*parts]), strict=True):
+        found = np.array([wrench(*each, row) for each in zip(points.air, points.rate, points.rotor, strict=True)])
+        assert np.abs((found - own) / points.scale).max() < 1e-12
 
 
 def test_one_batched_function_flies_all_vehicles():

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import turning_law
+from cpfls_cli.export.acting import parts_along, wrench_along
 from cpfls_cli.export.json_form import json_text
-from cpfls_cli.export.points import reference_points, reference_run, term_sizes
+from cpfls_cli.export.points import part_sizes, reference_points, reference_run
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
@@ -75,7 +76,8 @@ def test_torque_and_force_are_those_of_the_library(exports, name, form):
 def sizes_of(model, state, rotor):
     """Sizes of the terms of the accelerations."""
     air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
-    sizes, rate = term_sizes(model, air, state.rate, rotor), np.abs(state.rate).max(axis=1, keepdims=True)
+    parts = parts_along(model, air, state.rate, rotor).values()
+    sizes, rate = part_sizes(model, parts), np.abs(state.rate).max(axis=1, keepdims=True)
     torque = sizes[:, :3].max(axis=1, keepdims=True) + np.abs(model.body.inertia).max() * rate**2
     linear = sizes[:, 3:].max(axis=1, keepdims=True) / model.body.mass + model.body.gravity
     return np.hstack([np.repeat(linear, 3, axis=1), np.repeat(np.abs(model.body.inverse).max() * torque, 3, axis=1)])
@@ -117,7 +119,7 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
     air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], turning_law(model.fuzzy)(attitude, rate)
+    torque, turning = wrench_along(model, air, rate, rotor)[:, :3], turning_law(model.fuzzy)(attitude, rate)
     for own, wanted, inertia, direct in zip(found[:, 3:], torque, *turning, strict=True):
         left = inertia @ own + direct - wanted
         assert np.abs(left).max() < ALLOWED * (np.abs(wanted).max() + np.abs(direct).max())
@@ -197,8 +199,12 @@ def test_the_self_test_of_c_passes(tmp_path, name, flags):
 
 @pytest.mark.parametrize(
     ("before", "after"),
-    [("slowness = R(0.45)", "slowness = R(0.4500001)"), ("{5, 0, 5, R(", "{5, 0, 5, R(1e-15 + "), ("* falling", "")],
-    ids=["slow actuation", "weight", "nothing"],
+    [
+        ("slowness = R(0.45)", "slowness = R(0.4500001)"),
+        ("1_thrust_factor = R(", "1_thrust_factor = R(1e-15 + "),
+        ("* falling", ""),
+    ],
+    ids=["slow actuation", "number", "nothing"],
 )
 def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, after):
     require_gcc()
@@ -240,10 +246,11 @@ def test_json_is_the_same_each_time_and_strict():
     assert json.loads(text)["worth"] == ["caf\u00e9", "?"]
 
 
-def test_the_terms_have_names(exports):
-    document = exports("two functions", "json").document
-    assert document["terms_of_motion"][:8] == ["1", "u", "v", "w", "p", "q", "r", "uu"]
-    assert document["terms_of_motion"][-2:] == ["U c2", "U^2 c2"]
+def test_numbers_and_terms_have_names(exports):
+    document = exports("some effects", "json").document
+    (effect, *_) = MODELS["some effects"].effects
+    value = {"value": effect.coefficients[0], "unit": effect.known.coefficients[0].unit}
+    assert document["numbers"][f"{effect.name}_{effect.known.coefficients[0].name}"] == value
     assert document["terms_of_rotors"][:3] == ["1", "w1", "w2"]
     assert document["terms_of_rotors"][-1] == "z4 - w4^2"
 

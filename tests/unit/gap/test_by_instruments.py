@@ -14,8 +14,8 @@ from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, signi
 from cpfls_cli.gap.naming.estimate import NamedFit
 from cpfls_cli.gap.residual.air import _growing
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import held as stays
-from cpfls_cli.playback.newness import PER_WINDOW, news
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
@@ -121,7 +121,7 @@ def test_what_was_before_knows_nothing_of_what_is_new_in_a_gust():
     gust = lfilter([1.0], [1.0, -fades], rng.standard_normal((30000, 6)), axis=0)
     # A loop that answers gusts, and what is asked of it. Its number is right: what is left is the gust alone.
     moved = lfilter([1.0], [1.0, -0.9], rng.standard_normal(gust.shape) - 0.5 * gust, axis=0)
-    (new,), (known,), lasts = news([np.stack([moved, gust], axis=2)], [gust], [moved[..., None]])
+    (new,), (known,), lasts = innovations([np.stack([moved, gust], axis=2)], [gust], [moved[..., None]])
     assert lasts[:, 0] == pytest.approx(fades ** (PER_WINDOW // 4), abs=0.05)
     assert (moved * gust).sum() / (moved**2).sum() < -0.15
     assert abs((known[..., 0] * new[..., 1]).sum() / (known[..., 0] * new[..., 0]).sum()) < 0.05
@@ -130,6 +130,6 @@ def test_what_was_before_knows_nothing_of_what_is_new_in_a_gust():
 def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
     rng = np.random.default_rng(4)
     rows = [rng.standard_normal((5, 6, 3)), rng.standard_normal((40, 6, 3))]
-    new, known, _ = news(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
+    new, known, _ = innovations(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
     assert [len(each) for each in new] == [len(each) for each in known]
     assert len(new[0]) == 0 < len(new[1])

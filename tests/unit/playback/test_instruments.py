@@ -43,7 +43,7 @@ def test_runs_of_a_path_are_found_however_late_they_begin(has_velocity):
 
 def test_runs_are_aligned_though_their_clocks_drift():
     first, second = _flown(1), _flown(1, late=1.0, drift=1.002)
-    place = instruments([first, second]).repeats.beside[0][1]
+    place = instruments([first, second]).repeats.places[0][1]
     known = np.isfinite(place)
     # The same place of the path by both clocks: t = 1.002 t' + 1.
     assert place[known] * PERIOD == pytest.approx((np.arange(3000)[known] * PERIOD - 1.0) / 1.002, abs=0.02)
@@ -62,7 +62,7 @@ def test_a_flight_that_is_asked_its_path_again_is_cut_into_its_runs():
     assert [run.part.start for run in found.runs[:4]] == pytest.approx([0, 1500, 3000, 4500], abs=10)
     assert found.repeats.paths() == ((0, 1, 2, 3),)
     assert found.flights == {0}
-    beside, none = found.beside([flight.motion.rate[:, 0], motion.rate[:, 0]])
+    beside, none = found.by_flight([flight.motion.rate[:, 0], motion.rate[:, 0]])
     assert none is None
     known = np.isfinite(beside[:, 0])
     assert known.mean() > 0.9
@@ -87,7 +87,7 @@ def test_runs_that_are_too_short_to_look_alike_are_told_by_what_was_asked_of_the
     found = instruments(short)
     # The last is asked the same path, and smaller.
     assert found.repeats.paths() == ((0, 1),)
-    place = found.repeats.beside[0][1]
+    place = found.repeats.places[0][1]
     known = np.isfinite(place)
     assert place[known] == pytest.approx(np.arange(600)[known] - 40, abs=3)
     still = [replace(flight, setpoints={"position": np.ones((600, 3))}) for flight in short]
@@ -97,7 +97,7 @@ def test_runs_that_are_too_short_to_look_alike_are_told_by_what_was_asked_of_the
 def test_paths_that_differ_repeat_nothing():
     found = instruments([_flown(path) for path in range(6)])
     assert found.kind == "none"
-    assert found.beside([flight.motion.rate[:, 0] for flight in [_flown(path) for path in range(6)]]) == [None] * 6
+    assert found.by_flight([flight.motion.rate[:, 0] for flight in [_flown(path) for path in range(6)]]) == [None] * 6
 
 
 def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none():

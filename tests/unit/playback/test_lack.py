@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.playback.lack import Lack, Rest, lack_of
+from cpfls_cli.estimation.whittle import GaussMarkov
+from cpfls_cli.playback.lack import Lack, lack_of
 from tests.builders.playback_flights import truth
 
 PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
@@ -16,11 +17,7 @@ SHARE, REST, MEMORY_S = np.array([0.3, 0.1, 0.0]), 0.4, 0.5
 @pytest.fixture(scope="module")
 def rest():
     """Spectra of a process seen through pieces of 4 s."""
-    lags = STEP_S * np.arange(200)
-    turns = 2 * np.pi * 0.25 * np.arange(FREQUENCIES)
-    window = np.hanning(200)
-    alike = np.correlate(window, window, "full")[199:]
-    return Rest(np.cos(np.outer(turns, lags)) * alike * np.where(lags == 0, 1.0, 2.0) / 50, lags, (0.05, 8.0))
+    return GaussMarkov.seen_by(np.hanning(200) / np.sqrt(50), STEP_S, 2 * np.pi * 0.25 * np.arange(FREQUENCIES))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +31,7 @@ def pieces(rest):
 
 
 def test_shares_the_rest_and_the_memory_are_found(pieces, rest):
-    found = lack_of(*pieces, KNOWN, rest)
+    found = lack_of(*pieces, KNOWN, rest, (0.05, 8.0))
     assert found.share[:2] == pytest.approx(SHARE[:2], rel=0.15)
     assert found.share[2] == 0.0
     assert found.rest < 3 * REST
@@ -43,13 +40,16 @@ def test_shares_the_rest_and_the_memory_are_found(pieces, rest):
 
 def test_the_unit_of_a_part_does_not_matter(pieces, rest):
     power, squares = pieces
-    one, other = lack_of(power, squares, KNOWN, rest), lack_of(power, 1e-6 * squares, KNOWN, rest)
+    one, other = (
+        lack_of(power, squares, KNOWN, rest, (0.05, 8.0)),
+        lack_of(power, 1e-6 * squares, KNOWN, rest, (0.05, 8.0)),
+    )
     assert 1e-3 * other.share == pytest.approx(one.share, rel=1e-3)
 
 
 def test_where_nothing_is_lacking_little_is_found(pieces, rest):
     noise = KNOWN * np.random.default_rng(6).standard_exponential((PIECES, FREQUENCIES))
-    found = lack_of(noise, pieces[1], KNOWN, rest)
+    found = lack_of(noise, pieces[1], KNOWN, rest, (0.05, 8.0))
     size = found.rest**2 + (pieces[1] @ found.share**2).mean()
     assert size * rest.power(found.memory)[0].mean() < 0.05 * KNOWN.mean()
 
@@ -57,7 +57,7 @@ def test_where_nothing_is_lacking_little_is_found(pieces, rest):
 def test_a_model_whose_parts_give_nothing_has_a_rest_alone(rest):
     rng = np.random.default_rng(7)
     power = (KNOWN + rest.power(MEMORY_S)[0]) * rng.standard_exponential((PIECES, FREQUENCIES))
-    found = lack_of(power, np.zeros((PIECES, 2)), KNOWN, rest)
+    found = lack_of(power, np.zeros((PIECES, 2)), KNOWN, rest, (0.05, 8.0))
     assert found.rest == pytest.approx(1.0, rel=0.1)
     assert not found.share.any()
 

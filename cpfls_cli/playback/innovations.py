@@ -1,0 +1,212 @@
+"""Innovations of a residual: whether the past predicts them, or how large they are.
+
+A gust blows whatever the vehicle does: nothing before predicts its innovations, nor any loop, and they are as large in
+gentle flight as in fierce. Those of an effect come from the motion, which goes on as it was, and are large where that
+is fierce.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import BLOCK_S
+from cpfls_cli.estimation.first_stage import OF_MANY, RIDGE, first_stage_fit_by_run
+from cpfls_cli.rounding import levelled
+from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
+
+PER_WINDOW = FEWEST_SAMPLES
+"""Windows that begin within one where what they see is followed in time: as many as samples follow its curve."""
+_LATER = 0.25
+"""Innovations come so much later, share of a window."""
+_BEFORE = range(PER_WINDOW, 2 * PER_WINDOW, round(_LATER * PER_WINDOW))
+
+MOST_PREDICTED = 1 / 5
+"""Share of innovations that may be predicted where they are called the air, at 95 %: of an effect a third is."""
+
+_DRAWS = 999
+"""Of chance, so many that a rare one is known to a third."""
+
+
+class Innovations(NamedTuple):
+    """Quasi-differences of windows of runs; of each run those of the last windows.
+
+    Attributes
+    ----------
+    rows, predicted : list of array, shape (window, axis, column)
+        And what the past predicts of them.
+    kept : array, shape (axis, 1)
+        Share of the residual that lasts from one window to the later one.
+    """
+
+    rows: list[Array]
+    predicted: list[Array]
+    kept: Array
+
+
+def innovations(
+    rows: Sequence[Array],
+    residual: Sequence[Array],
+    signals: Sequence[Array],
+    per_window: int = PER_WINDOW,
+    before: Sequence[int] = _BEFORE,
+    ridge: float = RIDGE,
+) -> Innovations:
+    """Take quasi-differences of windows, and what signals of windows that ended before predict of them.
+
+    With r the residual, a moment later and now, and a the share of it that lasts so long, ``r' - a r`` has of a gust
+    only what has come since the window began. Whatever ended before that knows nothing of it, the loop's answers to
+    older gusts and noise included. a is the residual's regression on itself, with its past as instrument.
+
+    Parameters
+    ----------
+    rows : sequence of array, shape (window, axis, column)
+        Of each run, linear in what acts.
+    residual : sequence of array, shape (window, axis)
+    signals : sequence of array, shape (window, signal) or (window, axis, signal)
+        What is known of each window when it has ended; of each axis by itself, where all are predicted alike.
+    per_window : int
+        Windows that begin within one.
+    before : sequence of int
+        How many windows ago those of the signals began, the longest last; the first of them no longer overlap.
+    ridge : float
+        Of the predictions, see `first_stage_fit`.
+
+    References
+    ----------
+    Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument); Söderström and Stoica 2002.
+    """
+    first, ahead = before[-1], round(_LATER * per_window)
+
+    def moved(values: Sequence[Array], by: int) -> list[Array]:
+        return [own[first + by :][: max(0, len(own) - first - ahead)] for own in values]
+
+    # What a run is off by throughout is no gust.
+    off = [own - own.mean(axis=0) if len(own) else own for own in residual]
+    past = [np.sum(each, axis=0) for each in zip(*(moved(off, -lag) for lag in before), strict=True)]
+    # By the past of both, which the noise of neither has a part in.
+    later, now = (
+        sum((each * own).sum(axis=0) for each, own in zip(moved(off, by), past, strict=True)) for by in (ahead, 0)
+    )
+    kept = np.clip(later / np.where(now > 0, now, np.inf), 0.0, 1.0)[:, None]
+    new = [then - kept * own for then, own in zip(moved(rows, ahead), moved(rows, 0), strict=True)]
+    seen = [np.concatenate(each, axis=-1) for each in zip(*(moved(signals, -lag) for lag in before), strict=True)]
+    flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(seen) if len(own)}
+    known = first_stage_fit_by_run(flat, {n: new[n].reshape(len(own), -1) for n, own in flat.items()}, ridge)
+    predicted = [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
+    return Innovations(new, predicted, kept)
+
+
+@dataclass(frozen=True)
+class ResidualInnovations:
+    """Innovations of a residual.
+
+    Attributes
+    ----------
+    new, predicted : array, shape (window, axis), N m and N
+        And what the past predicts of them.
+    noise : array, shape (axis,)
+        Variance of the noise in them, which nothing predicts either.
+    moved : array, shape (window, signal)
+        Signals of the motion in windows that ended as each began, and their squares about the mean.
+    block : array of int, shape (window,)
+    """
+
+    new: Array
+    predicted: Array
+    noise: Array
+    moved: Array
+    block: IntArray
+
+    @property
+    def shares(self) -> tuple[Array, Array]:
+        """Shares that are predicted, shape (axis,), and without each block, (block, axis); NaN where all is noise."""
+        known, size = _by_block(self.new * self.predicted, self.block), _by_block(self.new**2 - self.noise, self.block)
+        whole = np.where(size.sum(axis=0) > 0, size.sum(axis=0), np.nan)
+        return known.sum(axis=0) / whole, (known.sum(axis=0) - known) / (whole - size)
+
+    def grows(self, rare: float) -> BoolArray:
+        """Mark axes whose innovations are surely the larger, or the smaller, the more a signal moved before.
+
+        By ranks; what chance has to offer, over all axes and signals, have blocks whose signs are drawn.
+
+        References
+        ----------
+        Engle 1982 (a variance that the past predicts); Winkler et al. 2014, permutation with the largest statistic.
+        """
+        rows = ranks(np.abs(self.new))[:, None] * ranks(self.moved)[..., None]
+        products = _by_block(rows.reshape(len(rows), -1), self.block)
+        scale = np.sqrt(np.maximum((products**2).sum(axis=0), 1.0))
+        alike = np.abs(products.sum(axis=0) / scale).reshape(rows.shape[1:]).max(axis=0)
+        # The same draws each time that it is asked of flights, for other names too.
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(_DRAWS, len(products)))
+        chance = np.abs(signs @ products / scale).max(axis=1)
+        return np.asarray((chance[:, None] >= alike).sum(axis=0) < rare * (1 + _DRAWS))
+
+
+def blows(like: BoolArray, known: BoolArray) -> bool:
+    """Check whether axes that look like air can be: it turns a vehicle about every known axis, and pushes it.
+
+    Parameters
+    ----------
+    like, known : array of bool, shape (axis,)
+        Torques, and forces behind them where there are any.
+    """
+    return bool((like | ~known)[:3].all() and (like[3:].any() or not known[3:].any()))
+
+
+def residual_innovations(
+    windows: Windows,
+    residual: Sequence[Array],
+    signals: Sequence[Array],
+    moving: BoolArray,
+    noise: Array,
+    block_s: float = BLOCK_S,
+) -> ResidualInnovations:
+    """Take innovations of a residual along runs, and what the past predicts of them.
+
+    Parameters
+    ----------
+    windows : Windows
+        A `PER_WINDOW`-th of one apart.
+    residual : sequence of array, shape (window, axis), N m and N
+        Of each run.
+    signals : sequence of array, shape (window, signal)
+        Of motion and rotors.
+    moving : array of bool, shape (signal,)
+        Those of the motion.
+    noise : array, shape (axis, 2)
+        Variances of white noise in the residual, and in what a derivative is taken of, as of samples.
+    """
+    rows, predicted, kept = innovations([own[..., None] for own in residual], residual, signals, ridge=OF_MANY)
+    last = [np.arange(len(own) - len(new), len(own)) for own, new in zip(residual, rows, strict=True)]
+    variance, ahead = np.zeros(len(noise)), round(_LATER * PER_WINDOW)
+    for own, kernel in zip(noise.T, (windows.weight, windows.slope), strict=True):
+        later, now = (np.pad(kernel, pad) for pad in ((ahead * windows.hop, 0), (0, ahead * windows.hop)))
+        variance += own * ((later - kept * now) ** 2).sum(axis=1)
+    mean = np.concatenate(signals)[:, moving].mean(axis=0)
+    moved = np.concatenate([own[at - ahead - PER_WINDOW][:, moving] for own, at in zip(signals, last, strict=True)])
+    index = np.repeat(np.arange(len(last)), [len(at) for at in last])
+    return ResidualInnovations(
+        np.concatenate(rows)[..., 0],
+        np.concatenate(predicted)[..., 0],
+        variance,
+        np.hstack([moved, (moved - mean) ** 2]),
+        blocks_of(index, np.asarray(np.concatenate(last) * float(windows.hop * windows.period)), block_s),
+    )
+
+
+def _by_block(values: Array, block: IntArray) -> Array:
+    """Sum rows over blocks, shape (block, column)."""
+    return np.array([values[block == own].sum(axis=0) for own in np.unique(block)])
+
+
+def ranks(rows: Array) -> Array:
+    """Rank the rows of each column, equal ones alike, doubled and about their mean, so that products are exact."""
+    places = [np.unique(levelled(column), return_inverse=True)[1] for column in rows.T]
+    return np.array([2.0 * each - each.max(initial=0) for each in places]).T
