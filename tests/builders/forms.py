@@ -56,7 +56,8 @@ def blocks_in_all_forms(blocks):
     """Write blocks alone in each form; give the text, one line for each row of a table."""
     document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
     pages = {form: written(document, form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
-    shown = [*terminal_lines(blocks, whole=True), *(warning.text for warning in warnings_of(blocks))]
+    # So wide that no cell is broken.
+    shown = [*terminal_lines(blocks, 1000, whole=True), *(warning.text for warning in warnings_of(blocks))]
     return _plain({"terminal": "\n".join(shown), **pages})
 
 

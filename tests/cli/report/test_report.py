@@ -132,7 +132,6 @@ def test_everything_given_everything_shown(full):
         "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "predict-1-figure-7-error", "predict-1-torques",
         "predict-1-inertia-matrix", "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
         "identify-1-figure", "identify-2-convergence", "identify-2-pareto-front", "identify-2-ridge-curve",
-        "identify-2-figure",
     }  # fmt: skip
 
 
