@@ -92,8 +92,9 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
         shown = stage_named(name).together(own) if own else ()
+        several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
         return [
-            stage_named(name).section(source, number, drawn=name != "extend" or source.sha256 not in sources.answered)
+            stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
             for number, source in enumerate(shown, start=1)
         ]
 
