@@ -305,8 +305,8 @@ class Stage:
     def section(self, about: Source, number: int, *, named: bool = False, drawn: bool = True) -> Section:
         """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
 
-        That is in the summary. Where several results are shown, each is named; figures are left out where another section
-        has them.
+        That is in the summary. Where several results are shown, each is named; figures are left out where another
+        section has them.
         """
         prefix, anchor = f"{self.name}-{number}-", self.name if number == 1 else f"{self.name}-{number}"
         drawings = pictures(self.figures, prefix, about.record) if drawn else {}
