@@ -32,7 +32,7 @@ from cpfls_cli.artifacts.output import (
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
-from cpfls_cli.report.canvas import picture_of
+from cpfls_cli.report.canvas import picture_of, pictures
 from cpfls_cli.report.content import Box, Heading, Section, Text
 from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
@@ -302,20 +302,17 @@ class Stage:
         """Give the verdict on a result, where its template begins with one, for the summary of a report."""
         return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
 
-    def section(self, about: Source, number: int, *, drawn: bool = True) -> Section:
+    def section(self, about: Source, number: int, *, named: bool = False, drawn: bool = True) -> Section:
         """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
 
-        That is in the summary. Figures are left out where another section has them.
+        That is in the summary. Where several results are shown, each is named; figures are left out where another
+        section has them.
         """
-        pictures = {
-            name: picture
-            for name, draw in (self.figures.items() if drawn else ())
-            if (picture := picture_of(draw, f"{self.name}-{number}-{name}", about.record)) is not None
-        }
-        anchor = self.name if number == 1 else f"{self.name}-{number}"
-        blocks = page.blocks(self.text(about.record, about=about), pictures, f"{self.name}-{number}-")
+        prefix, anchor = f"{self.name}-{number}-", self.name if number == 1 else f"{self.name}-{number}"
+        drawings = pictures(self.figures, prefix, about.record) if drawn else {}
+        blocks = page.blocks(self.text(about.record, about=about), drawings, prefix)
         shown = (block for block in blocks if not isinstance(block, Box))
-        return Section(anchor, self.title, [*([Heading(about.label)] if number > 1 else []), *shown])
+        return Section(anchor, self.title, [*([Heading(about.label)] if named else []), *shown])
 
     def run(self, run: Run, **given: Any) -> Outcome:
         """Check the output, compute, write, and say what there is to say."""

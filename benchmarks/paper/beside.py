@@ -47,8 +47,7 @@ _SAMPLES, _QUANTITY = 1, 0
 def with_the_paper(section: Section, sources: PaperSources) -> Section:
     """Put beside a section what the paper prints of it."""
     blocks: list[Block] = list(_blocks(section.blocks, sources))
-    told = "models" if len(sources.models) > 1 else "summary"
-    if section.name == told and not sources.sweeps:
+    if section.name == "summary" and not sources.sweeps:
         blocks.append(_LACKS_SWEEP)
     return replace(section, blocks=blocks)
 
@@ -73,7 +72,7 @@ def _blocks(given: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
             case Text(text=text) if text.endswith(f"{_FLOOR}."):
                 floor = "the paper's floor, that a reduced set cannot be, does not hold"
                 yield Text(f"{text.removesuffix('.')}: {floor}.")
-            case Table(name="table-5-identification"):
+            case Table() if _is_of(block, "comparison" if len(sources.models) > 1 else "identify", "Quantity"):
                 yield block if in_sweeps else _all_columns(block)
                 yield Text(_scale_sentence(sources), "note")
             case Table() if _is_of(block, "sweep", "Quantity"):

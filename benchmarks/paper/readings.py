@@ -15,7 +15,6 @@ from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColu
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting, Sweep, spread
-from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
@@ -33,7 +32,7 @@ _RULE = (
     "How far a reading is off: the geometric mean of the factors between its numbers and the printed ones, namely mean "
     "squared error, largest error and condition number of FLS, of cpFLS and of cpFLS on the fewest samples (medians "
     "over the seeds), condition numbers of all and of the fewest samples with uniform partitions, and the largest "
-    f"torque as far as it lies below {number(LEAST_TORQUE, 3)} {TORQUE}."
+    f"torque as far as it lies below {number(LEAST_TORQUE, 3)} N m."
 )
 
 
@@ -203,7 +202,7 @@ def _judged_here(sources: Sources) -> Iterator[Text]:
         if compares_readings(sweep.record.settings):
             continue
         noise = _mean_square_noise(sources, sweep)
-        alone = f" Its noise alone has a mean square of {number(noise, 3)} {SQUARED_TORQUE}." if noise else ""
+        alone = f" Its noise alone has a mean square of {number(noise, 3)} (N m)²." if noise else ""
         for reading in _of_sweep(sweep):
             far = [
                 f"{name} ({number(ours, 3)}, printed {number(printed, 3)})"
@@ -260,8 +259,8 @@ def _counted(measured: Iterable[Measurement]) -> str:
 
 def _numbers(found: Sequence[Reading]) -> Table:
     header = (
-        "Flight", "Noise", "Samples by", "Errors over", "Search", f"Largest torque, {TORQUE}", "Uniform condition: all",
-        "chosen", f"MSE, {SQUARED_TORQUE}: all", "chosen", f"Largest error, {TORQUE}", "Relative, whole flight",
+        "Flight", "Noise", "Samples by", "Errors over", "Search", "Largest torque, N m", "Uniform condition: all",
+        "chosen", "MSE, (N m)²: all", "chosen", "Largest error, N m", "Relative, whole flight",
         "Condition number", "Off by a factor of",
     )  # fmt: skip
     printed, full = TABLE_5[-2], TABLE_5[1]

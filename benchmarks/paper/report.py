@@ -22,8 +22,8 @@ from cpfls_cli.report.content import Section
 from cpfls_cli.stages.report import read_sources
 from cpfls_cli.version import __version__
 
-_BEFORE = {"summary", "comparison", "models"}
-"""Sections that stand before the reproduction."""
+_BEFORE = ("summary", "comparison", "identify")
+"""How the names of sections begin that come before the reproduction."""
 
 
 def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[EvaluationTime] = ()) -> Page:
@@ -32,7 +32,7 @@ def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[Evaluati
     given = read_sources(artifacts, [read_content(path).sha256 for path in artifacts])
     sources = PaperSources(given, study.vehicle, study.report, times)
     sections = [_without_readings(section, sources) for section in sections_of(sources)]
-    place = sum(section.name in _BEFORE for section in sections if section)
+    place = sum(section.name.startswith(_BEFORE) for section in sections if section)
     ordered = [*sections[:place], reproduction_section(sources), *sections[place:]]
     return page_of(sources, [with_the_paper(section, sources) for section in ordered if section], __version__)
 

@@ -1,30 +1,37 @@
-"""How a model was identified: its errors beside its baselines, what it is worth, the search and its Pareto front."""
+"""What templates of identified models know: their errors as tables, their numbers as rows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
-from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import model_words, stopped_words, trust_words
-from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.inertia import six_parameters
+from cpfls_cli.pages.comparison import COMPARISON_WORDS
+from cpfls_cli.pages.identified_figures import (
+    ENTRIES,
+    PREDICTORS,
+    STEP_ROWS,
+    entry_of,
+    first_objective,
+    has_partitions,
+    weight_words,
+)
+from cpfls_cli.pages.model import WORDS as MODEL_WORDS
+from cpfls_cli.pages.source import Source
+from cpfls_cli.report.numbers import ROUNDING, count, number, percent, printed, probability, r_squared, with_interval
+from cpfls_cli.rounding import at_most
+from cpfls_cli.validation.bands import band
+from cpfls_cli.validation.replay import StepErrors
+from cpfls_cli.validation.validate import Curves, RoundTrip
+from cpfls_cli.vehicle.settings import VehicleSettings
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-TORQUE, SQUARED_TORQUE = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
-"""Units that are not torn apart at the end of a line."""
-
-MODELS = {
+_MODELS = {
     MODEL: "model",
     RIGID_BODY: "rigid body",
     "constant-inertia": "constant inertia",
@@ -32,12 +39,11 @@ MODELS = {
     "uniform-partitions": "no search: uniform partitions",
 }
 """The judged models in words."""
-
 _SCORES = (
     "Judged on",
     "Model",
-    f"MSE, {SQUARED_TORQUE}",
-    f"Largest error, {TORQUE}",
+    "MSE, (N m)²",
+    "Largest error, N m",
     "Relative error",
     *(f"R² {axis}" for axis in AXES),
 )
@@ -47,267 +53,191 @@ _ROWS = (
     "population",
     "generations",
     "evaluations",
-    f"MSE of the chosen model, {SQUARED_TORQUE}",
-    f"largest error of the chosen model, {TORQUE}",
+    "MSE of the chosen model, (N m)²",
+    "largest error of the chosen model, N m",
     "its condition number",
     "relative error",
 )
-_MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
-    ("mse", f"MSE, {SQUARED_TORQUE}", lambda value: number(value, 3)),
-    ("max_error", f"Largest error, {TORQUE}", lambda value: number(value, 3)),
-    ("relative_error", "Relative error", percent),
-    ("r2", "R²", r_squared),
-    ("r2_body", "R² of body torque", r_squared),
-)
+_SIGNIFICANT = 0.01
+"""As in the reasons of the verdict."""
+_SAME = 1e-9
 
 
-def unjudged(record: IdentifiedModel, path: object) -> Iterator[Text]:
-    """Say of an identified model that nothing says how far to trust it."""
-    if record.trust == Trust.NOT_JUDGED:
-        yield Text(
-            f"{path}: has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them",
-            "warning",
-        )
-
-
-def solution(model: Source[IdentifiedModel]) -> Iterator[Text]:
-    """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
-    record = model.record
-    evaluations = record.history.evaluations
-    yield Text(
-        f"{record.parameters} parameters from {len(record.training_indices)} samples; rank {record.rank}, condition "
-        f"number {number(record.condition_number, 5)}; {evaluations[-1]} evaluations"
-    )
-    if record.stop_reason == "converged":
-        stall = model.config["identification"]["stall_generations"]
-        yield Text(
-            f"converged after generation {len(evaluations) - 1}: no objective improved enough "
-            f"(identification.stall_generations = {stall})"
-        )
-    held_out = record.pareto_front.held_out
-    if held_out is not None:
-        yield Text(
-            f"chosen among {len(held_out)} on the flights kept for it, mean squared error "
-            f"{number(float(np.min(held_out)), 3)}"
-        )
-    pairs = zip(INERTIA_PARAMETERS, record.rigid_body, strict=True)
-    moments = " ".join(f"{name} {number(float(value))}" for name, value in pairs)
-    yield Text(f"rigid body that fits best, kg m²: {moments}")
-
-
-def scores_table(model: Source[IdentifiedModel], index: int) -> Table:
-    """Show the errors of a model and its baselines on every part of the data."""
-    caption = (
-        f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
-        "and where there is something to search for, the same structure without a search."
-    )
-    legend = (
-        "MSE: mean over the axes. Relative error: largest error over largest torque, worst axis. R²: share of the "
-        "variance of the body torque explained."
-    )
-    judged = model.record.judged
-    rows = [_row(judged, part, name) for part in judged.parts for name in judged.models]
-    return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}), legend=legend)
-
-
-def _row(judged: Judged, part: str, name: str) -> list[str | Cell]:
-    relative, axis = judged.worst(name, part)
-    return [
-        part if name == MODEL else "",
-        MODELS.get(name, name),
-        number(float(np.mean(judged.of_axes("mse", name, part))), 3),
-        number(float(np.max(judged.of_axes("max_error", name, part))), 3),
-        f"{percent(relative)} ({axis})" if relative > ROUNDING else percent(relative),
-        *(
-            Cell(r_squared(value), "warning" if value < 0 else "plain")
-            for value in judged.of_axes("r2_body", name, part)
-        ),
-    ]
-
-
-def verdict_line(model: Source[IdentifiedModel]) -> Text:
-    """Say in one line how far to trust a model, and whether its search came to its end."""
-    record = model.record
-    incomplete = (
-        ""
-        if record.complete
-        else f" The search is incomplete ({record.stop_reason or 'stopped'}): this is the best so far, and --resume "
-        "goes on."
-    )
-    if record.verdict is None:
-        reason = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
-        return Text(f"{model.label}: {reason}.{incomplete}", "warning" if incomplete else "note")
-    words = trust_words(record.trust)
-    where = f" Region: {record.verdict.region.rstrip('.')}." if record.verdict.region else ""
-    return Text(f"{model.label}: {words.sentence}.{where}{incomplete}", "warning" if incomplete else words.tone)
-
-
-def identification_section(sources: Sources) -> Section | None:
-    """Show the models beside each other, and their baselines; None where no model was given.
-
-    References
-    ----------
-    Table 5 of the paper.
-    """
-    if not sources.models:
-        return None
-    blocks: list[Block] = [_table(sources)]
-    for index, model in enumerate(sources.models, start=1):
-        blocks += _baselines(model, index)
-    return Section("identification", "Identification", blocks)
-
-
-def _table(sources: Sources) -> Table:
-    columns = [_column(model) for model in sources.models]
-    header = ["Quantity", *(model.label for model in sources.models)]
-    rows = [[name, *(column[index] for column in columns)] for index, name in enumerate(_ROWS)]
-    caption = (
-        "Table 5. Results of the identification on the whole training part: mean squared error over the axes, largest "
-        "error and condition number of the selected model, and its largest error over the largest torque (worst axis)."
-    )
-    return Table("table-5-identification", caption, header, rows, sentences=frozenset(range(1, len(header))))
+def _table_5(models: Sequence[Source[IdentifiedModel]]) -> Markup:
+    """Tabulate how models were found and how well they fit: Table 5 of the paper."""
+    columns = map(_column, models)
+    return page.table(["Quantity", *(model.label for model in models)], list(zip(_ROWS, *columns, strict=True)))
 
 
 def _column(model: Source[IdentifiedModel]) -> list[str]:
-    record, settings, judged = model.record, model.config["identification"], model.record.judged
+    r, settings, judged = model.record, model.config["identification"], model.record.judged
     return [
-        {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]] + (" on rigid body" if record.on_rigid_body else ""),
-        str(len(record.training_indices)),
-        str(settings["population"]) if record.searched else "no search",
-        str(settings["generations"]) if record.searched else "no search",
-        count(record.history.evaluations[-1]),
+        {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]] + (" on rigid body" if r.on_rigid_body else ""),
+        str(r.learned),
+        str(settings["population"]) if r.searched else "no search",
+        str(settings["generations"]) if r.searched else "no search",
+        count(r.evaluations),
         number(float(np.mean(judged.of_axes("mse", MODEL, TRAINING))), 3),
         number(float(np.max(judged.of_axes("max_error", MODEL, TRAINING))), 3),
-        number(record.condition_number, 5),
+        number(r.condition_number, 5),
         percent(judged.worst(MODEL, TRAINING)[0]),
     ]
 
 
-def _baselines(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
-    judged = model.record.judged
-    yield Heading(f"{model.label} and its baselines")
-    yield Text(
-        "By axis of the Euler angles; the last column is about the axes of the body. All are fitted to the same "
-        "samples. Marked: the rigid body has the smaller mean squared error there."
-    )
-    header = ("Model", "Axis", *(title for _, title, _ in _MEASURES))
-    for part_number, part in enumerate(judged.parts, start=1):
-        rows = [row for name in judged.models for row in _rows(judged, part, name)]
-        caption = f"{model.label} on {part}, {judged.samples_of(part)} samples."
-        yield Table(f"baselines-{index}-{part_number}", caption, header, rows, frozenset({0, 1}))
-    lost = [part for part in judged.parts if "rigid-body" in judged.winners(part)]
-    if lost:
-        yield Text(
-            f"The rigid body beats {model.label} about at least one axis on: {', '.join(lost)}. Where it does, use the "
-            "rigid body.",
-            "warning",
-        )
-
-
-def _rows(judged: Judged, part: str, name: str) -> Iterator[list[str | Cell]]:
-    for axis, axis_name in enumerate(AXES):
-        values = [Cell(shown(float(judged.of_axes(measure, name, part)[axis]))) for measure, _, shown in _MEASURES]
-        if name == RIGID_BODY and judged.winner(part, axis) == "rigid-body":
-            values[0] = Cell(f"{values[0].text} ◂", "warning")
-        yield [MODELS.get(name, name) if axis == 0 else "", axis_name, *values]
-
-
-def search_blocks(model: Source[IdentifiedModel], index: int) -> Iterator[Block]:
-    """Show how a model was found."""
-    if not model.record.searched:
-        yield Text(
-            f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",
-            "note",
-        )
-        return
-    if model.record.fuzzy_part_off:
-        yield Text(
-            f"The fuzzy part of {model.label} is off, so all chromosomes may give one and the same model, and the "
-            "search decides nothing.",
-            "note",
-        )
-    yield convergence_figure(f"convergence-{index}", model)
-    yield front_figure(f"pareto-front-{index}", model)
-
-
-def convergence_figure(name: str, model: Source[IdentifiedModel]) -> Plot:
-    """Draw the best of each objective found so far, by generation."""
-    history = model.record.history
-    generation = np.arange(len(history.best))
-    error, unit = _first_objective(model.record)
-    titles = (f"smallest {error}", "smallest largest error", "smallest condition number")
-    units = (unit, "N m", "pure number")
-
-    def draw(figure: Figure) -> None:
-        from matplotlib.ticker import MaxNLocator
-
-        panels = stacked(figure, len(titles))
-        for axes, title, unit, best in zip(panels, titles, units, history.best.T, strict=True):
-            axes.plot(generation, np.where(np.isfinite(best), best, np.nan), marker="o", markersize=3, **style_of(0))
-            axes.set_title(title)
-            axes.set_ylabel(unit)
-            plain_ticks(axes.yaxis)
-        panels[-1].set_xlabel("generation")
-        panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
-
-    caption = (
-        f"Search of {model.label}: the best value of each objective found so far, each possibly by another chromosome; "
-        f"{history.evaluations[-1]} chromosomes were evaluated."
-    )
-    return plot(name, caption, f"Best {error}, largest error and condition number by generation", 4.6, draw)
-
-
-def front_figure(name: str, model: Source[IdentifiedModel]) -> Plot:
-    """Draw the members of the Pareto front and mark the chosen one."""
-    objectives, chosen = model.record.pareto_front.objectives, model.record.pareto_front.chosen
-    error, unit = _first_objective(model.record)
-    others = np.arange(len(objectives)) != chosen
-    mark: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 2}
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        shown = objectives[others]
-        axes.plot(shown[:, 2], shown[:, 0], "o", color=style_of(0)["color"], markersize=5, label="not dominated")
-        axes.plot(*objectives[chosen, [2, 0]], "D", color=style_of(1)["color"], label="chosen", **mark)
-        axes.set_xlabel("condition number")
-        axes.set_ylabel(f"{error}, {unit}")
-        plain_ticks(axes.yaxis)
-        axes.set_xscale("log")
-        legend_above(axes)
-
-    members = f"{len(objectives)} member{'s' if len(objectives) > 1 else ''}"
-    rule = model.config["identification"]["choice"]
-    caption = (
-        f"Pareto front of {model.label}, {members}: {error} against condition number, as the search saw "
-        f"them. The third objective, the largest error, is not shown, so a member may look dominated "
-        f"here. The chosen one follows the rule {rule}."
-    )
-    return plot(name, caption, f"Scatter of {error} against condition number, the chosen member marked", 3.0, draw)
-
-
-def _first_objective(record: IdentifiedModel) -> tuple[str, str]:
-    """Name the error that the search minimised, and its unit.
-
-    Over a rigid body it is the error on blocks left out in turn, every axis divided by its own scale.
-    """
-    if record.on_rigid_body:
-        return "cross-validated error", "scaled torque²"
-    return "mean squared error", "(N m)²"
-
-
-def _scores(judged: Judged, parts: Iterable[str], models: Iterable[str], columns: Sequence[int]) -> str:
-    """Tabulate some columns of the errors of some models on some parts, for a template."""
+def _scores(judged: Judged, parts: Iterable[str], models: Iterable[str], columns: Sequence[int]) -> Markup:
+    """Tabulate some columns of the errors of some models on some parts."""
     rows = [_row(judged, part, name) for part in parts for name in models if name in judged.models]
-    cells = [[row[at] for at in columns] for row in rows]
-    shown = [[page.toned(each.text, each.tone) if isinstance(each, Cell) else each for each in row] for row in cells]
-    return page.table([_SCORES[at] for at in columns], shown, (0, 1))
+    return page.table([_SCORES[at] for at in columns], [[row[at] for at in columns] for row in rows], (0, 1))
+
+
+def _row(judged: Judged, part: str, name: str) -> list[str]:
+    return [
+        part if name == MODEL else "",
+        _MODELS.get(name, name),
+        number(float(np.mean(judged.of_axes("mse", name, part))), 3),
+        number(float(np.max(judged.of_axes("max_error", name, part))), 3),
+        _with_axis(*judged.worst(name, part)),
+        *(
+            page.toned(r_squared(each), "warning" if each < 0 else "plain")
+            for each in judged.of_axes("r2_body", name, part)
+        ),
+    ]
+
+
+def _with_axis(relative: float, axis: str, but: str = "") -> str:
+    """Write the largest relative error with the axis that it is about, unless that is known or it is rounding."""
+    return f"{percent(relative)} ({axis})" if relative > ROUNDING and axis != but else percent(relative)
+
+
+def _winners(judged: Judged, part: str) -> dict[str, list[str]]:
+    """List the axes about which the model is better, the rigid body is, and they are equal."""
+    found: dict[str, list[str]] = {"model": [], "rigid-body": [], "tie": []}
+    for axis, winner in zip(AXES, judged.winners(part), strict=True):
+        found[winner].append(axis)
+    return {winner: axes for winner, axes in found.items() if axes}
+
+
+def _whiteness(r: IdentifiedModel) -> Iterator[tuple[str, list[str]]]:
+    """Say of the residuals about each axis whether they are white noise about 0; nothing of those that are rounding."""
+    residuals = r.residuals
+    assert residuals is not None, "asked only of models that hold them"
+    for axis, name in enumerate(AXES):
+        known = residuals.autocorrelation[np.isfinite(residuals.autocorrelation[:, axis]), axis]
+        if not known.size:
+            yield name, []
+            continue
+        chance, biased = float(residuals.ljung_box[axis]), float(residuals.mean_p[axis])
+        white, centred = chance >= _SIGNIFICANT, not biased < _SIGNIFICANT
+        conclusion = ("white" if white else "not white") + ("" if centred else ", not 0 in the mean")
+        yield (
+            name,
+            [
+                number(float(known[0]), 3),
+                percent(float(np.mean(np.abs(known) > residuals.band))),
+                probability(chance),
+                number(float(residuals.mean[axis]), 3),
+                probability(biased) if np.isfinite(biased) else number(biased),
+                page.toned(conclusion, "plain" if white and centred else "warning"),
+            ],
+        )
+
+
+def _followed(r: IdentifiedModel) -> Iterator[tuple[str, list[str | None]]]:
+    """Write the largest correlation of the residuals about each axis with each signal, and its lag."""
+    residuals = r.residuals
+    assert residuals is not None, "asked only of models that hold them"
+    for name, by_axis in zip(residuals.input, residuals.correlation.transpose(0, 2, 1), strict=True):
+        yield name, [_strongest(values, residuals.input_lag, residuals.band) for values in by_axis]
+
+
+def _strongest(values: np.ndarray[Any, Any], lag: np.ndarray[Any, Any], noise: float) -> str | None:
+    if not np.isfinite(values).any():
+        return None
+    at = int(np.nanargmax(np.abs(values)))
+    text = f"{values[at]:+.2f} at {lag[at]:.2g}".replace("-", "−")
+    return page.toned(f"{text} ◂", "warning") if abs(values[at]) > 2 * noise else text
+
+
+def _inertia_bands(r: IdentifiedModel, vehicle: VehicleSettings) -> Iterator[tuple[float, list[str], bool]]:
+    """Give of each inertia parameter the stated value, those found, and whether it lies in the first interval."""
+    draws = r.uncertainty
+    assert draws is not None, "asked only of models that hold them"
+    pairs = [(r.rigid_body, draws.best_rigid_body)]
+    pairs += [(r.functions.rigid_body, draws.rigid_body)] if r.on_rigid_body else []
+    columns = [(value, *band(value, drawn, draws.blocks)) for value, drawn in pairs]
+    for at, stated in enumerate(six_parameters(vehicle.inertia_kg_m2).tolist()):
+        found = [tuple(float(side[at]) for side in column) for column in columns]
+        written = ([printed(each) for each in with_interval(*one)] for one in found)
+        yield (
+            stated,
+            [f"{value} ({low} … {high})" for value, low, high in written],
+            found[0][1] <= stated <= found[0][2],
+        )
+
+
+def _round_trip(round_trip: RoundTrip) -> list[str]:
+    """Say of each entry of D(q) in what share of the visited points a second identification was within the band."""
+    shares = ((entry, float(entry_of(round_trip.inside, entry))) for entry in ENTRIES)
+    return [f"{entry} {percent(share)}" for entry, share in shares if np.isfinite(share)]
+
+
+def _same_as_rigid(curves: Curves, curve: int) -> bool:
+    """Tell whether a model is its rigid body along a curve, up to rounding."""
+    values, rigid = curves.inertia[curve], curves.rigid_body[curve]
+    near = _SAME * float(np.abs(rigid).max(initial=0.0))
+    return np.allclose(values, rigid, rtol=0.0, atol=near, equal_nan=True)
+
+
+def _steps(steps: StepErrors) -> Iterator[list[str]]:
+    """Write the errors of the predictors after some times, all axes together; the least are marked."""
+    last = len(steps.horizon) - 1
+    sizes = [scale * np.sqrt(np.sum(getattr(steps, quantity) ** 2, axis=2)) for quantity, _, scale in STEP_ROWS]
+    for step in sorted({0, (last + 1) // 5, (last + 1) // 2, last}):
+        for row, predictor in enumerate(steps.model):
+            first = [f"{number(float(steps.horizon[step]), 3)} s", count(steps.samples[step])] if row == 0 else ["", ""]
+            yield [*first, PREDICTORS.get(predictor, predictor), *(_least(size[:, step], row) for size in sizes)]
+
+
+def _least(errors: np.ndarray[Any, Any], row: int) -> str:
+    text = number(float(errors[row]), 3)
+    is_least = np.isfinite(errors[row]) and at_most(errors[row], np.nanmin(errors))
+    return page.toned(f"{text} ◂", "good") if is_least else text
+
+
+def _chromosome(r: IdentifiedModel) -> list[list[str]]:
+    """Write of each partition its weights and the breakpoints that they encode."""
+    structure = r.functions.structure
+    parts = zip(structure.partitions, structure.weight_slices(), r.functions.partitions, strict=True)
+    return [
+        [own.name, " ".join(map(count, r.weights[genes])), " ".join(number(float(peak), 5) for peak in peaks)]
+        for own, genes, peaks in parts
+    ]
 
 
 WORDS: Mapping[str, Any] = {
+    **MODEL_WORDS,
+    **COMPARISON_WORDS,
+    "AXES": AXES,
     "MODEL": MODEL,
+    "MODELS": _MODELS,
     "RIGID_BODY": RIGID_BODY,
+    "TRAINING": TRAINING,
+    "at_most": at_most,
+    "chromosome": _chromosome,
+    "count": count,
+    "first_objective": first_objective,
+    "followed": _followed,
+    "has_partitions": has_partitions,
+    "inertia_bands": _inertia_bands,
+    "r_squared": r_squared,
+    "round_trip_words": _round_trip,
+    "same_as_rigid": _same_as_rigid,
     "scores": _scores,
-    "stopped_words": stopped_words,
-    "words_of": model_words,
+    "steps_rows": _steps,
+    "table_5": _table_5,
+    "weight_words": weight_words,
+    "whiteness": _whiteness,
+    "winners": _winners,
+    "with_axis": _with_axis,
 }
-"""What the template of an identified model knows."""
+"""What templates of identified models know, of one and of several."""

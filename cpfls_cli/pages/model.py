@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.parameters import FOUND_AS, name_of
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
-from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
-from cpfls_cli.report.content import Block, Box, Heading, Text, impossible
+from cpfls_cli.report.content import Text, impossible
 from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.words import joined
 
@@ -38,14 +36,6 @@ WORDS: Mapping[str, Any] = {
     "words_of": model_words,
 }
 """What templates of models know (`model_parts.md.j2`)."""
-
-
-def trust_box(model: Source[IdentifiedModel]) -> Box:
-    """Say how far to trust an identified model, and why."""
-    record = model.record
-    words, stopped, (title,) = model_words(record), stopped_words(record), said_by("identify", record, "title")
-    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{title}"
-    return Box(words.short.upper(), title, said_by("identify", record, "grounds"), words.tone)
 
 
 def cautions_of(record: AnyModel, path: object, cautions: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -94,9 +84,3 @@ def impossible_in_words(record: AnyModel) -> str:
 def worth_in_words(record: AnyModel) -> list[str]:
     """Say what a model that is used elsewhere is worth."""
     return said_by(record.MADE_BY, record, "usage")
-
-
-def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[Block]:
-    """Say what a model is, part by part."""
-    yield from [Heading(model.label)] if len(sources.models) > 1 else []
-    yield from page.blocks(page.words("model_part", model.record, added=WORDS), prefix=f"model-{index}-")

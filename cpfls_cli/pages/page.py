@@ -6,22 +6,19 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
-from typing import Any
 
 from markupsafe import Markup
 
 from cpfls_cli import page
-from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
-from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
-from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
-from cpfls_cli.pages.identification import identification_section, search_blocks
-from cpfls_cli.pages.model import model_blocks
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.flights.flight import Flight, Imported
+from cpfls_cli.pages.comparison import compared_vehicles_section
+from cpfls_cli.pages.identification import WORDS
+from cpfls_cli.pages.identified_figures import COMPARED
+from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
-from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.uncertainty import uncertainty_blocks
+from cpfls_cli.report.canvas import pictures
 from cpfls_cli.report.content import (
     Block,
     Box,
@@ -43,29 +40,50 @@ from cpfls_cli.report.source import Document
 from cpfls_cli.stage import stage_named
 
 
-def _of_each(
-    name: str,
-    title: str,
-    given: Callable[[Sources], Sequence[Source[Any]]],
-    blocks: Callable[..., Iterable[Block]],
-    *,
-    holds: Callable[[Any], object] = lambda _: True,
-    among: bool = False,
-) -> Callable[[Sources], Section | None]:
-    """Make a section of all artifacts of one kind, or of those that hold what it shows, each numbered from 1.
+def _summary_section(sources: Sources) -> Section:
+    """Say in plain words what ran on what and how it ended."""
+    blocks: list[Block] = [Text(caution, "warning") for caution in _cautions(sources)]
+    blocks += [Text(note, "note") for note in sources.settings.notes]
+    judged = [each for each in sources.all if each.sha256 not in sources.answered]
+    blocks += [box for source in judged for box in stage_named(source.stage).verdict(source)]
+    exact = [model.label for model in sources.models if _learned_without_noise(model, sources)]
+    blocks += [Text(f"{label}: {_EXACT}", "note") for label in exact]
+    if not sources.models and not sources.only_gap:
+        blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
+    for flight in sources.of_kind(Imported):
+        said = (*flight.record.contradictions, *flight.record.warnings)
+        blocks += [Text(f"{flight.label}: {warning}.", "warning") for warning in said]
+    blocks += [Text(sentence, "note") for sentence in missing(sources).values()]
+    return Section("summary", "Summary", blocks)
 
-    Parameters
-    ----------
-    blocks : callable
-        What is shown of an artifact with its number and, if it has to know what is shown beside it, of all.
-    """
 
-    def section(sources: Sources) -> Section | None:
-        shown, others = [source for source in given(sources) if holds(source.record)], [sources] if among else []
-        parts = (blocks(source, number, *others) for number, source in enumerate(shown, start=1))
-        return Section(name, title, [block for part in parts for block in part]) if shown else None
+def _cautions(sources: Sources) -> Iterator[str]:
+    """Say what speaks against models that the artifacts rest on, each once; those on the page say it themselves."""
+    shown = {each for source in sources.vehicles for each in cautions_of(source.record, source.label)}
+    given = dict.fromkeys(caution for source in sources.all for caution in source.header.cautions)
+    yield from (caution for caution in given if caution not in shown)
 
-    return section
+
+def _learned_without_noise(model: Source[IdentifiedModel], sources: Sources) -> bool:
+    """Tell whether a model's flight is shown that was simulated and to which nothing was added."""
+    flight: Source[Flight] | None = sources.by_hash(model.made_from("flight"))
+    if flight is None or flight.made_from("trajectory") is None:
+        return False
+    settings = flight.config["simulation"]
+    return not any((*settings["noise"].values(), *settings["relative_noise"].values()))
+
+
+def _compared_models(sources: Sources) -> Section | None:
+    """Compare identified models with each other; None for fewer than two."""
+    models = sources.models
+    if len(models) < 2:
+        return None
+    text = page.words("identify_compared", models, added=WORDS)
+    return Section(
+        "comparison",
+        "The models side by side",
+        page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-"),
+    )
 
 
 def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
@@ -74,21 +92,24 @@ def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
     def sections(sources: Sources) -> list[Section]:
         own = [source for source in sources.all if source.stage == name]
         shown = stage_named(name).together(own) if own else ()
+        several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
         return [
-            stage_named(name).section(source, number, drawn=name != "extend" or source.sha256 not in sources.answered)
+            stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
             for number, source in enumerate(shown, start=1)
         ]
 
     return sections
 
 
+_EXACT = (
+    "The flight is simulated without noise by a rigid body, so six inertia parameters reproduce it up to rounding. No "
+    "fuzzy model can beat that here; the row measures how close it comes."
+)
 _HASH_SHOWN = 12
-_MODELS = attrgetter("models")
 _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
-    summary_section,
-    comparison_section,
-    models_section,
-    _of_each("model", "What the model is", _MODELS, model_blocks, among=True),
+    _summary_section,
+    _compared_models,
+    _of_stage("identify"),
     _of_stage("diagnose"),
     _of_stage("extend"),
     compared_vehicles_section,
@@ -99,20 +120,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("simulate"),
     _of_stage("import"),
     _of_stage("reduce"),
-    identification_section,
-    _of_each("validation", "How far to trust it", _MODELS, validation_blocks),
-    _of_each("residuals", "What the model leaves unexplained", _MODELS, residual_blocks, holds=attrgetter("residuals")),
-    _of_each(
-        "uncertainty",
-        "How sure the inertia is",
-        _MODELS,
-        uncertainty_blocks,
-        holds=lambda record: record.uncertainty or record.curves,
-    ),
-    _of_each("steps", "Prediction by horizon", _MODELS, steps_blocks, holds=attrgetter("steps")),
     _of_stage("sweep"),
-    _of_each("search", "Search", _MODELS, search_blocks),
-    _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
     _of_stage("predict"),
     _of_stage("twin"),
     _of_stage("response"),
@@ -121,7 +129,6 @@ _SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
     _of_stage("trend"),
     _of_stage("changed"),
     _of_stage("_flight_numbers"),
-    _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -194,6 +194,12 @@ def picture_of(draw: Callable[[Any], str], name: str, given: Any) -> Picture | N
         return _Drawing(name, draw.description, height, lambda figure: draw.draw(given, figure))
     written = draw(given)
     return _Written(written) if written else None
+
+
+def pictures(figures: Mapping[str, Callable[[Any], str]], prefix: str, given: Any) -> dict[str, Picture]:
+    """Give those figures of a result in which there is something to draw, their ids beginning with a prefix."""
+    made = ((name, picture_of(draw, f"{prefix}{name}", given)) for name, draw in figures.items())
+    return {name: picture for name, picture in made if picture is not None}
 
 
 def _panels_of(figure: Figure) -> list[Panel]:

@@ -39,6 +39,7 @@ from cpfls_cli.identification.identify import identify as identified
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
+from cpfls_cli.pages.identified_figures import FIGURES
 from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
@@ -58,7 +59,7 @@ SelectionOption = Annotated[
 ]
 
 
-@stage(IdentifiedModel, title="Identification", words=WORDS, study=True, resumes=True)
+@stage(IdentifiedModel, title="Identification", figures=FIGURES, words=WORDS, study=True, resumes=True)
 def identify(
     run: Run,
     flights: TrainingArgument,

@@ -27,7 +27,6 @@ from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
-from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.playback.model import VehicleModel
@@ -38,6 +37,7 @@ from cpfls_cli.stage import Parts, Run, stage
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.store import count_rows, read_first
 from cpfls_cli.validation.prediction import AlongFlight, Totals
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.weak_form.windows import Recording
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
+_UNJUDGED = "has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them"
 
 
 def _error(r: AlongFlight, figure: Figure) -> None:
@@ -168,7 +169,7 @@ def predict(run: Run, model: ModelArgument, flight: FlightArgument) -> Parts | N
     known |= {
         "begins_s": read_first(flight, Flight)[0].begins,
         "condition_number": identified.condition_number if identified.known_everywhere else None,
-        "warnings": (*(each.text for each in unjudged(identified, model.name)), *others),
+        "warnings": (*([f"{model.name}: {_UNJUDGED}"] if identified.trust == Trust.NOT_JUDGED else ()), *others),
     }
     chunks = (data[start : start + PART] for data in flown.chunks() for start in range(0, len(data), PART))
     parts = (

@@ -2,19 +2,16 @@
 
 import json
 import re
-import sys
-from contextlib import ExitStack
 from html import unescape
-from types import SimpleNamespace
-from unittest.mock import patch
 
 from cpfls_cli.config.study import Study
 from cpfls_cli.pages.page import report_page, written
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Box, Facts, Folded, Plot, Section, Table, Text
+from cpfls_cli.report.content import Box, Facts, Folded, Section, Table, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.source import Document
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
+from tests.builders.command_line import undrawn
 
 
 def phrases(block):
@@ -49,10 +46,8 @@ def in_all_forms(source, blocks, beside=()):
         On the same page.
     """
     sources = Sources([source, *beside], source.vehicle, Study().report)
-    with ExitStack() as drawing:
-        for module in [module for name, module in sys.modules.items() if name.startswith("cpfls_cli.pages.")]:
-            if hasattr(module, "plot"):
-                drawing.enter_context(patch.object(module, "plot", _undrawn))
+    # Drawing the curves takes longer than all the rest.
+    with undrawn():
         pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
     return _plain({"terminal": "\n".join(terminal_lines(blocks, whole=True)), **pages})
 
@@ -61,7 +56,8 @@ def blocks_in_all_forms(blocks):
     """Write blocks alone in each form; give the text, one line for each row of a table."""
     document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
     pages = {form: written(document, form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
-    shown = [*terminal_lines(blocks, whole=True), *(warning.text for warning in warnings_of(blocks))]
+    # So wide that no cell is broken.
+    shown = [*terminal_lines(blocks, 1000, whole=True), *(warning.text for warning in warnings_of(blocks))]
     return _plain({"terminal": "\n".join(shown), **pages})
 
 
@@ -73,11 +69,6 @@ def _plain(pages):
         "json": "\n".join(_of_json(json.loads(pages[Form.JSON]))),
     }
     return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in texts.items()}
-
-
-def _undrawn(name, caption, description, _height, _draw):
-    """Stand for a figure whose curves are of no interest: drawing them takes longer than all the rest."""
-    return Plot(name, caption, SimpleNamespace(svg="<svg></svg>", panels=()), description)
 
 
 def _of_html(page):

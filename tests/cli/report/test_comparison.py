@@ -66,8 +66,18 @@ def parsed(cell):
     return float(cell.split(" (")[0].replace(" × 10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
 
 
+def unfolded(blocks):
+    return [inner for block in blocks for inner in (unfolded(block["blocks"]) if "blocks" in block else [block])]
+
+
 def named(blocks, name):
     return next(block for block in blocks if block.get("name") == name)
+
+
+def table(blocks, first, place=0):
+    """Find a table by the name of its first column, the first or a later one of that name."""
+    tables = [block for block in blocks if block["kind"] == "table" and block["header"][0] == first]
+    return tables[place]
 
 
 def test_one_model_is_compared_with_nothing(compared, write):
@@ -78,18 +88,18 @@ def test_one_model_is_compared_with_nothing(compared, write):
 def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is_marked(compared, write):
     names, blocks = compared(write("one.h5"), write("two.h5", (0.5, 2.0, 1.0)))
     assert names[:2] == ["summary", "comparison"]
-    table = named(blocks, "comparison-axes-1")
-    for name in ("comparison-1", "comparison-axes-1"):
-        assert [row[0] for row in named(blocks, name)["rows"]] == ["one.h5", "two.h5", "rigid body"]
-    column = {title.split(",")[0]: place for place, title in enumerate(table["header"])}
-    shown = {axis: [row[column[axis]] for row in table["rows"]] for axis in ("roll", "pitch", "yaw")}
+    by_axis = table(blocks, "Model", 1)
+    for place in (0, 1):
+        assert [row[0] for row in table(blocks, "Model", place)["rows"]] == ["one.h5", "two.h5", "rigid body"]
+    column = {title.split(",")[0]: place for place, title in enumerate(by_axis["header"])}
+    shown = {axis: [row[column[axis]] for row in by_axis["rows"]] for axis in ("roll", "pitch", "yaw")}
     rigid_wins = all("◂" in cells[2] for cells in shown.values())
     assert rigid_wins, "the flight is simulated without noise by a rigid body"
     one, two = (parsed(shown["roll"][row]) for row in (0, 1))
     assert two == pytest.approx(one / 2, rel=1e-2)
-    marked = {(mark["row"], mark["column"]) for mark in table["marked"]}
+    marked = {(mark["row"], mark["column"]) for mark in by_axis["marked"]}
     assert marked == {
-        (row, place) for row, cells in enumerate(table["rows"]) for place, cell in enumerate(cells) if "◂" in cell
+        (row, place) for row, cells in enumerate(by_axis["rows"]) for place, cell in enumerate(cells) if "◂" in cell
     }
 
 
@@ -101,7 +111,7 @@ def test_among_models_the_smaller_error_is_marked(compared, write, bare):
         own = mse.copy()
         own[bare[0].judged.models.index("model")] *= np.square(scale)
         paths.append(write(name, **{"judged/mse": own}))
-    rows = named(compared(*paths)[1], "comparison-axes-1")["rows"]
+    rows = table(compared(*paths)[1], "Model", 1)["rows"]
     places = range(1, 4)
     assert [["◂" in row[place] for place in places] for row in rows] == [
         [True, False, True],
@@ -116,8 +126,8 @@ def test_models_of_different_flights_are_not_ranked(compared, write):
     assert texts.startswith("Judged on different flights, so the errors cannot be ranked: ")
     assert "one.h5 on training" in texts
     assert "two.h5 on training (sha256 ffffffffffff)" in texts
-    tables = [block for block in blocks if block["kind"] == "table" and block["name"] != "comparison-keys"]
-    assert not tables
+    tables = [block["header"][0] for block in blocks if block["kind"] == "table"]
+    assert "Model" not in tables
     assert not [block for block in blocks if block["kind"] == "figure"]
 
 
@@ -128,14 +138,14 @@ def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared
     renamed = {**origin.inputs, "flight": InputFile("other.h5", flight.sha256, flight.format)}
     store.write(path, given, replace(origin, inputs=renamed))
     _, blocks = compared(write("one.h5"), path)
-    assert len(named(blocks, "comparison-1")["rows"]) == 3
+    assert len(table(blocks, "Model")["rows"]) == 3
 
 
 def test_another_split_of_one_flight_is_other_data(compared, write):
     other = ("training_share: 1.0", "training_share: 0.9")
     _, blocks = compared(write("one.h5"), write("two.h5", config=other))
     assert any("cannot be ranked" in block.get("text", "") for block in blocks)
-    keys = named(blocks, "comparison-keys")
+    keys = table(blocks, "Key")
     assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
 
@@ -144,12 +154,12 @@ def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write
     mse[bare[0].judged.models.index("rigid-body")] = 1.0
     _, blocks = compared(write("one.h5"), write("two.h5", **{"judged/mse": mse}))
     names = ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
-    assert [row[0] for row in named(blocks, "comparison-1")["rows"]] == names
+    assert [row[0] for row in table(blocks, "Model")["rows"]] == names
 
 
 def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
     _, blocks = compared(write("one.h5", (1e-14, 1e-14, 1e-14)), write("two.h5", (3e-14, 3e-14, 3e-14)))
-    assert all("◂" in cell for row in named(blocks, "comparison-axes-1")["rows"] for cell in row[1:])
+    assert all("◂" in cell for row in table(blocks, "Model", 1)["rows"] for cell in row[1:])
 
 
 @pytest.mark.usefixtures("data_of_figures")
@@ -168,9 +178,9 @@ def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale
 
 def test_each_model_is_summarised_after_the_comparison(compared, write):
     names, _ = compared(write("one.h5"), write("two.h5"))
-    assert "models" not in names, "equal files count once"
+    assert "comparison" not in names, "equal files count once"
     names, _ = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
-    assert names[:3] == ["summary", "comparison", "models"]
+    assert names[:4] == ["summary", "comparison", "identify", "identify-2"]
 
 
 def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_path):
@@ -198,7 +208,7 @@ def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
     panel = named(blocks, "comparison-curves-1")["panels"][0]
     labels = [series["label"] for series in panel["series"]]
     assert {"one.h5", "two.h5", "rigid body", "95 % band of one.h5", "95 % band of two.h5"} == set(labels)
-    rows = named(blocks, "comparison-1")["rows"]
+    rows = table(blocks, "Model")["rows"]
     assert [row[1] for row in rows] == ["do not use", "new", "not judged", ""]
 
 
@@ -220,8 +230,8 @@ def test_predictors_that_are_equal_are_both_the_least(cpfls, study, write, tmp_p
     path, output = write("one.h5", **own), tmp_path / "steps.json"
     assert cpfls("report", study, path, "-o", output).exit_code == 0
     page = json.loads(output.read_text(encoding="utf-8"))
-    blocks = next(part["blocks"] for part in page["sections"] if part["name"] == "steps")
-    assert ["◂" in row[3] for row in named(blocks, "steps-table-1")["rows"][:3]] == marks
+    blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
+    assert ["◂" in row[3] for row in table(blocks, "Horizon")["rows"][:3]] == marks
 
 
 @pytest.mark.parametrize("same", [True, False])
@@ -231,8 +241,8 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
     output = tmp_path / "curves.json"
     assert cpfls("report", study, write("one.h5", **own), "-o", output).exit_code == 0
     page = json.loads(output.read_text(encoding="utf-8"))
-    blocks = next(part["blocks"] for part in page["sections"] if part["name"] == "uncertainty")
-    caption = named(blocks, "inertia-curves-1-1")["caption"]
+    blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
+    caption = named(blocks, "identify-1-inertia-curves-1")["caption"]
     assert ("the grey line lies under its own" in caption) == same
     assert "what the structure does, not what the vehicle does" in caption
     assert "a band need not hold the truth" in caption

@@ -15,10 +15,11 @@ from tests.builders.command_line import undrawn
 from tests.builders.evidence_artifacts import REASONS, with_evidence
 from tests.builders.identified_models import EVIDENCE_PARTS, write_changed
 
-EVIDENCE = ["validation", "residuals", "uncertainty", "steps"]
+EVIDENCE = ["what it leaves unexplained", "how sure the inertia is", "prediction by horizon"]
 FIGURES = [
-    "autocorrelation-1", "cross-correlation-1", "error-distribution-1", "inertia-curves-1-1", "inertia-curves-1-2",
-    "steps-1",
+    f"identify-1-{name}"
+    for name in ("autocorrelation", "cross-correlation", "error-distribution", "inertia-curves-1", "inertia-curves-2",
+                 "steps")
 ]  # fmt: skip
 
 
@@ -70,7 +71,7 @@ def test_the_made_evidence_keeps_to_its_description(model):
 
 
 def test_all_evidence_is_shown(page):
-    assert [name for name in page.sections if name in EVIDENCE] == EVIDENCE
+    assert [name for name in EVIDENCE if name in section(page, "identify")] == EVIDENCE
     assert [name for name in page.figures if name in FIGURES] == FIGURES
     assert page.text.count("<summary>Numbers</summary>") == len(page.figures)
 
@@ -78,41 +79,41 @@ def test_all_evidence_is_shown(page):
 @pytest.mark.usefixtures("undrawn")
 def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
     page = report(bare)
-    assert [name for name in page.sections if name in EVIDENCE] == ["validation"]
+    assert [name for name in EVIDENCE if name in section(page, "identify")] == []
     assert page.words.count("--set identification.validation.enabled=true") == 1
-    assert "bare.h5: no verdict" in section(page, "summary")
+    assert "NOT JUDGED: bare.h5" in section(page, "summary")
 
 
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
-    ("label", "told", "tone"),
+    ("label", "short", "told", "tone"),
     [
-        ("good-for-control", "Good for control", "good"),
-        ("good-inside-region", "Good inside the region that training visited", "note"),
-        ("not-better-than-rigid-body", "Not better than the rigid body", "warning"),
-        ("do-not-use", "Do not use it", "warning"),
-        ("of-a-newer-version", "of-a-newer-version", "note"),
+        ("good-for-control", "GOOD FOR CONTROL", "Good for control", "good"),
+        ("good-inside-region", "GOOD INSIDE ITS REGION", "Good inside the region that training visited", "note"),
+        ("not-better-than-rigid-body", "NO BETTER THAN A RIGID BODY", "Not better than the rigid body", "warning"),
+        ("do-not-use", "DO NOT USE", "Do not use it", "warning"),
+        ("of-a-newer-version", "OF-A-NEWER-VERSION", "Of-a-newer-version", "note"),
     ],
 )
-def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, told, tone):
+def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, short, told, tone):
     page = report(model(label=label))
-    summary, evidence = section(page, "summary"), section(page, "validation")
-    assert re.match(rf"Summary model-\d+\.h5: {told}.* Region: roll and pitch within 32 degrees\.", summary)
+    summary, evidence = section(page, "summary"), section(page, "identify")
+    assert re.match(rf"Summary {short}: model-\d+\.h5: .*{told}.* Region: roll and pitch within 32 degrees\.", summary)
     assert f'<article class="card {tone} open wide">' in page.text
     for sign, reason in zip(("For it", "Against it", "To know"), REASONS, strict=True):
-        assert f"{sign}: {reason[0].upper()}{reason[1:]}." in evidence
+        assert f"{sign}: {reason[0].upper()}{reason[1:]}." in f"{summary} {evidence}"
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_an_incomplete_search_is_told_in_the_summary(report, model):
     stopped = {"stop_reason": "time-limit"}
-    assert "The search is incomplete (time-limit)" in section(report(model(**stopped)), "summary")
-    assert "incomplete" not in section(report(model()), "summary")
+    assert "stopped (time limit), go on with" in section(report(model(**stopped)), "summary")
+    assert "stopped" not in section(report(model()), "summary")
 
 
 def test_scores_are_those_of_the_artifact(page, pipeline):
     r2 = read(pipeline.model, IdentifiedModel)[0].judged.of_axes("r2", "model", "training")
-    shown = section(page, "validation")
+    shown = section(page, "identify")
     for explained in r2:
         assert f"{100 * np.sqrt(1 - explained):.3g}" in shown
     assert "RMSE one period away" in shown
@@ -121,7 +122,7 @@ def test_scores_are_those_of_the_artifact(page, pipeline):
 
 
 def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
-    shown = section(page, "validation")
+    shown = section(page, "identify")
     assert "rigid body 0 0.05000 ± 0.0040 fuzzy part off" in shown
     assert "5 functions | harmonic 60 0.03100 ± 0.0030 ◂ least" in shown
     assert "7 functions (this model)" in shown
@@ -144,19 +145,19 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
         "ridge/chosen": 1,
     }
     page = report(model(**ridge))
-    assert told in section(page, "validation")
-    assert "ridge-curve-1" in page.figures
+    assert told in section(page, "identify")
+    assert "identify-1-ridge-curve" in page.figures
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_how_many_samples_of_how_many_were_examined(report, model):
-    assert "the first 2500 of its 7300 samples" in section(report(model()), "residuals")
-    whole = section(report(model(**{"residuals/available": 2500})), "residuals")
+    assert "the first 2500 of its 7300 samples" in section(report(model()), "identify")
+    whole = section(report(model(**{"residuals/available": 2500})), "identify")
     assert "held-out rest, 2500 samples" in whole
 
 
 def test_residuals_are_called_white_where_they_are(page):
-    shown = section(page, "residuals")
+    shown = section(page, "identify")
     assert re.search(r"roll 0\.700 2\d\.\d % < 10⁻⁶ \S+ 0\.30 not white pitch", shown)
     assert re.search(r"pitch 0\.140 \S+ % 0\.40 0\.1250? < 10⁻⁶ white, not 0 in the mean", shown)
     assert "yaw — — — — — only rounding is left" in shown
@@ -168,7 +169,7 @@ def test_residuals_are_called_white_where_they_are(page):
 def test_residuals_that_are_rounding_are_not_drawn(report, model):
     exact = {"residuals/autocorrelation": np.full((40, 3), np.nan), "residuals/ljung_box": np.full(3, np.nan)}
     page = report(model(**exact))
-    assert "Nothing but rounding is left over" in section(page, "residuals")
+    assert "Nothing but rounding is left over" in section(page, "identify")
     assert not set(FIGURES[:3]) & set(page.figures)
 
 
@@ -187,13 +188,13 @@ def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipe
 
 @pytest.mark.usefixtures("undrawn")
 def test_the_round_trip_is_told_with_its_share(page, report, model):
-    assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "uncertainty")
+    assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "identify")
     without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
-    assert "Round trip" not in section(without, "uncertainty")
+    assert "Round trip" not in section(without, "identify")
 
 
 def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page):
-    shown = section(page, "steps")
+    shown = section(page, "identify")
     assert re.search(r"rigid body \S+ — nothing moves", shown)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 

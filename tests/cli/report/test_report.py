@@ -37,8 +37,8 @@ report: {title: "<script>alert(1)</script> & a study"}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "comparison", "models", "model", "stated-vehicle", "trajectory", "simulate", "simulate-2", "reduce",
-    "identification", "validation", "sweep", "search", "partitions", "predict", "rules", "provenance",
+    "summary", "comparison", "identify", "identify-2", "stated-vehicle", "trajectory", "simulate", "simulate-2",
+    "reduce", "sweep", "predict", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -129,9 +129,9 @@ def test_everything_given_everything_shown(full):
     kinds = {re.sub(r"-\d+$", "", name) for name in full.summary["figures"]}
     assert kinds == {
         "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
-        "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "convergence", "pareto-front", "ridge-curve",
-        "figure-6-partitions", "predict-1-figure-7-error", "predict-1-torques", "predict-1-inertia-matrix",
-        "sweep-1-replicates",
+        "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "predict-1-figure-7-error", "predict-1-torques",
+        "predict-1-inertia-matrix", "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
+        "identify-1-figure", "identify-2-convergence", "identify-2-pareto-front", "identify-2-ridge-curve",
     }  # fmt: skip
 
 
@@ -296,12 +296,12 @@ def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path
     cpfls("identify", study.config, study.noisy, "-o", model, *single, "--set", "identification.ridge.count=3")
     summary, html, _ = report(study, tmp_path, model)
     text = Page(html).text
-    assert not [name for name in summary["figures"] if name.startswith(("convergence", "pareto-front"))]
-    assert "ridge-curve-1" in summary["figures"]
+    assert not [name for name in summary["figures"] if name.endswith(("convergence", "pareto-front"))]
+    assert "identify-1-ridge-curve" in summary["figures"]
     assert text.count("no search: one chromosome") == 1
     assert "No search: one chromosome. single.h5 has one rule per input" in text
     assert "population 10" not in text
-    table = html[html.index('id="table-5-identification"') :]
+    table = html[html.index("Table 5. Results") :]
     assert table[: table.index("</table>")].count(">no search<") == 2
 
 
@@ -311,7 +311,7 @@ def test_the_search_is_labelled_by_the_error_that_it_minimised(study, tmp_path):
         (study.ridge, "cross-validated error, scaled torque²", "mean squared error against"),
     ):
         _, html, _ = report(study, tmp_path, model, options=("--force",))
-        section = html[html.index('id="search"') : html.index('id="partitions"')]
+        section = html[html.index('<section id="identify"') :].split("</section>")[0]
         assert error in section
         assert other not in section
         assert f"smallest {error.split(',')[0]}" in section
