@@ -12,9 +12,8 @@ with derivatives at all states that the runs passed, which are then composed ste
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from cpfls_cli.playback.motion import FASTEST, Body, MeasuredMotion
 from cpfls_cli.vehicle.motion import Instant, Vehicle
 from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, Vector, add, zero
 
-_SAMPLES = 4_000
+_SAMPLES = 2_000
 """States at a time of which derivatives are taken, so that they stay in the cache."""
 
 MOST_RUNS = 1_200
@@ -581,13 +580,11 @@ def sums_of(legs: Iterable[Leg], flown: Flown, steps: Steps, loss: Loss, group: 
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
     for leg in legs if numbers else ():
         shares, residual = _shares(leg, loss.of_runs(leg.part))
-        found = partial(_products, leg, flown, steps.of_runs(leg.part), shares, residual, group[leg.part])
-        # NumPy lets go of Python for most of it.
-        with ThreadPoolExecutor(2) as threads:
-            for products in threads.map(found, _slices(len(leg.runs.starts), max(1, _SAMPLES // (2 * horizon)))):
-                for place, by_number, square in products:
-                    gradient[place] += by_number
-                    hessian[place] += square
+        own_steps, owners = steps.of_runs(leg.part), group[leg.part]
+        for some in _slices(len(owners), max(1, _SAMPLES // (2 * horizon))):
+            for place, by_number, square in _products(leg, flown, own_steps, shares, residual, owners, some):
+                gradient[place] += by_number
+                hessian[place] += square
     return gradient, hessian
 
 
