@@ -66,4 +66,4 @@ class Body(NamedTuple):
 
 
 FASTEST = 300.0
-"""Body rate in rad/s, and speed in m/s, at which a run is called diverged and stands still."""
+"""Body rate in rad/s, and speed in m/s, at which a run is called diverged and stays as it was."""

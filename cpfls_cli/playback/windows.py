@@ -386,7 +386,7 @@ def _run(flown: Flown, start: _State, steps: Steps, period: float, translates: b
             if good.all():
                 state, now = end, after
             else:
-                # A run that no body flies stands still from there on.
+                # A run that no body flies stays as it is from there on.
                 diverged[(diverged < 0) & ~good] = step
                 state = _State(*(np.where(good, new, old) for new, old in zip(end, state, strict=True)))
                 now = Turned(*(np.where(good, new, old) for new, old in zip(after, now, strict=True)))

@@ -142,12 +142,12 @@ def _array_where(condition: Value, yes: Value, no: Value) -> Value:
 
 
 def _array_arctan2(y: Value, x: Value) -> Value:
-    above, beside = value_of(y), value_of(x)
-    angle = np.arctan2(above, beside)
+    upward, along = value_of(y), value_of(x)
+    angle = np.arctan2(upward, along)
     if not (isinstance(y, Tangent) or isinstance(x, Tangent)):
         return angle
-    share = 1.0 / np.maximum(above * above + beside * beside, _LEAST)
-    turned = minus(times(Tangent(0, getattr(y, "by", {})), share * beside), times(x - beside, share * above))
+    share = 1.0 / np.maximum(upward * upward + along * along, _LEAST)
+    turned = minus(times(Tangent(0, getattr(y, "by", {})), share * along), times(x - along, share * upward))
     return Tangent(angle, turned.by)
 
 
