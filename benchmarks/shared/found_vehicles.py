@@ -6,8 +6,6 @@ import sys
 from collections.abc import Sequence
 from time import perf_counter
 
-import numpy as np
-
 from cpfls_cli.config.load import validate
 from cpfls_cli.playback.fit import fit
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -17,7 +15,7 @@ from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import INERTIA
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Judged, Structure, fitted_to_all
+from cpfls_cli.playback.structure import BASELINES, Judged, Structure, fitted_to_all
 from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -44,10 +42,10 @@ def learned(
 ) -> dict[str, VehicleModel]:
     """Find a vehicle with the program's settings, and fit the baselines of the choice; what was found is printed."""
     used, start = PlaybackSettings(), perf_counter()
-    found = find_vehicle(vehicle, training, used, np.random.default_rng(SEED), _shown)
+    found = find_vehicle(vehicle, training, used, _shown)
     choice = found.choice
     print(f"\nfound in {perf_counter() - start:.0f} s, {choice.evaluated} structures judged on flights kept aside:")
-    for name in ("chosen", "best", "greedy", "everything", "nothing"):
+    for name in BASELINES:
         judged = getattr(choice, name)
         worse, uncertain = judged.worse_than(choice.best)
         blocks = " ".join(judged.structure.blocks)
@@ -58,7 +56,7 @@ def learned(
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
     # Where flights repeat each other the model is the constants, and no forecast.
     models = {f"vehicle, {choice.chosen.numbers} parameters": found.forecast or found.model}
-    for name in ("greedy", "everything") if baselines else ():
+    for name in ("added", "everything") if baselines else ():
         judged = getattr(choice, name)
         clock = perf_counter()
         fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fit)

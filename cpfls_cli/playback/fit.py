@@ -19,6 +19,7 @@ from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.windows import MOST_RUNS, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
+from cpfls_cli.rounding import smallest
 
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
 """Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
@@ -273,40 +274,57 @@ def fit(
     Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
     error); Bock 1983 (multiple shooting: each window starts from what was measured).
     """
-    return fit_parts(free, [windows], known, steps, tolerance)[0]
+    return fit_parts(free, [windows], [known], steps, tolerance)[0]
+
+
+class HeldOut(NamedTuple):
+    """Numbers fitted without a part of the windows, and the errors of these windows, flight by flight."""
+
+    fitted: FittedNumbers
+    errors: list[Array]
 
 
 def fit_parts(
-    free: JointNumbers, parts: Sequence[Sequence[FitWindows]], known: Mapping[str, float], steps: int, tolerance: float
-) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
+    free: JointNumbers,
+    parts: Sequence[Sequence[FitWindows]],
+    starts: Sequence[Mapping[str, float]],
+    steps: int,
+    tolerance: float,
+) -> tuple[Fitted, tuple[HeldOut, ...]]:
     """Fit numbers to all parts of the windows, and from there, by one step, without each.
 
     Without a part the derivatives at the fit to all are known: they are those of all less those of the part. Each step
-    has to lower the loss without the part. Parameters are those of `fit`; a single part cannot be left out.
+    has to lower the loss without the part. Parameters are those of `fit`, but that it begins at the best of several
+    starts; a single part cannot be left out.
     """
     windows = WindowSet(tuple(window for part in parts for window in part))
     place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     bounds = free.lows, free.highs
 
     def best(kept: BoolArray, point: FitPoint, steps: int) -> FitPoint:
-        own = windows if kept.all() else WindowSet(tuple(np.array(windows.windows, dtype=object)[kept]))
-
         def evaluated(values: Array) -> FitPoint:
-            return WindowSums(free, own, values).mean()
+            return WindowSums(free, windows, values).mean(kept=kept)
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
-    start = WindowSums(free, windows, np.clip(free.values(known), *bounds)).mean()
-    if not np.isfinite(start.objective):
+    values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
+    begun = [WindowSums(free, windows, np.array(each)).mean() for each in values]
+    finite = [each for each in begun if np.isfinite(each.objective)]
+    if not finite:
         raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")
+    start = smallest(finite, lambda each: each.objective)
     sums = WindowSums(free, windows, best(place >= 0, start, steps).values)
     losses = sums.losses()
     whole = sums.mean(losses)
 
-    def without(part: int) -> FittedNumbers:
+    def without(part: int) -> HeldOut:
         kept = place != part
         point = best(kept, sums.mean(losses, kept), 1)
-        return FittedNumbers(free, point.values, point.loss)
+        errors = windows.errors(free, point.values)
+        return HeldOut(
+            FittedNumbers(free, point.values, point.loss),
+            [own for own, other in zip(errors, kept, strict=True) if not other],
+        )
 
     found = tuple(without(part) for part in range(len(parts) if len(parts) > 1 else 0))
     return Fitted(free, whole.values, whole.loss, whole.hessian), found

@@ -1,4 +1,4 @@
-"""What structures of a vehicle are judged by: parts kept aside in turn, and the errors there, computed or foretold."""
+"""What structures of a vehicle are judged by: parts kept aside in turn, and the errors there, computed or predicted."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gauss_newton import damped_step
-from cpfls_cli.playback.fit import PRIOR, Fitted, FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
+from cpfls_cli.playback.fit import PRIOR, FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
@@ -81,8 +81,8 @@ class Outlook:
     """Loss of free runs near values of numbers, to second order, by pieces of the flights.
 
     A model with fewer numbers has the others at where they are absent, and one with more has them there at first: both
-    are foretold by the step that a fit would take from there, without each part and then judged on it. Errors of the
-    step make what is foretold too large rather than too small, as the loss grows by less than the square.
+    are predicted by the step that a fit would take from there, without each part and then judged on it. Errors of the
+    step make what is predicted too large rather than too small, as the loss grows by less than the square.
 
     Attributes
     ----------
@@ -127,44 +127,46 @@ class Outlook:
             np.repeat(place, [len(own) for own in loss]),
         )
 
-    @cached_property
-    def _without(self) -> list[tuple[Array, Array]]:
-        """Gradient and Hessian of the mean objective without each part."""
-        scale, belief = self.free.scales, PRIOR / self.free.spreads**2
-        away, found = (self.values - self.free.starts) / scale, []
-        for part in range(int(self.part.max()) + 1):
-            kept = self.part != part
-            count = self.count[kept].sum()
-            gradient, hessian = self.gradient[kept].sum(axis=0), self.hessian[kept].sum(axis=0)
-            found.append((gradient / count + belief * away, hessian / count + np.diag(belief)))
-        return found
-
     def errors(self, blocks: Collection[str]) -> Array:
-        """Foretell the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
-        free, scale, own = self.free, self.free.scales, self._own(blocks)
-        # Without shares of slow actuation its time constant says nothing.
-        absent = [value if n.name == SLOW else n.absent for n, value in zip(free.numbers, self.values, strict=True)]
-        low, high = ((bound - self.values) / scale for bound in (free.lows, free.highs))
-        move, errors = np.where(own, 0.0, (np.array(absent) - self.values) / scale), np.empty(len(self.loss))
-        for part, (gradient, hessian) in enumerate(self._without):
-            moved, aside = (gradient + hessian @ move)[own], self.part == part
-            step = move.copy()
-            room = np.minimum(low[own], 0.0), np.maximum(high[own], 0.0)
-            step[own] = damped_step(hessian[np.ix_(own, own)], moved, _DAMPING, *room)
+        """Predict the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
+        own, errors = self._own(blocks), np.empty(len(self.loss))
+        for part, mean in enumerate(self._without):
+            step, aside = self._step(mean, own), self.part == part
             square = 0.5 * np.einsum("i,pij,j->p", step, self.hessian[aside], step, optimize=True)
             errors[aside] = (self.loss[aside] + self.gradient[aside] @ step + square) / self.count[aside]
         return errors
 
-    def error(self, blocks: Collection[str]) -> float:
-        """Foretell the mean error of a model of some of the blocks."""
-        return float(np.average(self.errors(blocks), weights=self.count))
+    def start(self, blocks: Collection[str]) -> dict[str, float]:
+        """Predict the values of the fit of a model of some of the blocks to all parts, by name."""
+        step = self._step(self._mean(self.part >= 0), self._own(blocks))
+        return self.free.named(self.values + self.free.scales * step)
 
-    def objectives(self, blocks: Collection[str]) -> tuple[float, float, float]:
-        """Foretell mean error, numbers and logarithm of the condition number of the fit of some of the blocks."""
-        own = self._own(blocks)
-        hessian = self.hessian.sum(axis=0) / self.count.sum() + np.diag(PRIOR / self.free.spreads**2)
-        condition = Fitted(self.free, self.values, np.nan, hessian[np.ix_(own, own)]).condition_number
-        return self.error(blocks), float(own.sum()), float(np.log10(condition))
+    @cached_property
+    def _without(self) -> list[tuple[Array, Array]]:
+        """Gradient and Hessian of the mean objective without each part."""
+        return [self._mean(self.part != part) for part in range(int(self.part.max()) + 1)]
+
+    def _mean(self, kept: BoolArray) -> tuple[Array, Array]:
+        scale, belief, count = self.free.scales, PRIOR / self.free.spreads**2, self.count[kept].sum()
+        gradient = self.gradient[kept].sum(axis=0) / count + belief * (self.values - self.free.starts) / scale
+        return gradient, self.hessian[kept].sum(axis=0) / count + np.diag(belief)
+
+    @cached_property
+    def _room(self) -> tuple[Array, Array, Array]:
+        """How far numbers are from where they are absent, and from their bounds, in scales."""
+        free, scale = self.free, self.free.scales
+        # Without shares of slow actuation its time constant says nothing.
+        absent = [value if n.name == SLOW else n.absent for n, value in zip(free.numbers, self.values, strict=True)]
+        gone, low, high = ((each - self.values) / scale for each in (np.array(absent), free.lows, free.highs))
+        return gone, np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    def _step(self, mean: tuple[Array, Array], own: BoolArray) -> Array:
+        """Step to the fit of some of the numbers, the others absent, in scales, shape (number,)."""
+        (gradient, hessian), (gone, low, high) = mean, self._room
+        step = np.where(own, 0.0, gone)
+        moved = (gradient + hessian @ step)[own]
+        step[own] = damped_step(hessian[np.ix_(own, own)], moved, _DAMPING, low[own], high[own])
+        return step
 
     def _own(self, blocks: Collection[str]) -> BoolArray:
         """Tell which numbers a model of some of the blocks has; what is not known of a vehicle every one has."""

@@ -39,8 +39,6 @@ class PlaybackSettings(Settings):
         400
     )
     folds: Annotated[int, Ge(2), Doc("parts of the flights, each of which is kept aside once in the search")] = 3
-    population: Annotated[int, Ge(2), Doc("structures in the population of the search")] = 16
-    generations: Annotated[int, Ge(0), Doc("generations bred; 0 takes the greedy choice and its neighbours alone")] = 8
     leave_out: Annotated[
         tuple[str, ...],
         Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -10,16 +10,14 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.ranking import comparable
-from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.playback.fit import (
     Fitted,
     FittedNumbers,
     FitWindows,
+    HeldOut,
     fit,
     fit_parts,
     stays_error,
@@ -48,18 +46,19 @@ _VISIBLE = 0.02
 _VISIBLE_OF_STAYS = 0.002
 """Most that is asked of a name, as a share of the error of "rate stays"."""
 
-_FORETOLD = 2
-"""Blocks that are added for a trial at least: the best by what is foretold."""
+_FITTED = 2
+"""Neighbours of a structure that are fitted, the best of those predicted to be no worse, and starts that are grown."""
 
-_HOPELESS = 2.0
-"""Times what may be given up for fewer numbers, from which on a structure that is foretold to be so bad is not fitted;
-what is foretold near the bound is right within a tenth or two."""
+_HOPEFUL = 2.0
+"""Times what may be given up for fewer numbers, up to which a structure that is predicted to be so bad may be fitted:
+what is predicted near the bound is right within a tenth or two."""
 
-_BENT = ("lag", "delay", "slow_actuation")
-"""Blocks whose gain is no square of their numbers by far, so that none is foretold."""
+_PREDICTED = 1e-3
+"""Share of the error that a further block is predicted to take away at least."""
 
-_HALF = 2**15
-"""Of a gene, from which on a block is in."""
+_ACTUATION = ("lag", "delay", "slow_actuation")
+"""Blocks between command and rotor, in whose numbers the error is far from quadratic: each leads to a minimum of its
+own, and what it gains is not predicted."""
 
 
 class Rules(NamedTuple):
@@ -120,16 +119,27 @@ class Judged:
     fit: Fitted
     without: tuple[FittedNumbers, ...]
 
+    def start(self, structure: Structure) -> Mapping[str, float]:
+        """Give the values that the fit of another structure starts from."""
+        known = self.fit.free.named(self.fit.values)
+        if structure.rules == self.structure.rules:
+            return known
+        return {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
+
     def worse_than(self, other: Judged) -> tuple[float, float]:
         """Compare on the same blocks: mean difference, and its standard error."""
         difference = self.by_block - other.by_block
         return float(difference.mean()), float(mean_error(difference))
 
 
+BASELINES = ("chosen", "best", "added", "everything", "nothing")
+"""What is listed of a choice, by its attributes."""
+
+
 class TriedStructure(NamedTuple):
     """A structure of the Pareto front, or a baseline, judged on the flights kept aside."""
 
-    name: Annotated[str, About("chosen, best, greedy, everything, nothing, or front")]
+    name: Annotated[str, About("chosen, best, added, everything, nothing, or front")]
     blocks: Annotated[tuple[str, ...], About("its blocks", ("block",))]
     error: Annotated[float, About("mean error of the windows kept aside; about 1.1 for rates that stay")]
     worse: Annotated[float, About("error less that of the best")]
@@ -146,8 +156,8 @@ class Choice:
     ----------
     chosen : Judged
         The one with the fewest numbers within one standard error of the best.
-    greedy, everything, nothing : Judged
-        Baselines: blocks added one by one, all blocks, and the stated vehicle.
+    added, everything, nothing : Judged
+        Baselines: named effects added to the stated vehicle alone, all blocks, and the stated vehicle.
     front : tuple of Judged
         Not dominated in error, numbers and condition number, by number.
     evaluated : int
@@ -158,7 +168,7 @@ class Choice:
 
     chosen: Judged
     best: Judged
-    greedy: Judged
+    added: Judged
     everything: Judged
     nothing: Judged
     front: tuple[Judged, ...]
@@ -168,7 +178,7 @@ class Choice:
     @property
     def tried(self) -> tuple[TriedStructure, ...]:
         """The baselines, then the front."""
-        baselines = [(name, getattr(self, name)) for name in ("chosen", "best", "greedy", "everything", "nothing")]
+        baselines = [(name, getattr(self, name)) for name in BASELINES]
         return tuple(
             TriedStructure(
                 name,
@@ -207,11 +217,11 @@ class Solution(NamedTuple):
     hessian: Array
 
 
-Objectives = tuple[float, float, float]
-"""Error, numbers, and logarithm of the condition number."""
-
 Kept = Mapping[Structure, Solution]
 """Structures that a stopped search has judged."""
+
+Start = Mapping[str, float]
+"""Values by name that a fit starts from."""
 
 
 @dataclass
@@ -228,7 +238,6 @@ class _Bench:
     expected: int
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
-    foretold: dict[Structure, Objectives] = field(default_factory=dict)
 
     @cached_property
     def stays(self) -> float:
@@ -237,26 +246,34 @@ class _Bench:
         counts = [len(each.starts) for each in windows]
         return float(np.average([stays_error(each) for each in windows], weights=counts))
 
-    def judge(self, structure: Structure, first: VehicleSettings | None = None) -> Judged:
-        """Fit and judge a structure; fitted to another vehicle first, where one is given."""
+    def judge(self, structure: Structure, *starts: Start, first: VehicleSettings | None = None) -> Judged:
+        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given."""
         if structure not in self.known:
             kept = self.kept.get(structure)
-            fits = self._fits(structure, first) if kept is None else _rebuilt(structure.free(self.vehicle), kept)
-            self.known[structure] = self._judged(structure, *fits)
+            fits = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            self.known[structure] = _judged(structure, *fits)
             if kept is None:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(self, structure: Structure, first: VehicleSettings | None) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
-        known = self._known(structure)
+    def _fits(
+        self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None
+    ) -> tuple[Fitted, tuple[HeldOut, ...]]:
+        begun = starts or (self._nearest(structure),)
         if first is not None:
             free = structure.free(first)
             windows = [each for part in self.parts for each in part]
-            known |= free.named(fit(free, windows, known, _SEARCH_STEPS, _SEARCH_TOLERANCE).values)
-        return fit_parts(structure.free(self.vehicle), self.parts, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+            begun = (free.named(fit(free, windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE).values),)
+        return fit_parts(structure.free(self.vehicle), self.parts, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
-    def nearest(self, structure: Structure) -> Judged | None:
-        """Find the known structure that differs in the fewest blocks; the better one of two."""
+    def _rebuilt(self, structure: Structure, kept: Solution) -> tuple[Fitted, tuple[HeldOut, ...]]:
+        free = structure.free(self.vehicle)
+        whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
+        held = (HeldOut(each, window_errors(each, part)) for each, part in zip(without, self.parts, strict=True))
+        return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(held)
+
+    def _nearest(self, structure: Structure) -> Start:
+        """Give the values of the known structure that differs in the fewest blocks; the better one of two."""
         asked = set(structure.blocks)
 
         def away(judged: Judged) -> int:
@@ -265,43 +282,30 @@ class _Bench:
             return len(asked ^ set(other.blocks)) + 2 * int(rules)
 
         known = ascending(self.known.values(), lambda each: each.error)
-        return min(known, key=away, default=None)
+        return min(known, key=away).start(structure) if known else {}
 
-    def _known(self, structure: Structure) -> dict[str, float]:
-        """Give the values that a fit starts from."""
-        near = self.nearest(structure)
-        if near is None:
-            return {}
+    def outlook(self, near: Judged, blocks: Iterable[str]) -> Outlook:
+        """Evaluate what predicts the errors of structures of some blocks and its own, from the fit of one."""
+        own = near.structure
+        union = Structure(tuple(dict.fromkeys((*own.blocks, *blocks))), own.rules).free(self.vehicle)
         known = near.fit.free.named(near.fit.values)
-        if near.structure.rules != structure.rules:
-            known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
-        return known
-
-    def objectives(self, structure: Structure) -> Objectives:
-        """Give those of the fit, or as they are foretold of what is not fitted."""
-        known = self.known.get(structure)
-        return self.foretold[structure] if known is None else _objectives(known)
-
-    def outlook(self, near: Judged, asked: Sequence[Structure]) -> Outlook:
-        """Evaluate what foretells the errors of structures, as `Judged.by_block`, from the fit of another one."""
-        both = (near.structure, *asked)
-        blocks = tuple(dict.fromkeys(block for each in both for block in each.blocks))
-        rules = next((each.rules for each in both if each.learns), near.structure.rules)
-        union, known = Structure(blocks, rules).free(self.vehicle), near.fit.free.named(near.fit.values)
-        values = union.values({number.name: number.absent for number in union.numbers} | known)
-        return Outlook.of(union, values, self.parts)
-
-    def _judged(self, structure: Structure, whole: Fitted, without: tuple[FittedNumbers, ...]) -> Judged:
-        pairs = zip(without, self.parts, strict=True)
-        errors = [each for fitted, kept in pairs for each in window_errors(fitted, kept)]
-        by_block, joined = block_errors(errors), np.concatenate(errors)
-        condition = whole.condition_number
-        return Judged(structure, float(joined.mean()), by_block, len(whole.values), condition, whole, without)
+        return Outlook.of(
+            union, union.values({number.name: number.absent for number in union.numbers} | known), self.parts
+        )
 
 
-def _rebuilt(free: JointNumbers, kept: Solution) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
-    whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
-    return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(without)
+def _judged(structure: Structure, whole: Fitted, held: tuple[HeldOut, ...]) -> Judged:
+    errors = [each for part in held for each in part.errors]
+    without, joined = tuple(each.fitted for each in held), np.concatenate(errors)
+    return Judged(
+        structure,
+        float(joined.mean()),
+        block_errors(errors),
+        len(whole.values),
+        whole.condition_number,
+        whole,
+        without,
+    )
 
 
 def tried_blocks(
@@ -317,11 +321,10 @@ def choose(
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
-    rng: np.random.Generator,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
 ) -> Choice:
-    """Search for the structure: all blocks, fewer and fewer of them, greedy addition, then the genetic algorithm.
+    """Search for the structure, from all blocks and from the stated vehicle, by what fits predict of other structures.
 
     Parameters
     ----------
@@ -338,86 +341,101 @@ def choose(
         If it is stopped before all blocks were judged.
     """
     blocks = tried_blocks(vehicle, flights, settings)
-    parts = parts_of(flights, settings)
-    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 4
-    bench = _Bench(vehicle, parts, progress, expected, kept)
+    bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept)
     nothing = bench.judge(Structure(()))
     # All blocks on the stated body first, or on a guessed one: a body that is free from the beginning is made so heavy
     # that no torque that is not explained yet moves it, and then no explanation is worth anything.
     if INERTIA in blocks:
         bench.judge(Structure(tuple(block for block in blocks if block != INERTIA)))
     guessed = replace(vehicle, unknown=tuple(name for name in vehicle.unknown if name != INERTIA))
-    everything = bench.judge(Structure(blocks), guessed if INERTIA in vehicle.unknown else None)
-    path, complete = [nothing], True
+    everything = bench.judge(Structure(blocks), first=guessed if INERTIA in vehicle.unknown else None)
+    complete, added = True, nothing
     try:
-        shrunk = _shrunk(bench, everything) if len(blocks) > 1 else []
-        path.extend(_greedy(bench, blocks, nothing))
-        near = _neighbours(bench, smallest(bench.known.values(), lambda each: each.error))
-        _evolve(bench, blocks, [*(each.structure for each in path), *shrunk, *near], settings, rng)
-        _refine(bench, blocks)
+        added = _grow(bench, nothing, blocks)
+        _explore(bench, everything, blocks)
+        _settle(bench, blocks)
     except SearchStoppedError:
         complete = False
     judged, best, chosen = _preferred(bench)
-    return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
+    return Choice(chosen, best, added, everything, nothing, _front(judged), len(judged), complete)
 
 
-def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
-    """Add the block that lowers the error most, until none lowers it by more than its standard error.
-
-    Fitted are those of which most is foretold. Of others nothing can be, and what such a block gained before bounds
-    what it may gain now, near enough; all of them are tried before it ends, because some gain only beside others.
-    """
-    present, gained, all_tried = start, dict.fromkeys(_BENT, np.inf), False
-    yield present
-    while promise := _promised(bench, present, gained, blocks):
-        best, foretold = None, 0
-        for block, gain in ascending(promise.items(), lambda each: -each[1]):
-            if best and foretold >= _FORETOLD and less(gain, present.error - best.error, present.error):
+def _grow(bench: _Bench, nothing: Judged, blocks: tuple[str, ...]) -> Judged:
+    """Add named effects to the stated vehicle, with each kind of response of its rotors, and go on with the best."""
+    named = tuple(block for block in blocks if block not in LEARNED)
+    kinds = (block for block in _ACTUATION if block in blocks)
+    starts = [nothing, *(bench.judge(Structure((block,)), {}) for block in kinds)]
+    grown = [_explore(bench, each, named) for each in starts]
+    for present in ascending(grown, lambda each: each.error)[:_FITTED]:
+        while True:
+            grown.append(_explore(bench, present, named))
+            if not _visibly_better(bench, grown[-1], present):
                 break
-            foretold += block not in _BENT
-            tried = bench.judge(_with(present.structure, block, blocks))
-            gained[block] = present.error - tried.error
-            if best is None or less(tried.error, best.error):
-                best = tried
-        assert best is not None
-        better, uncertain = present.worse_than(best)
-        if not at_most(better, uncertain, present.error):
-            present, all_tried = best, False
-            yield present
-        elif all_tried:
-            return
-        else:
-            gained, all_tried = dict.fromkeys(_BENT, np.inf), True
+            present = grown[-1]
+    return smallest(grown, lambda each: each.error)
 
 
-def _promised(bench: _Bench, present: Judged, gained: Mapping[str, float], blocks: tuple[str, ...]) -> dict[str, float]:
-    """Say by how much each block that is not in lowers the error: as foretold, or what it gained where that is bent."""
-    absent = {
-        block: _with(present.structure, block, blocks) for block in blocks if block not in present.structure.blocks
-    }
-    asked = {block: each for block, each in absent.items() if block not in _BENT}
-    outlook = bench.outlook(present, list(asked.values()))
-    before = outlook.errors(present.structure.blocks).mean()
-    gains = {block: float(before - outlook.errors(each.blocks).mean()) for block, each in asked.items()}
-    return {block: gains.get(block, gained.get(block, np.inf)) for block in absent}
+def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
+    """Take blocks in or out as long as that is predicted to lower the error, then out as long as it hardly matters.
 
-
-def _shrunk(bench: _Bench, everything: Judged) -> list[Structure]:
-    """List structures without the block that is foretold to be missed least, one after another, and judge two of them.
-
-    These are the best as foretold, and the simplest that is hardly worse.
+    The best and the simplest as predicted are fitted; the better of them, or the centre, comes back.
     """
-    structure, outlook = everything.structure, bench.outlook(everything, [])
-    while len(structure.blocks) > 1:
-        structure = smallest(_fewer(structure), lambda each: outlook.error(each.blocks))
-        bench.foretold[structure] = outlook.objectives(structure.blocks)
-    path = list(bench.foretold)
-    errors = {each: outlook.errors(each.blocks) for each in path}
-    best = smallest(path, lambda each: bench.objectives(each)[0])
-    simplest = [each for each in path if _keeps_up(bench, errors[each], errors[best], 1.0)]
-    for each in (best, *simplest[-1:]):
-        bench.judge(each)
-    return path
+    inside = centre.structure.blocks
+    open_ = tuple(block for block in blocks if block in inside or block not in _ACTUATION)
+    outlook = bench.outlook(centre, open_)
+    errors: dict[Structure, Array] = {}
+
+    def error(structure: Structure) -> float:
+        if structure not in errors:
+            errors[structure] = outlook.errors(structure.blocks)
+        return float(errors[structure].mean())
+
+    best = centre.structure
+    while open_:
+        other = smallest([_with(best, block, blocks) for block in open_], error)
+        if not less(error(other), (1.0 - _PREDICTED) * error(best), error(best)):
+            break
+        best = other
+    simplest = best
+    while simplest.blocks:
+        fewer = smallest(_fewer(simplest), error)
+        if not _keeps_up(bench, errors[fewer], errors[best], 1.0):
+            break
+        simplest = fewer
+    found = [bench.judge(each, outlook.start(each.blocks), centre.start(each)) for each in (best, simplest)]
+    return smallest([centre, *found], lambda each: each.error)
+
+
+def _settle(bench: _Bench, blocks: tuple[str, ...]) -> None:
+    """Explore what is near the best and the choice, then judge their neighbours, until nothing changes them any more.
+
+    What is learned is held against names for the choice alone, which takes many fits.
+    """
+    explored: set[Structure] = set()
+    while True:
+        present = _preferred(bench)[1:]
+        pair = list({each.structure: each for each in present}.values())
+        new = [each for each in pair if each.structure not in explored]
+        for each in new:
+            explored.add(each.structure)
+            _explore(bench, each, blocks)
+        if new and _changed(bench, *present):
+            continue
+        for each in pair:
+            _neighbours(bench, each, blocks)
+        _named_instead(bench, _preferred(bench)[2], blocks)
+        if not _changed(bench, *present):
+            return
+
+
+def _changed(bench: _Bench, best: Judged, choice: Judged) -> bool:
+    """Tell whether the choice is another one, or the best is visibly better."""
+    _, found, chosen = _preferred(bench)
+    return chosen.structure != choice.structure or _visibly_better(bench, found, best)
+
+
+def _visibly_better(bench: _Bench, one: Judged, other: Judged) -> bool:
+    return bool(less(one.error + _visible(bench, one.error), other.error, other.error))
 
 
 def _fewer(structure: Structure) -> list[Structure]:
@@ -428,32 +446,33 @@ def _fewer(structure: Structure) -> list[Structure]:
 def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
     """Add a block, or take it out where it is in."""
     kept = set(structure.blocks) ^ {block}
-    return Structure(tuple(name for name in order if name in kept), structure.rules)
+    found = Structure(tuple(name for name in order if name in kept), structure.rules)
+    return found if found.learns else Structure(found.blocks)
 
 
-def _neighbours(bench: _Bench, judged: Judged) -> list[Structure]:
-    """List the structures with one block less, or with other rules of what is learned, and judge the hopeful."""
-    structure = judged.structure
-    fewer = _fewer(structure)
+def _neighbours(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> None:
+    """Judge hopeful structures with one block less or more, and all with other rules of what is learned."""
+    structure = centre.structure
+    more = [_with(structure, block, blocks) for block in blocks if block not in structure.blocks]
+    of_actuation = [each for each in more if not set(_ACTUATION).isdisjoint({*each.blocks} - {*structure.blocks})]
+    _judge_hopeful(bench, centre, _fewer(structure), _HOPEFUL)
+    _judge_hopeful(bench, centre, [each for each in more if each not in of_actuation], 0.0)
     other = [structure._replace(rules=rules) for rules in REMAINDERS] if structure.learns else []
-    _judge_hopeful(bench, judged, fewer)
-    for each in other:
+    for each in (*of_actuation, *other):
         bench.judge(each)
-    return [*fewer, *other]
 
 
-def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure]) -> None:
-    """Judge those of some structures that are not foretold to be hopeless, from a near one that is judged."""
+def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], most: float) -> None:
+    """Judge the best few of some structures as predicted from a near one, where they are about as good as the best."""
     best = smallest(bench.known.values(), lambda each: each.error)
     new = [each for each in others if each not in bench.known]
     if not new:
         return
-    outlook = bench.outlook(near, new)
-    for each in new:
-        if _keeps_up(bench, outlook.errors(each.blocks), best.by_block, _HOPELESS):
-            bench.judge(each)
-        else:
-            bench.foretold[each] = outlook.objectives(each.blocks)
+    outlook = bench.outlook(near, [block for each in new for block in each.blocks])
+    errors = {each: outlook.errors(each.blocks) for each in new}
+    for each in ascending(new, lambda each: float(errors[each].mean()))[:_FITTED]:
+        if _keeps_up(bench, errors[each], best.by_block, most):
+            bench.judge(each, outlook.start(each.blocks), near.start(each))
 
 
 def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:
@@ -471,7 +490,7 @@ def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> No
     absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
     for learned in (block for block in structure.blocks if block in LEARNED):
         named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]
-        _judge_hopeful(bench, judged, named)
+        _judge_hopeful(bench, judged, named, _HOPEFUL)
 
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
@@ -486,79 +505,6 @@ def _visible(bench: _Bench, best: float) -> float:
     return min(_VISIBLE * best, _VISIBLE_OF_STAYS * bench.stays)
 
 
-def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
-    """Judge the neighbours of the best and of the choice, until no block is left that nothing speaks for.
-
-    What is learned is then held against names, which takes many fits, for the choice alone.
-    """
-    asked: set[Structure] = set()
-    held: set[Structure] = set()
-    while True:
-        new = [each for each in _preferred(bench)[1:] if each.structure not in asked]
-        if not new:
-            choice = _preferred(bench)[2]
-            if choice.structure in held:
-                return
-            held.add(choice.structure)
-            _named_instead(bench, choice, blocks)
-            continue
-        asked |= {each.structure for each in new}
-        for each in new:
-            _neighbours(bench, each)
-
-
-def _evolve(
-    bench: _Bench,
-    blocks: tuple[str, ...],
-    first: Sequence[Structure],
-    settings: PlaybackSettings,
-    rng: np.random.Generator,
-) -> None:
-    """Breed structures: a gene for each block, in its upper half for one that is in, and one for the remainder."""
-    evolution = EvolutionSettings(
-        population=settings.population,
-        generations=settings.generations,
-        recombination="single-point",
-        mutated_bits=0.02,
-    )
-
-    def evaluate(genes: IntArray) -> Evaluation:
-        return Evaluation(genes, np.array([_bred(bench, _decoded(chromosome, blocks)) for chromosome in genes]))
-
-    ranked = ascending(dict.fromkeys(first), lambda each: bench.objectives(each)[0])
-    initial = np.array([_encoded(each, blocks) for each in ranked[: settings.population]], dtype=np.int64)
-    for _ in evolve(evaluate, len(blocks) + 1, evolution, rng, initial):
-        pass
-
-
-def _bred(bench: _Bench, structure: Structure) -> Objectives:
-    """Give the objectives of a structure: of its fit, or as they are foretold where they are hopeless."""
-    near = bench.nearest(structure)
-    assert near is not None
-    bent = not set(_BENT).isdisjoint(set(structure.blocks) - set(near.structure.blocks))
-    if bent or (structure.learns and near.structure.learns and structure.rules != near.structure.rules):
-        bench.judge(structure)
-    else:
-        _judge_hopeful(bench, near, [structure])
-    return bench.objectives(structure)
-
-
-def _objectives(judged: Judged) -> Objectives:
-    return judged.error, float(judged.numbers), float(np.log10(judged.condition_number))
-
-
-def _decoded(genes: IntArray, blocks: tuple[str, ...]) -> Structure:
-    chosen = tuple(block for block, gene in zip(blocks, genes, strict=False) if gene >= _HALF)
-    found = Structure(chosen, REMAINDERS[int(genes[-1]) * len(REMAINDERS) // (2 * _HALF)])
-    return found if found.learns else Structure(chosen)
-
-
-def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
-    middle = [_HALF + _HALF // 2 if block in structure.blocks else _HALF // 2 for block in blocks]
-    place = REMAINDERS.index(structure.rules)
-    return [*middle, (2 * place + 1) * _HALF // len(REMAINDERS)]
-
-
 def _simplest(judged: Sequence[Judged], best: Judged, visible: float) -> Judged:
     """Choose the fewest numbers within one standard error of the best, or not visibly worse."""
     for each in judged:
@@ -570,7 +516,7 @@ def _simplest(judged: Sequence[Judged], best: Judged, visible: float) -> Judged:
 
 def _front(judged: Sequence[Judged]) -> tuple[Judged, ...]:
     """Keep what nothing else beats in error, numbers and condition number."""
-    values = comparable(np.array([_objectives(each) for each in judged]))
+    values = comparable(np.array([(each.error, each.numbers, np.log10(each.condition_number)) for each in judged]))
     beaten = [np.any(np.all(values <= row, axis=1) & np.any(values < row, axis=1)) for row in values]
     return tuple(each for each, lost in zip(judged, beaten, strict=True) if not lost)
 

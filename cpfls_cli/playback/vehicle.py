@@ -137,14 +137,13 @@ def find_vehicle(
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
-    rng: np.random.Generator,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
 ) -> FoundVehicle:
     """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
-    choice = choose(begun, own, settings, rng, progress, kept)
+    choice = choose(begun, own, settings, progress, kept)
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)

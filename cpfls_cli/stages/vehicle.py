@@ -35,7 +35,7 @@ from cpfls_cli.artifacts.parameters import (
 )
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle, mismatches
-from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
@@ -84,11 +84,11 @@ _REMAINDER, _ROTORS = "remainder", "rotors"
 _TRIED = {
     "chosen": "chosen",
     "best": "smallest error",
-    "greedy": "one by one",
+    "added": "named effects added",
     "everything": "all blocks",
     "nothing": "stated vehicle",
 }
-_MARKERS = {"chosen": "s", "best": "^", "greedy": "v", "everything": "D", "nothing": "x"}
+_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x"}
 _PANELS = (
     *(("torque", "N m", each) for each in ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")),
     *(("force", "N", each) for each in ("x (ahead)", "y (left)", "z (up)")),
@@ -385,7 +385,6 @@ def _found(
 ) -> tuple[FoundVehicle, int | None]:
     """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
     study, watch = run.study, Watch(run, None)
-    run.progress(0.0, 1, "loads compiled loops")
 
     def progress(judged: Sequence[Judged], total: int) -> None:
         best = min(each.error for each in judged)
@@ -399,7 +398,7 @@ def _found(
     along = [flight.playback for flight in flights]
     with settings_of("playback", study), watch.deferring():
         try:
-            vehicle = find_vehicle(study.vehicle, along, settings, generator(study, "vehicle"), progress, kept)
+            vehicle = find_vehicle(study.vehicle, along, settings, progress, kept)
         except SearchStoppedError as error:
             raise (without_model("interrupted", watch.signal) or error) from None
     return vehicle, watch.signal

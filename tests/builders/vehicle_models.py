@@ -106,7 +106,7 @@ def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=T
 
 def vehicle_of(model, **changed):
     """A vehicle, as if it had been found by a search over two structures."""
-    names = ("chosen", "best", "greedy", "everything", "nothing", "front", "front")
+    names = ("chosen", "best", "added", "everything", "nothing", "front", "front")
     rows = zip(names, (0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4), (4, 4, 4, 9, 0, 4, 0), strict=True)
     given = {
         "model": model,

@@ -24,8 +24,6 @@ SETTINGS = {
     "playback": {
         "search_windows": 20,
         "folds": 2,
-        "generations": 0,
-        "population": 2,
         "leave_out": left_out(("inertia",)),
     },
     "gap": {"shifts": 39},

@@ -23,7 +23,7 @@ DAMPING = 0.012
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
     path = tmp_path_factory.mktemp("vehicle") / "quad.yaml"
-    search = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
+    search = {"search_windows": 20, "folds": 2, "leave_out": left_out(TRIED)}
     path.write_text(f"{CONFIG}playback: {json.dumps(search)}\n")
     return path
 
@@ -70,7 +70,7 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
     assert told["verdict"] == "good-for-simulation"
     assert told["complete"] is True
     names = [row["name"] for row in told["structures"]]
-    assert names[:5] == ["chosen", "best", "greedy", "everything", "nothing"]
+    assert names[:5] == ["chosen", "best", "added", "everything", "nothing"]
     assert set(names[5:]) == {"front"}
     errors = {row["name"]: row["error"] for row in told["structures"][:5]}
     assert errors["best"] <= errors["chosen"] < 0.1 * errors["nothing"]

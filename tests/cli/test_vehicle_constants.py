@@ -8,7 +8,7 @@ from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.result import plain
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
-SEARCH = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
+SEARCH = {"search_windows": 20, "folds": 2, "leave_out": left_out(TRIED)}
 KEYS = {
     "rotors.thrust_factor_n_s2",
     "rotors.drag_factor_n_m_s2",

@@ -40,8 +40,8 @@ def numbers(found):
 
 def chosen(vehicle, flights, candidates, **asked):
     others = tuple(block for block in blocks_of(vehicle) if block not in candidates)
-    settings = PlaybackSettings(leave_out=others, population=2, generations=0, **asked)
-    choice = choose(vehicle, flights, settings, np.random.default_rng(1), lambda *_: None)
+    settings = PlaybackSettings(leave_out=others, **asked)
+    choice = choose(vehicle, flights, settings, lambda *_: None)
     return choice.chosen, settings
 
 
@@ -67,8 +67,8 @@ def test_from_mass_and_geometry_alone_the_constants_come_back():
     """Thrust factor, drag factor and inertia are guesses, up to twice too large or a third of what they are."""
     flights = flown(truth(), ("multisine", "figure"), seed=1, noise=MIDDLING)
     others = tuple(block for block in blocks_of(nothing_known()) if block not in TRUE_BLOCKS)
-    settings = PlaybackSettings(leave_out=others, search_windows=40, folds=2, population=2, generations=0)
-    found = find_vehicle(nothing_known(), flights, settings, np.random.default_rng(1), lambda *_: None)
+    settings = PlaybackSettings(leave_out=others, search_windows=40, folds=2)
+    found = find_vehicle(nothing_known(), flights, settings, lambda *_: None)
     true, guessed = true_numbers(), nothing_known()
     assert guessed.rotors[0].drag_factor_n_m_s2 < 0.3 * true["drag_factor"]
     by_name = {number.name: number for number in found.numbers}
