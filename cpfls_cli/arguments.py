@@ -126,6 +126,13 @@ AnywayOption = Annotated[
         "there is to be used.",
     ),
 ]
+QuickOption = Annotated[
+    bool,
+    typer.Option(
+        "--quick",
+        help="Give a first answer: named effects alone, judged on at most 100 windows, no forecast by the past.",
+    ),
+]
 ExportAnywayOption = Annotated[
     bool,
     typer.Option(

@@ -24,7 +24,10 @@ from cpfls_cli.vehicle_limits import beyond_any_vehicle
 
 _PAPER = "remove it; `make reproduce` writes the page that compares a study with the paper"
 _CONTROL = "a model is flown by `simulate --model` in closed loop; examples/computed_torque.py controls with one"
+_STRUCTURES = "remove it; the search for the structure of a vehicle breeds none"
 _GONE = {
+    ("playback", "generations"): _STRUCTURES,
+    ("playback", "population"): _STRUCTURES,
     ("report", "evaluation_times"): _PAPER,
     ("report", "paper"): _PAPER,
     ("simulation", "computed_torque"): f"remove it; {_CONTROL}",

@@ -20,6 +20,9 @@ from cpfls_cli.playback.settings import PlaybackSettings
 _FEWEST_BLOCKS = 8
 """Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
 
+_QUICK = 100
+"""Windows of a quick search at most."""
+
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
 
@@ -35,7 +38,8 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
-    interval = max(settings.window_interval_s, flown / settings.search_windows)
+    most = min(settings.search_windows, _QUICK) if settings.quick else settings.search_windows
+    interval = max(settings.window_interval_s, flown / most)
     windows = windows_of(flights, settings.horizon_s, interval)
     count = min(settings.folds, len(windows))
     ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()

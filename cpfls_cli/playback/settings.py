@@ -39,6 +39,10 @@ class PlaybackSettings(Settings):
         400
     )
     folds: Annotated[int, Ge(2), Doc("parts of the flights, each of which is kept aside once in the search")] = 3
+    quick: Annotated[
+        bool,
+        Doc("a first answer: named effects alone, judged on at most 100 windows, no forecast by the past; --quick"),
+    ] = False
     leave_out: Annotated[
         tuple[str, ...],
         Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),

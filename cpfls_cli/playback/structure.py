@@ -157,7 +157,8 @@ class Choice:
     chosen : Judged
         The one with the fewest numbers within one standard error of the best.
     added, everything, nothing : Judged
-        Baselines: named effects added to the stated vehicle alone, all blocks, and the stated vehicle.
+        Baselines: named effects added to the stated vehicle alone, all blocks, and the stated vehicle; None where the
+        search was stopped before.
     front : tuple of Judged
         Not dominated in error, numbers and condition number, by number.
     evaluated : int
@@ -168,8 +169,8 @@ class Choice:
 
     chosen: Judged
     best: Judged
-    added: Judged
-    everything: Judged
+    added: Judged | None
+    everything: Judged | None
     nothing: Judged
     front: tuple[Judged, ...]
     evaluated: int
@@ -178,7 +179,7 @@ class Choice:
     @property
     def tried(self) -> tuple[TriedStructure, ...]:
         """The baselines, then the front."""
-        baselines = [(name, getattr(self, name)) for name in BASELINES]
+        baselines = [(name, found) for name in BASELINES if (found := getattr(self, name)) is not None]
         return tuple(
             TriedStructure(
                 name,
@@ -313,7 +314,8 @@ def tried_blocks(
 ) -> tuple[str, ...]:
     """List the blocks that the flights can say anything of."""
     moves = all(flight.translates for flight in flights)
-    found = (block for block in blocks_of(vehicle) if block not in settings.leave_out)
+    left_out = {*settings.leave_out, *(LEARNED if settings.quick else ())}
+    found = (block for block in blocks_of(vehicle) if block not in left_out)
     return tuple(block for block in found if moves or not needs_velocity(block))
 
 
@@ -334,37 +336,31 @@ def choose(
         Training flights alone.
     kept : mapping of Structure to sequence of Solution
         Of the same search, stopped before; it goes on to the same end.
-
-    Raises
-    ------
-    SearchStoppedError
-        If it is stopped before all blocks were judged.
     """
     blocks = tried_blocks(vehicle, flights, settings)
     bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept)
-    nothing = bench.judge(Structure(()))
-    # All blocks on the stated body first, or on a guessed one: a body that is free from the beginning is made so heavy
-    # that no torque that is not explained yet moves it, and then no explanation is worth anything.
-    if INERTIA in blocks:
-        bench.judge(Structure(tuple(block for block in blocks if block != INERTIA)))
-    guessed = replace(vehicle, unknown=tuple(name for name in vehicle.unknown if name != INERTIA))
-    everything = bench.judge(Structure(blocks), first=guessed if INERTIA in vehicle.unknown else None)
-    complete, added = True, nothing
+    complete, added = True, None
     try:
-        added = _grow(bench, nothing, blocks)
-        _explore(bench, everything, blocks)
-        _settle(bench, blocks)
+        added = _grow(bench, blocks)
+        _explore(bench, bench.judge(Structure(blocks), added.start(Structure(blocks))), blocks)
+        if not settings.quick:
+            _settle(bench, blocks)
     except SearchStoppedError:
         complete = False
-    judged, best, chosen = _preferred(bench)
+    known, (judged, best, chosen) = bench.known, _preferred(bench)
+    everything, nothing = known.get(Structure(blocks)), known[Structure(())]
     return Choice(chosen, best, added, everything, nothing, _front(judged), len(judged), complete)
 
 
-def _grow(bench: _Bench, nothing: Judged, blocks: tuple[str, ...]) -> Judged:
+def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
     """Add named effects to the stated vehicle, with each kind of response of its rotors, and go on with the best."""
     named = tuple(block for block in blocks if block not in LEARNED)
-    kinds = (block for block in _ACTUATION if block in blocks)
-    starts = [nothing, *(bench.judge(Structure((block,)), {}) for block in kinds)]
+    # A body that is free from the beginning is made so heavy that no torque that is not explained yet moves it, and
+    # then no explanation is worth anything.
+    open_ = bench.vehicle.unknown
+    guessed = replace(bench.vehicle, unknown=tuple(name for name in open_ if name != INERTIA))
+    kinds = ((), *((block,) for block in _ACTUATION if block in blocks))
+    starts = [bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds]
     grown = [_explore(bench, each, named) for each in starts]
     for present in ascending(grown, lambda each: each.error)[:_FITTED]:
         while True:
@@ -407,10 +403,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
 
 
 def _settle(bench: _Bench, blocks: tuple[str, ...]) -> None:
-    """Explore what is near the best and the choice, then judge their neighbours, until nothing changes them any more.
-
-    What is learned is held against names for the choice alone, which takes many fits.
-    """
+    """Explore what is near the best and the choice, then judge their neighbours, until nothing changes any more."""
     explored: set[Structure] = set()
     while True:
         present = _preferred(bench)[1:]
@@ -422,8 +415,9 @@ def _settle(bench: _Bench, blocks: tuple[str, ...]) -> None:
         if new and _changed(bench, *present):
             continue
         for each in pair:
-            _neighbours(bench, each, blocks)
-        _named_instead(bench, _preferred(bench)[2], blocks)
+            _judge_hopeful(bench, each, _fewer(each.structure), _HOPEFUL)
+        _judge_more(bench, present[0], blocks)
+        _judge_other(bench, _preferred(bench)[2], blocks)
         if not _changed(bench, *present):
             return
 
@@ -450,16 +444,28 @@ def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
     return found if found.learns else Structure(found.blocks)
 
 
-def _neighbours(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> None:
-    """Judge hopeful structures with one block less or more, and all with other rules of what is learned."""
-    structure = centre.structure
-    more = [_with(structure, block, blocks) for block in blocks if block not in structure.blocks]
-    of_actuation = [each for each in more if not set(_ACTUATION).isdisjoint({*each.blocks} - {*structure.blocks})]
-    _judge_hopeful(bench, centre, _fewer(structure), _HOPEFUL)
-    _judge_hopeful(bench, centre, [each for each in more if each not in of_actuation], 0.0)
-    other = [structure._replace(rules=rules) for rules in REMAINDERS] if structure.learns else []
-    for each in (*of_actuation, *other):
-        bench.judge(each)
+def _judge_more(bench: _Bench, best: Judged, blocks: tuple[str, ...]) -> None:
+    """Judge structures with one block more than the best that are hopeful, and any with another response."""
+    absent = [block for block in blocks if block not in best.structure.blocks]
+    more = {block: _with(best.structure, block, blocks) for block in absent}
+    _judge_hopeful(bench, best, [more[block] for block in absent if block not in _ACTUATION], 0.0)
+    for block in _ACTUATION:
+        if block in more:
+            bench.judge(more[block])
+
+
+def _judge_other(bench: _Bench, choice: Judged, blocks: tuple[str, ...]) -> None:
+    """Judge the choice with other rules of what is learned, and with an effect in its place.
+
+    What is learned can stand for several effects; none of them alone may then gain anything beside it.
+    """
+    structure = choice.structure
+    absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
+    for learned in (block for block in structure.blocks if block in LEARNED):
+        named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]
+        _judge_hopeful(bench, choice, named, _HOPEFUL)
+    for rules in REMAINDERS if structure.learns else ():
+        bench.judge(structure._replace(rules=rules))
 
 
 def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], most: float) -> None:
@@ -479,18 +485,6 @@ def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:
     """Tell by block whether errors are worse than the best by less than `most` times what fewer numbers may cost."""
     worse, mean = errors - best, float(best.mean())
     return bool(less(worse.mean(), most * max(float(mean_error(worse)), _visible(bench, mean)), mean))
-
-
-def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> None:
-    """Judge the structures with an effect in the place of what is learned.
-
-    What is learned can stand for several effects; none of them alone may then gain anything beside it.
-    """
-    structure = judged.structure
-    absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
-    for learned in (block for block in structure.blocks if block in LEARNED):
-        named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]
-        _judge_hopeful(bench, judged, named, _HOPEFUL)
 
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:

@@ -169,6 +169,7 @@ def find_vehicle(
         gusts = find_gusts(model, given, determined, told=forecast is not None)
     shares, airspeed = _shares(model, own)
     used = None if forecast is None or constants is None else constants.used
+    past = choice.complete and settings.history_s and not settings.quick
     return FoundVehicle(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
@@ -186,7 +187,7 @@ def find_vehicle(
         instruments=used,
         forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
         disturbance=gusts,
-        history=find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,
+        history=find_history(chosen, fitted, own, settings) if past else None,
         choice=choice,
         sources=given,
         others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.arguments import AnywayOption, FlightsArgument, HeldOutOption, ResumeOption, WriteConfigOption
+from cpfls_cli.arguments import (
+    AnywayOption,
+    FlightsArgument,
+    HeldOutOption,
+    QuickOption,
+    ResumeOption,
+    WriteConfigOption,
+)
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.learned import LearnedFlight
@@ -67,7 +74,7 @@ from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly
-from cpfls_cli.stages._stopped import stop_note, without_model
+from cpfls_cli.stages._stopped import stop_note
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import did_you_mean, joined
 
@@ -78,6 +85,7 @@ _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
 _LIVELY_RAD_S = 1.0
 """Body rate, root mean square, above which larger turns show no more of the vehicle."""
+_FIRST_ANSWER = "a first answer by --quick: without it more structures are tried, on more windows"
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 _REMAINDER, _ROTORS = "remainder", "rotors"
@@ -204,6 +212,8 @@ def _structures(r: Vehicle, figure: Figure) -> None:
     axes.plot(count, error, "o", label="Pareto front", color=GREY, markersize=4)
     by_name: dict[str, TriedStructure] = {each.name: each for each in r.structures}
     for place, (name, marker) in enumerate(_MARKERS.items()):
+        if name not in by_name:
+            continue
         look = {"label": _TRIED[name], "color": style_of(place)["color"], "markersize": 7, "linestyle": "none"}
         axes.plot([by_name[name].numbers], [by_name[name].error], marker, **look)
     axes.axhline(1.1, label="rates stay", **BASELINE)
@@ -270,7 +280,9 @@ def remainder_curves(r: Vehicle) -> tuple[Array, Array, Array]:
     study=True,
     resumes=True,
     # The file holds it with its config.
-    overrides=lambda anyway=False, **_: ["playback.anyway=true"] if anyway else [],
+    overrides=lambda anyway=False, quick=False, **_: [
+        f"playback.{name}=true" for name, asked in (("anyway", anyway), ("quick", quick)) if asked
+    ],
 )
 def vehicle(
     run: Run,
@@ -279,6 +291,7 @@ def vehicle(
     resume: ResumeOption = False,
     write_config: WriteConfigOption = None,
     anyway: AnywayOption = False,  # noqa: ARG001  # the config has it
+    quick: QuickOption = False,  # noqa: ARG001  # so it has this one
 ) -> Vehicle | None:
     """Find a vehicle in flights, and judge it on those held out."""
     others = held_out or []
@@ -304,7 +317,8 @@ def vehicle(
         checkpoint.remove()
     run.until_written.enter_context(checkpoint.kept())
     found, signal = _found(run, training, settings, checkpoint, kept or {})
-    warnings = [*limit, *twice, *(warning for flight in read for warning in flight.warnings)]
+    first = [_FIRST_ANSWER] if settings.quick else []
+    warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
     made = _judged(run, found, read, list(_learned([run.files[role] for role in learned], training)), warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
@@ -325,6 +339,9 @@ def next_commands(
     # No flight that is planned says more before the logs are faster.
     if not made.complete or made.logged_slowly:
         return (page,)
+    if job.study.playback.quick:
+        others = [part for path in held_out for part in ("--held-out", path)]
+        return page, ("cpfls", "vehicle", config, *flights, *others, "-o", job.output.with_name(f"{name}-full.h5"))
     if made.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING, Trust.DO_NOT_USE):
         mission = job.output.with_name(f"{name}-mission.h5")
         return page, to_fly(job, mission)
@@ -397,10 +414,7 @@ def _found(
 
     along = [flight.playback for flight in flights]
     with settings_of("playback", study), watch.deferring():
-        try:
-            vehicle = find_vehicle(study.vehicle, along, settings, progress, kept)
-        except SearchStoppedError as error:
-            raise (without_model("interrupted", watch.signal) or error) from None
+        vehicle = find_vehicle(study.vehicle, along, settings, progress, kept)
     return vehicle, watch.signal
 
 

@@ -159,14 +159,14 @@ def interrupt_at(monkeypatch):
 
         find = vehicle.find_vehicle
 
-        def finding(stated, flights, settings, rng, progress, kept):
+        def finding(stated, flights, settings, progress, kept):
             def told(judged, total):
                 evaluated.append(len(judged))
                 if len(judged) == number:
                     os.kill(os.getpid(), signal.SIGINT)
                 progress(judged, total)
 
-            return find(stated, flights, settings, rng, told, kept)
+            return find(stated, flights, settings, told, kept)
 
         evaluated = []
         monkeypatch.setattr(vehicle, "find_vehicle", finding)
