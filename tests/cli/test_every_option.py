@@ -66,7 +66,7 @@ LINES = (
     f"identify study.yaml flight.h5 -o model.h5 --selection selection.h5 {LEARN} --resume",
     f"sweep study.yaml flight.h5 -o sweep.h5 {LEARN} --time-limit 0.001",
     f"sweep study.yaml flight.h5 -o sweep.h5 {LEARN} --resume",
-    "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --write-config found.yaml --anyway",
+    "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --write-config found.yaml --anyway --quick",
     "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --resume # nothing to resume",
     "predict study.yaml model.h5 flight.h5 -o 7.h5",
     "replay study.yaml vehicle flight.h5 -o 8.h5 --horizon 0.2 --every 50 --hold linear",

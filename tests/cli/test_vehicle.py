@@ -197,16 +197,29 @@ def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, int
     assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
 
 
-def test_an_interrupt_before_anything_was_found_keeps_the_checkpoint_alone(
+def test_an_interrupt_after_the_first_structure_gives_the_stated_vehicle(
     cpfls, config, flights, tmp_path, interrupt_at
 ):
-    interrupt_at(2)
-    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5")
-    assert (result.exit_code, result.stdout) == (130, "")
-    assert result.stderr == (
-        f"cpfls: error: the search was interrupted before a model was found, so none is written; {RESUME}\n"
-    )
-    assert names(tmp_path) == ["v.h5.checkpoint"]
+    interrupt_at(1)
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
+    assert result.exit_code == 130
+    told = json.loads(result.stdout)
+    assert (told["complete"], told["evaluated"]) == (False, 1)
+    assert {each["name"] for each in told["structures"]} == {"chosen", "best", "nothing", "front"}
+    assert told["model"]["effects"] == []
+    assert names(tmp_path) == ["v.h5", "v.h5.checkpoint"]
+    cpfls.done("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
+
+
+@pytest.mark.decides
+def test_a_quick_search_finds_the_same_effect_in_fewer_structures(cpfls, config, flights, found, tmp_path):
+    words = ("vehicle", config, flights[0], "--held-out", flights[1], "--quick")
+    told = cpfls.told(*words, "-o", tmp_path / "v.h5")
+    assert told["evaluated"] <= found.told["evaluated"]
+    assert told["model"]["effects"][0]["name"] == "linear_damping"
+    result = cpfls.done(*words, "-o", tmp_path / "v.h5", "--force", "-v")
+    assert "a first answer by --quick" in result.stderr
+    assert "v-full.h5" in result.stdout
 
 
 @pytest.mark.parametrize("number", [1, 3, 8])
