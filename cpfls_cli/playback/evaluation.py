@@ -37,8 +37,8 @@ from cpfls_cli.playback.table import Airflow, learned_wrench, rotor_weights
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, traced
-from cpfls_cli.vehicle.values import ARRAYS, Each, Functions, Tangent, Value, Vector, dot, times
+from cpfls_cli.vehicle.tracing import ARRAY_SYMBOLS, Graph, traced_in_two
+from cpfls_cli.vehicle.values import ARRAYS, Functions, Tangent, Value, Vector, dot, times
 
 _TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
@@ -245,10 +245,10 @@ class VehicleAt:
         """The vehicle as runs fly it."""
         airflow = self.free.airflow
         key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
-        function, given = traced_wrench(*key), tuple(self.values.tolist())
+        function = traced_wrench(*key)(tuple(self.values.tolist()))
         return replace(
             self._flown(*acting_at(self.free, lambda name: self.get(name, 0.0)), np.zeros((0, 3, 3))),
-            traced=lambda *motion: function(*motion, given),
+            traced=lambda air, rate, *rotors: function(air, rate, rotors),
         )
 
     @cached_property
@@ -316,30 +316,28 @@ def acting_at(
 @lru_cache(maxsize=256)
 def traced_wrench(
     vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int
-) -> Callable[..., tuple[Vector, Vector]]:
-    """Make one function of torque and force of vehicles with these numbers.
+) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
+    """Make a function of values of the numbers that gives one of torque and force of the vehicle.
 
-    It takes air velocity, body rate, speeds, accelerations and slow squares of the rotors, arrays by component, and the
-    values of the numbers.
+    This takes air velocity, body rate, and speeds, accelerations and slow squares of the rotors: arrays by component.
     """
     free, graph = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)), Graph()
     symbols = dict(zip(free.index, graph.inputs("number", len(free.numbers)), strict=True))
     air, rate = (graph.inputs(name, 3) for name in ("air", "rate"))
-    speed, turning, slow = (graph.inputs(name, len(vehicle.rotors)) for name in ("speed", "turning", "slow"))
-    acting, drag_scale = acting_at(free, symbols.__getitem__, SYMBOLS)
+    rotors = graph.inputs("rotors", 3)
+    acting, drag_scale = acting_at(free, symbols.__getitem__, ARRAY_SYMBOLS)
     see = Instant(
         vehicle,
-        Each(speed),
+        rotors[0],
         air_velocity=air,
         body_rate=rate,
-        rotor_acceleration=Each(turning),
-        slow_square=Each(slow),
+        rotor_acceleration=rotors[1],
+        slow_square=rotors[2],
         drag_scale=drag_scale,
+        functions=ARRAY_SYMBOLS,
     )
-    arguments = {"air": air, "rate": rate, "speed": speed, "turning": turning, "slow": slow}
-    return traced(
-        graph, {**arguments, "number": (*symbols.values(),)}, Vehicle(vehicle, acting).wrench(see), arrays=True
-    )
+    numbers, motion = ("number", tuple(symbols.values())), {"air": air, "rate": rate, "rotors": rotors}
+    return traced_in_two(graph, numbers, motion, Vehicle(vehicle, acting).wrench(see))
 
 
 def inertia_derivatives(at: VehicleAt) -> Array:

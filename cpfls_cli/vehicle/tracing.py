@@ -1,4 +1,4 @@
-"""Symbols that record what is computed with them, and write it in a language: plain Python, C99, JAX, CasADi.
+"""Symbols that record what is computed with them, and write it in a language: plain Python, NumPy, C99, JAX, CasADi.
 
 What is computed twice is computed once, what no result needs is left out, and numbers that are known are folded in.
 """
@@ -6,13 +6,13 @@ What is computed twice is computed once, what no result needs is left out, and n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.vehicle.values import Each, Functions, Value, plus
+from cpfls_cli.vehicle.values import Each, Functions, Value, plus, zero
 
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
@@ -39,6 +39,14 @@ class Graph:
             self.nodes.append(operation)
         return Symbol(self, place)
 
+    def known(self, value: Value) -> Symbol:
+        """Record a number, or one for each rotor, shape (rotor, 1)."""
+        if isinstance(value, Symbol):
+            return value
+        if isinstance(value, np.ndarray):
+            return self.node("array", *value.ravel().tolist())
+        return self.node("number", float(value))
+
     def given(self, value: Symbol, *operation: Any) -> None:
         """Say what an operation gives, before it is recorded."""
         self._places[operation] = value.place
@@ -59,8 +67,7 @@ class Symbol:
 
     def made(self, name: str, *arguments: Value) -> Symbol:
         """Record an operation on numbers."""
-        places = (x.place if isinstance(x, Symbol) else self.graph.node("number", float(x)).place for x in arguments)
-        return self.graph.node(name, *places)
+        return self.graph.node(name, *(self.graph.known(x).place for x in arguments))
 
     def _by(self, name: str, a: Value, b: Value) -> Value:
         other = a if b is self else b
@@ -156,10 +163,38 @@ SYMBOLS = Functions(
 """Functions of symbols; of floats they give floats."""
 
 
+def _by_numpy(name: str) -> Callable[..., Value]:
+    def called(*arguments: Value) -> Value:
+        for argument in arguments:
+            if isinstance(argument, Symbol):
+                return argument.made(name, *arguments)
+        return getattr(np, _NUMPY.get(name, name))(*arguments)
+
+    return called
+
+
+def _by_rotor(values: Iterable[Value]) -> Value:
+    column = np.array([*values], dtype=float)[:, None]
+    return column if column.any() else 0
+
+
+_ARRAY_FUNCTIONS = {name: _by_numpy(name) for name in (*_FUNCTIONS, "where")}
+ARRAY_SYMBOLS = Functions(
+    **{name: _ARRAY_FUNCTIONS[name] for name in ("sqrt", "exp", "sin", "cos", "floor", "where")},
+    arctan2=_ARRAY_FUNCTIONS["atan2"],
+    absolute=_ARRAY_FUNCTIONS["abs"],
+    largest=lambda a, b: _ARRAY_FUNCTIONS["where"](a > b, a, b),
+    smallest=lambda a, b: _ARRAY_FUNCTIONS["where"](a < b, a, b),
+    rotors=_by_rotor,
+    total=lambda x: x if zero(x) else x.made("total", x) if isinstance(x, Symbol) else x.sum(axis=0),
+)
+"""Functions of symbols for arrays, whose first axis is that of the rotors where there is one value for each of them."""
+
+
 def traced(
-    graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]], *, arrays: bool = False
+    graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]
 ) -> Callable[..., Any]:
-    """Make a function of what was recorded, of floats or of arrays.
+    """Make a function of what was recorded, of floats.
 
     Parameters
     ----------
@@ -168,15 +203,43 @@ def traced(
     results : sequence of sequence of value
         What it gives: a tuple of tuples.
     """
-    return _compiled(python_source(graph, arguments, results, ARRAYS if arrays else PYTHON), arrays)
+    return _compiled(python_source(graph, arguments, results))["step"]  # type: ignore[no-any-return]
+
+
+def traced_in_two(
+    graph: Graph,
+    first: tuple[str, Sequence[Symbol]],
+    arguments: Mapping[str, Sequence[Symbol]],
+    results: Sequence[Sequence[Value]],
+) -> Callable[..., Callable[..., Any]]:
+    """Make a function of one argument that gives a function of the others, of arrays; see `traced`.
+
+    What depends on the first one alone is computed once.
+    """
+    early = {x.place for x in first[1]}
+    for place, (name, *inner) in enumerate(graph.nodes):
+        if name in _GIVEN[1:] or (name not in _GIVEN and early.issuperset(inner)):
+            early.add(place)
+    flat = [graph.known(x).place for group in results for x in group]
+    uses = _uses(graph, flat)
+    done = (place for place, node in enumerate(graph.nodes) if uses[place] and node[0] not in _GIVEN)
+    late = (graph.nodes[place][1:] for place in done if place not in early)
+    asked = {place for inner in late for place in inner if place in early} | early.intersection(flat)
+    kept = sorted(place for place in asked if graph.nodes[place][0] not in ("input", "number"))
+    lines, texts = written(graph, [Symbol(graph, place) for place in kept], ARRAYS)
+    lines += [f"known{place} = {text}" for place, text in zip(kept, texts, strict=True)]
+    step = python_source(graph, arguments, results, ARRAYS, {place: f"known{place}" for place in kept})
+    unpacked = f"{', '.join(graph.nodes[x.place][1] for x in first[1])}, = {first[0]}" if first[1] else ""
+    body = "\n    ".join([unpacked, *lines, *step.splitlines(), "return step"])
+    return _compiled(f"def made({first[0]}):\n    {body}\n", arrays=True)["made"]  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=32)
-def _compiled(source: str, arrays: bool) -> Callable[..., Any]:
+def _compiled(source: str, arrays: bool = False) -> dict[str, Any]:
     functions = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, "where")} if arrays else _FUNCTIONS
-    names: dict[str, Any] = {**functions, "inf": math.inf, "nan": math.nan}
+    names: dict[str, Any] = {**functions, "array": np.array, "inf": math.inf, "nan": math.nan}
     exec(compile(source, "<traced>", "exec"), names)
-    return names["step"]  # type: ignore[no-any-return]
+    return names
 
 
 class Language(NamedTuple):
@@ -207,7 +270,7 @@ class Language(NamedTuple):
 
 _OPERATORS = {name: f"({{}} {name} {{}})" for name in ("+", "-", "*", "/", "<", ">", "**")} | {"negative": "(-{})"}
 PYTHON = Language({"where": "({1} if {0} else {2})"})
-ARRAYS = Language({})
+ARRAYS = Language({"total": "{}.sum(0)"})
 _NUMPY = {"atan2": "arctan2"}
 """Functions that NumPy has by another name."""
 C = Language(
@@ -228,10 +291,11 @@ def python_source(
     arguments: Mapping[str, Sequence[Symbol]],
     results: Sequence[Sequence[Value]],
     language: Language = PYTHON,
+    known: Mapping[int, str] | None = None,
 ) -> str:
-    """Write what `traced` makes as text: a function called ``step``."""
+    """Write what `traced` makes as text: a function called ``step``; some operations may have names already."""
     flat = [x for group in results for x in group]
-    lines, texts = written(graph, flat, language)
+    lines, texts = written(graph, flat, language, known=known)
     named = {name: [graph.nodes[x.place][1] for x in group] for name, group in arguments.items()}
     unpacked = [f"{', '.join(names)}, = {name}" for name, names in named.items() if names]
     text = iter(texts)
@@ -241,7 +305,11 @@ def python_source(
 
 
 def written(
-    graph: Graph, results: Sequence[Value], language: Language, parts: Mapping[int, str] | None = None
+    graph: Graph,
+    results: Sequence[Value],
+    language: Language,
+    parts: Mapping[int, str] | None = None,
+    known: Mapping[int, str] | None = None,
 ) -> tuple[list[str], list[str]]:
     """Write what was recorded: lines, and expressions of the results in terms of them.
 
@@ -249,17 +317,20 @@ def written(
     ----------
     parts : mapping of int to str, optional
         What is said before the operations that begin at a place.
+    known : mapping of int to str, optional
+        Names of operations that are computed elsewhere, by place.
     """
-    uses = _uses(graph, [x.place for x in results if isinstance(x, Symbol)])
-    text: dict[int, str] = {}
+    text = dict(known or {})
+    uses = _uses(graph, [x.place for x in results if isinstance(x, Symbol)], text)
     lines: list[str] = []
     said = ""
     for place, (name, *inner) in enumerate(graph.nodes):
         said = (parts or {}).get(place, said)
-        if not uses[place]:
+        if not uses[place] or place in text:
             continue
-        if name in ("input", "number"):
-            text[place] = inner[0] if name == "input" else language.number.format(inner[0])
+        if name in _GIVEN:
+            column = f"array({[[value] for value in inner]})"
+            text[place] = {"input": inner[0], "array": column}.get(name) or language.number.format(inner[0])
             continue
         text[place] = language.written(name, [text[each] for each in inner])
         if uses[place] > 1 or len(text[place]) > language.longest:
@@ -279,13 +350,17 @@ def _tuple(items: Iterable[str]) -> str:
     return f"({''.join(f'{item}, ' for item in items)})"
 
 
-def _uses(graph: Graph, results: Sequence[int]) -> list[int]:
-    """Count how often each operation is needed for the results."""
+_GIVEN = ("input", "number", "array")
+"""What is no operation."""
+
+
+def _uses(graph: Graph, results: Sequence[int], known: Container[int] = ()) -> list[int]:
+    """Count how often each operation is needed for the results, beyond those that are known."""
     uses = [0] * len(graph.nodes)
     waiting = [*results]
     while waiting:
         place = waiting.pop()
         uses[place] += 1
-        if uses[place] == 1 and graph.nodes[place][0] not in ("input", "number"):
+        if uses[place] == 1 and place not in known and graph.nodes[place][0] not in _GIVEN:
             waiting.extend(graph.nodes[place][1:])
     return uses
