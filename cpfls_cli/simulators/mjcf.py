@@ -155,9 +155,7 @@ def read_mjcf(file: Path) -> SimulatorModel:
                           tuple(notes), tuple(whole.files))  # fmt: skip
 
 
-def _gather(
-    whole: _File, body: Node, placed: Array, above: str, bodies: list[Body], sites: dict[str, Array]
-) -> None:
+def _gather(whole: _File, body: Node, placed: Array, above: str, bodies: list[Body], sites: dict[str, Array]) -> None:
     """Collect what has mass, and the sites, of a body and those below it, in the frame of the first."""
     named = body.attributes.get("childclass", above)
     inertial = body.first("inertial")
@@ -291,4 +289,3 @@ def _rotor(node: Node, own: Mapping[str, str], gear: Array, squared: bool, site:
         lag_down=lagging,
         node=node,
     )
-

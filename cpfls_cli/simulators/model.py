@@ -47,6 +47,11 @@ class Body:
     place: tuple[Stated, ...] = ()
     node: Node | None = None
 
+    @property
+    def inertia_at(self) -> str:
+        """Where its inertia stands."""
+        return self.entries[0].where if self.entries else self.mass.where
+
 
 @dataclass(frozen=True)
 class Rotor:
@@ -163,8 +168,9 @@ class SimulatorModel:
         known = [each for each in speeds if each is not None]
         return min(known, key=lambda each: each.value) if known and len(known) == len(speeds) else None
 
+    @property
     def where_of_mass(self) -> str:
-        """Say where the mass stands."""
+        """Where the mass stands."""
         with_mass = [body for body in self.bodies if body.mass.value > 0]
         rest = len(with_mass) - 1
         return self.bodies[0].mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")
@@ -181,8 +187,7 @@ def masses_of(body: Body) -> None:
         raise InputError(f"{body.mass.where}: a mass of {body.mass.value:g} kg; write one above 0")
     if body.mass.value > 0 and np.linalg.eigvalsh(body.inertia).min() < 0:
         raise InputError(
-            f"{(body.entries[0] if body.entries else body.mass).where}: inertia that no body has: a principal moment is "
-            "below 0; correct ixx to iyz there"
+            f"{body.inertia_at}: inertia that no body has: a principal moment is below 0; correct ixx to iyz there"
         )
 
 
