@@ -147,7 +147,7 @@ def _pose(node: Node | None) -> Array:
         return pose(of_quaternion([turn[3], *turn[:3]]), (x, y, z))
     x, y, z, *rpy = (each.value for each in node.numbers(count=6))
     degrees = node.attributes.get("degrees", "false") in ("true", "1")
-    return pose(rotated(np.radians(rpy) if degrees else np.array(rpy)), (x, y, z))
+    return pose(rotated([angle * (np.pi / 180 if degrees else 1.0) for angle in rpy]), (x, y, z))
 
 
 def _model_of(root: Node) -> Node:
@@ -189,7 +189,7 @@ def read_sdf(file: Path) -> SimulatorModel:
     spinning = {scope + _text(plugin, "jointName"): scope for scope, plugin in motors}
     base = _base(parts, motors[0][0], motors[0][1])
     held = _rigid(parts, base, set(spinning), notes)
-    inverse = np.linalg.inv(parts.pose(base))
+    inverse = np.asarray(np.linalg.inv(parts.pose(base)), dtype=float)
     bodies = tuple(_body(parts.links[name], name, inverse @ parts.pose(name), notes) for name in held)
     placed = {body.name: body for body in bodies}
     rotors = tuple(_rotor(parts, scope, plugin, placed, inverse) for scope, plugin in motors)

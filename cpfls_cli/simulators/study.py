@@ -92,8 +92,10 @@ class VehicleOf:
         for index in self.order:
             rotor = self.model.rotors[index]
             thrust = None if rotor.thrust is None else rotor.thrust.value
-            numbers = [None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor)]
-            found.append(RotorLine(_short(hubs[index].tolist()), rotor.spin, *numbers, f"{rotor.name}, {rotor.where}"))
+            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor))
+            found.append(
+                RotorLine(_short(hubs[index].tolist()), rotor.spin, thrust, drag, f"{rotor.name}, {rotor.where}")
+            )
         return found
 
     def where_of(self, quantity: str) -> str:
