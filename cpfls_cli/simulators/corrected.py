@@ -27,6 +27,7 @@ import numpy as np
 
 from cpfls_cli.effects.catalogue.rotor_mismatch import gains
 from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
@@ -194,7 +195,7 @@ def corrected(
         changes=changes,
         unchanged=tuple(made.unchanged),
         elsewhere=tuple(made.elsewhere),
-        diff=diff,
+        diff=visible(diff),
     )
     return said, texts
 
@@ -251,6 +252,11 @@ def _parameter_error(made: _Corrections, numbers: Mapping[str, Estimate]) -> Non
     factors = [
         _factor(numbers.get(f"inertia_{axis}")).with_factor(scale if axis != "z" or follows else _ONE) for axis in "xyz"
     ]
+    if scale.value != 1.0 and follows and "inertia_z" not in numbers and made.rotors[0].ratio is not None:
+        name = _TAGS[made.of.model.format].get("ratio", "their ratio")
+        made.unchanged.append(
+            f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
+        )
     _inertia(made, {index: factor for index, factor in enumerate(factors) if numbers.get(f"inertia_{'xyz'[index]}")})
 
 

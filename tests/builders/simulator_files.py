@@ -64,9 +64,7 @@ def sdf_of(truth, *, thrust=1.0, inertia=(1.0, 1.0, 1.0), rotor_mass=1e-5, spins
     apart = [rotor_mass * (truth.places**2).sum(axis=0)[::-1][axis] for axis in (0, 1)]
     apart.append(sum(apart))
     stated = [share * whole - own for share, whole, own in zip(inertia, truth.inertia, apart, strict=True)]
-    return MODEL.format(
-        mass=truth.mass - 4 * rotor_mass, x=stated[0], y=stated[1], z=stated[2], parts="".join(parts)
-    )
+    return MODEL.format(mass=truth.mass - 4 * rotor_mass, x=stated[0], y=stated[1], z=stated[2], parts="".join(parts))
 
 
 def write_log(path, flight):
