@@ -38,6 +38,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
 _ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+_WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
+_OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
+"""Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
@@ -107,6 +110,11 @@ class _Corrections:
     elsewhere: list[str] = field(default_factory=list)
 
     @property
+    def names(self) -> dict[Path, str]:
+        """Of the corrected files, by those that were given."""
+        return _names(self.of.model.files)
+
+    @property
     def rotors(self) -> list[Rotor]:
         """In the order of the study."""
         return [self.of.model.rotors[index] for index in self.of.order]
@@ -129,6 +137,7 @@ class _Corrections:
             self.elsewhere.append(f"{name} = {text} [{low:.4g}, {high:.4g}]: {stated.where}; write it there")
             return
         change = Change(
+            file=self.names[stated.span.file if stated.span is not None else room.file if room else self.of.model.file],
             element=name,
             where=stated.where,
             before=float(f"{before:.6g}"),
@@ -183,11 +192,14 @@ def corrected(
                 rivals = joined([find(rival.name).title for rival in found.rivals[each.name]], "or")
                 made.unchanged.append(f"{find(each.name).title}: these flights cannot separate it from {rivals}")
         _put_in(made, sure)
+        _not_found(made, found)
+    elif found.verdict == GapVerdict.NO_GAP:
+        _not_found(made, found)
     elif found.contradictions:
         made.unchanged.append("the log or its vehicle contradicts itself, so nothing is put in")
     changes = tuple(_said(change, whom) for change, whom in made.changes.values())
     files = _written(made, changes, flights)
-    names = _names(of.model.files)
+    names = made.names
     texts = {names[file]: text for file, text in files.items()}
     diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
     said = Corrected(
@@ -221,6 +233,18 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _not_found(made: _Corrections, found: Conclusion) -> None:
+    """Say of what the file states and the flights did not show why."""
+    named, hidden = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    tags = _TAGS[made.of.model.format]
+    for kind, name in _OF_EFFECTS.items():
+        stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
+        if kind not in tags or name in named or stated is None or stated.value == 0:
+            continue
+        why = f"these flights cannot show it: {hidden[name]}" if name in hidden else "these flights show none of it"
+        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
 
 
 def _not_held(made: _Corrections, each: NamedEffect | str) -> None:
@@ -341,7 +365,7 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
             continue
         now = float(first.centre[axis])
         found = _Found(*(now + share * each for each in (moved.value, moved.low, moved.high)))
-        words = f"centre of mass of the vehicle is {1e3 * moved.value:.3g} mm {('forward', 'left', 'up')[axis]}"
+        words = f"centre of mass of the vehicle is {1e3 * abs(moved.value):.3g} mm {_WAYS[axis][int(moved.value < 0)]}"
         if first.place:
             made.replace(f"pose {name}", first.place[axis], found, words, first.name, None)
         elif found.contradicts(now):
@@ -362,6 +386,7 @@ def _put_place(made: _Corrections, axis: int, found: _Found, words: str) -> None
     values[axis] = found.value
     made._put(first.node, f"<pose>{' '.join(f'{value:.4g}' for value in values)}</pose>")
     change = Change(
+        file=made.names[first.node.file],
         element=f"pose {'xyz'[axis]}",
         where=f"{first.node.where}: no <pose>",
         before=0.0,

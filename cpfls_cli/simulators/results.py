@@ -9,6 +9,7 @@ from cpfls_cli.result import about, part, result
 class Change:
     """A number of the file that the flights contradict."""
 
+    file: str = about("name of the corrected file that it is in")
     element: str = about("name of the element or attribute")
     where: str = about("file, line and element, first of all that change alike")
     before: float = about("as stated, in the unit of the file")

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.naming.results import Alternative, Estimate
+from cpfls_cli.gap.naming.results import Alternative, Estimate, NotExcited
 from cpfls_cli.simulators.corrected import corrected
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.study import of_log
@@ -41,7 +41,7 @@ def effect(name, **values):
     return named_effect(name, numbers=[number(key, *np.atleast_1d(value)) for key, value in values.items()])
 
 
-def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=()):
+def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(), hidden=()):
     of = of_log(read_model(path), None, None)
     vehicle = VehicleSettings(
         mass_kg=of.mass_kg,
@@ -59,7 +59,9 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=())
     rivals = {}
     for each in alternatives:
         rivals.setdefault(each.instead_of, []).append(each)
-    found = SimpleNamespace(verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects)
+    found = SimpleNamespace(
+        verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects, not_excited=hidden
+    )
     said, files = corrected(of, vehicle, found, ["one.csv", "two.csv"])
     (path.parent / "new").mkdir(exist_ok=True)
     for name, content in files.items():
@@ -172,6 +174,15 @@ def test_what_is_not_determined_stays(mine):
     assert (said.changes, said.diff) == ((), "")
     said, _ = correct(mine, offset, verdict="UNEXPLAINED")
     assert said.changes == ()
+
+
+def test_what_the_file_states_and_no_flight_shows(mine):
+    """A study's vehicle has no drag: what the file states of it is neither right nor wrong for that."""
+    mine.write_text(mine.read_text().replace("<rotorDragCoefficient>0<", "<rotorDragCoefficient>1e-5<"))
+    said, _ = correct(mine, verdict="NO_GAP", hidden=[NotExcited("motor_lag", "commands are not logged")])
+    assert "rotorDragCoefficient 1e-05: these flights show none of it" in said.unchanged
+    assert "timeConstantUp 0.02: these flights cannot show it: commands are not logged" in said.unchanged
+    assert said.diff == ""
 
 
 def test_line_ends_and_comments_stay(mine):

@@ -9,7 +9,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.numbers import places, spins
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.inertia import INERTIA_ENTRIES
-from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.formats import FORMATS, read_model
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import LARGE, SMALL
 from tests.builders.playback_flights import truth
@@ -241,3 +241,9 @@ def test_what_is_there_not_or_a_template_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match="its mass follows from a mesh, which is not read here; give the body"):
         read_model(mesh)
+
+
+def test_units_and_frames_of_the_page_are_those_of_the_table():
+    page = (Path(__file__).parents[3] / "docs" / "simulators-files.md").read_text()
+    for each in FORMATS:
+        assert f"| {each.units} | {each.frames} | {each.source} |" in page
