@@ -280,12 +280,12 @@ def init(
     """Write a commented config for logs of one vehicle, a simulator's file of it, or both."""
     if not logs and model is None:
         raise InputError("Missing argument 'LOG...': give logs, or a simulator's file by --from, or both")
-    own = [arm, inertia, thrust_factor, drag_factor, *([True] if scale_to_arm else [])]
-    if model is not None and any(each is not None for each in own):
-        raise InputError("--from takes all but the mass from the file: leave --arm, --inertia and the factors out")
+    file = None
     if model is not None:
         run.take({"model": model})
-    stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, model=None if model is None else read_model(model))
+        file = read_model(model)
+        _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
+    stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
     made, given, text = proposed(run, logs or (), stated, scale_to_arm=scale_to_arm)
     run.texts[run.output] = text
@@ -295,6 +295,14 @@ def init(
         # A config that asks for something is refused by every command until it is filled in.
         run.next += _next(run, proposal, given) if not made.asked else ()
     return made
+
+
+def _refuse_stated(file: SimulatorModel, *given: object) -> None:
+    if any(each is not None for each in given):
+        raise InputError(
+            f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
+            f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
+        )
 
 
 def proposed(
