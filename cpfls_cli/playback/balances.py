@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -13,24 +12,12 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import block_length
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
-from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.evaluation import BODY, BODY_MASS, VehicleAt
+from cpfls_cli.playback.equations import Equations, Form, Signals
+from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.innovations import innovations
 from cpfls_cli.playback.instruments import Instruments, past_setpoints
 from cpfls_cli.playback.parameters import FreeNumbers
-from cpfls_cli.vehicle.values import (
-    Polynomial,
-    Tangent,
-    Value,
-    Vector,
-    apply,
-    cross,
-    scaled,
-    subtract,
-    transposed,
-    value_of,
-)
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
 BANDS = ((0.08, 0.2), (0.15, 0.4), (0.3, 0.8), (0.6, 1.6), (1.2, 3.2))
@@ -86,27 +73,6 @@ class Sums(NamedTuple):
         return Sums(ztx, xtx, ztz, self.windows)
 
 
-class Column(NamedTuple):
-    """What balances are linear in: a product of numbers of the vehicle, along an axis.
-
-    Attributes
-    ----------
-    by : str
-        The time of the rotors' response by which it is differentiated; empty for none.
-    """
-
-    axis: int
-    factors: tuple[str, ...]
-    by: str
-
-
-class Signals(NamedTuple):
-    """What is balanced along a flight: what changes, whose derivative is taken, and what acts; (time, column) each."""
-
-    changing: Array
-    acting: Array
-
-
 class Rows(NamedTuple):
     """Balances of a flight in windows.
 
@@ -124,6 +90,14 @@ class Rows(NamedTuple):
     own: Array
     known: Array
     middles: IntArray
+
+
+class _Laid(NamedTuple):
+    """Equations that were evaluated along all flights, and what is kept of their balances of torque, and of force."""
+
+    equations: Equations
+    forms: Sequence[Form]
+    kept: Sequence[Any]
 
 
 @dataclass
@@ -211,38 +185,37 @@ class Balances:
         Sums
             First column: the residual; then derivatives by each number; last what the motion takes.
         """
-        at = VehicleAt(free, values)
-        if self._laid is None or not self._laid.hold(at):
-            self._laid = self._lay(at)
+        equations = Equations(VehicleAt(free, values))
+        if self._laid is None or not self._laid.equations.hold(equations):
+            self._laid = self._lay(equations)
         kinds = [
-            self._summed(kept, form, _weights(at, form.columns))
+            self._summed(kept, form, equations.weights(form.columns))
             for form, kept in zip(self._laid.forms, self._laid.kept, strict=True)
         ]
         sums = Sums(*(np.concatenate(each, axis=1) for each in zip(*kinds, strict=True)))
         seen = sums.windows.any(axis=1)
         return Sums(*(each[seen] for each in sums))
 
-    def _lay(self, at: VehicleAt) -> _Laid:
+    def _lay(self, equations: Equations) -> _Laid:
         """Evaluate the vehicle along all flights, and reduce what is balanced to what is kept."""
-        forms: list[_Form] = []
+        forms: list[Form] = []
         along: dict[int, list[Signals]] = {}
         for number in self.path:
-            forms, along[number] = _along(at, self.flights[number], self.translates)
+            forms, along[number] = equations.along(self.flights[number], self.translates)
         turning = len(self.bands_hz)
-        bands = self.bands[:turning], self.bands[turning:]
         kept = [
-            self._reduced(bands[kind], form, {number: each.pop(0) for number, each in along.items()})
-            for kind, form in enumerate(forms)
+            self._reduced(bands, form, {number: each.pop(0) for number, each in along.items()})
+            for form, bands in zip(forms, (self.bands[:turning], self.bands[turning:]), strict=False)
         ]
-        return _Laid(at, forms, kept)
+        return _Laid(equations, forms, kept)
 
-    def _reduced(self, bands: Sequence[Windows], form: _Form, signals: Mapping[int, Signals]) -> Any:
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Signals]) -> Any:
         """Sum products of all columns, by axis."""
         others = self._of_other_runs(signals)
         found = (self.of_band(self._rows(band, signals, others, form), form.slices) for band in bands)
         return [Sums.of(each) for each in zip(*found, strict=True)]
 
-    def _summed(self, kept: Any, form: _Form, weights: Array) -> Sums:
+    def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
         """Sum products of the combinations of columns that weights make."""
         return Sums.joined([own.combined(weights[columns]) for own, columns in zip(kept, form.slices, strict=True)])
 
@@ -274,10 +247,10 @@ class Balances:
         }
 
     def _rows(
-        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], form: _Form
+        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], form: Form
     ) -> Iterator[Rows]:
-        own = {number: form.windowed(band, self.flights[number], each) for number, each in signals.items()}
-        known = {number: form.windowed(band, self.flights[number], each) for number, each in others.items()}
+        own = {number: windowed(band, self.flights[number], form, each) for number, each in signals.items()}
+        known = {number: windowed(band, self.flights[number], form, each) for number, each in others.items()}
         known |= self._expected(band, {number: own[number] for number in self.asked})
         for number in self.path:
             yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))
@@ -322,126 +295,21 @@ def averaged(band: Windows, flight: PlaybackFlight, values: Array, *, changes: b
     return np.concatenate([np.zeros((0, values.shape[1])), *(seen(values[part]) for part in long)])
 
 
+def windowed(band: Windows, flight: PlaybackFlight, form: Form, signals: Signals) -> Array:
+    """Lay windows over what is balanced, shape (window, column)."""
+    acted, changed = averaged(band, flight, signals.acting), averaged(band, flight, signals.changing, changes=True)
+    rows = np.zeros((len(acted), len(form.columns)))
+    rows[:, form.acting] = acted
+    rows[:, form.changing] += changed
+    return rows
+
+
 def taken(values: Array, there: BoolArray) -> Array:
     """Take rows: a view where they follow one another, as a copy takes as long as what is made of them."""
     rows = np.flatnonzero(there)
     if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
         return values[rows[0] : rows[-1] + 1]
     return values[rows]
-
-
-class _Form(NamedTuple):
-    """Columns of a balance of torque or of force, those of one axis after those of another.
-
-    Attributes
-    ----------
-    columns : tuple of Column
-    changing, acting : array of int
-        Those in which something changes, and those in which something acts.
-    """
-
-    columns: tuple[Column, ...]
-    changing: IntArray
-    acting: IntArray
-
-    @property
-    def slices(self) -> list[slice]:
-        """Columns of each axis."""
-        ends = np.searchsorted([column.axis for column in self.columns], range(4)).tolist()
-        return [slice(*pair) for pair in pairwise(ends)]
-
-    def windowed(self, band: Windows, flight: PlaybackFlight, signals: Signals) -> Array:
-        """Lay windows over what is balanced, shape (window, column)."""
-        acted, changed = averaged(band, flight, signals.acting), averaged(band, flight, signals.changing, changes=True)
-        rows = np.zeros((len(acted), len(self.columns)))
-        rows[:, self.acting] = acted
-        rows[:, self.changing] += changed
-        return rows
-
-
-@dataclass(frozen=True)
-class _Laid:
-    """A vehicle that was evaluated along all flights, and what is kept of its balances of torque, and of force."""
-
-    at: VehicleAt
-    forms: Sequence[_Form]
-    kept: Sequence[Any]
-
-    def hold(self, at: VehicleAt) -> bool:
-        """Check whether the balances of another vehicle follow: rotors that respond alike, no other numbers."""
-        own, other = self.at.free, at.free
-        alike = own.vehicle == other.vehicle and self.at.response == at.response and {*other.index} <= {*own.index}
-        # Only what is not 0 is differentiated by times of the response.
-        return alike and (not at.times or at.in_use <= self.at.in_use)
-
-
-def _along(at: VehicleAt, flight: PlaybackFlight, translates: bool) -> tuple[list[_Form], list[Signals]]:
-    """Evaluate the balances of torque, and of force, along a flight."""
-    forms, signals = [], []
-    for balance in _balances(at, flight, translates):
-        parts = [
-            {
-                Column(axis, factors, by): values
-                for axis, component in enumerate(vector)
-                for factors, by, values in _terms(at, component)
-            }
-            for vector in balance
-        ]
-        columns = sorted(dict.fromkeys(chain(*parts)), key=lambda column: column.axis)
-        filled = [np.empty((len(flight), len(part))) for part in parts]
-        for out, part in zip(filled, parts, strict=True):
-            for row, values in zip(out.T, part.values(), strict=True):
-                row[:] = values
-        forms.append(_Form(tuple(columns), *(np.array([columns.index(each) for each in part]) for part in parts)))
-        signals.append(Signals(*filled))
-    return forms, signals
-
-
-def _balances(at: VehicleAt, flight: PlaybackFlight, translates: bool) -> Iterator[tuple[Vector, Vector]]:
-    """Write the balance of torque, body axes, then of force, world axes: what changes, and what acts against it.
-
-    They are polynomials of the numbers of the vehicle.
-    """
-    motion, number = flight.motion, Polynomial.number
-    rotation, velocity, rate = tuple(motion.rotation.transpose(1, 2, 0)), tuple(motion.velocity.T), tuple(motion.rate.T)
-    torque, force = at.polynomial.wrench(apply(transposed(rotation), velocity), rate, at.rotors_at_samples(flight))
-    xx, yy, zz, xy, xz, yz = map(number, INERTIA_PARAMETERS)
-    momentum = apply(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), rate)
-    yield momentum, subtract(cross(rate, momentum), torque)
-    if translates:
-        weight = number(BODY_MASS) * at.free.vehicle.gravity_m_s2
-        yield scaled(number(BODY_MASS), velocity), subtract((0, 0, weight), apply(rotation, force))
-
-
-def _terms(at: VehicleAt, component: Value) -> Iterator[tuple[tuple[str, ...], str, Value]]:
-    """List the terms of a polynomial, then the derivatives by times of the response of those that are not 0."""
-    for factors, value in Polynomial.of(component).terms.items():
-        yield factors, "", value_of(value)
-        if isinstance(value, Tangent) and value_of(at.product(factors)):
-            for place, slope in value.by.items():
-                yield factors, at.free.numbers[place].name, slope
-
-
-def _weights(at: VehicleAt, columns: Sequence[Column]) -> Array:
-    """Weigh columns so that they give the residual, its derivatives by each number, and what the motion takes.
-
-    Returns
-    -------
-    array, shape (column, 2 + number)
-    """
-    numbers = at.free.numbers
-    weights = np.zeros((len(columns), 2 + len(numbers)))
-    for row, (_, factors, by) in zip(weights, columns, strict=True):
-        value = at.product(factors)
-        if by:
-            if by in at.free.index:
-                row[1 + at.free.index[by]] = numbers[at.free.index[by]].scale * value_of(value)
-            continue
-        row[0] = value_of(value)
-        row[-1] = row[0] if any(name in BODY for name in factors) else 0.0
-        for place, slope in value.by.items() if isinstance(value, Tangent) else ():
-            row[1 + place] = numbers[place].scale * slope
-    return weights
 
 
 class PastBalances(Balances):
@@ -471,15 +339,15 @@ class PastBalances(Balances):
         """Each flight is a path of its own."""
         return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
 
-    def _reduced(self, bands: Sequence[Windows], form: _Form, signals: Mapping[int, Signals]) -> Any:
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Signals]) -> Any:
         """Average all columns over windows, by stretch, each as its own flight."""
         return [
-            (number, part, form.windowed(bands[0], part, signals[number]))
+            (number, part, windowed(bands[0], part, form, signals[number]))
             for number in self.path
             for part in (replace(self.flights[number], stretches=(each,)) for each in self.flights[number].stretches)
         ]
 
-    def _summed(self, kept: Any, form: _Form, weights: Array) -> Sums:
+    def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
         """Sum products of innovations with their predictions, fast ones and slow ones."""
         (band, *_) = self.bands
         count = max(1, round(_SLOW_S / (band.hop * band.period)))
@@ -491,7 +359,7 @@ class PastBalances(Balances):
         found = (self.of_band(each, slices) for each in (fast, slow))
         return Sums.joined([Sums.of(each) for each in zip(*found, strict=True)])
 
-    def _new(self, band: Windows, form: _Form, kept: Any, weights: Array) -> Iterator[Rows]:
+    def _new(self, band: Windows, form: Form, kept: Any, weights: Array) -> Iterator[Rows]:
         rows = [np.stack([own[:, axis] @ weights[axis] for axis in form.slices], axis=1) for *_, own in kept]
         seen = [averaged(band, part, _seen(part)) for _, part, _ in kept]
         new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import prod
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from cpfls_cli.playback.parameters import (
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
 from cpfls_cli.playback.table import Airflow, learned_wrench
-from cpfls_cli.playback.windows import MOTION, Flown, Rotors
+from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, traced
@@ -51,13 +50,10 @@ from cpfls_cli.vehicle.values import (
     times,
 )
 
-_TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
+TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
 DRAG_OVER_THRUST = "drag_over_thrust"
 """By how much more the drag factor differs from the stated one than the thrust factor does."""
-BODY_MASS = "mass"
-BODY = (*INERTIA_PARAMETERS, BODY_MASS)
-"""Numbers of the body that is moved."""
 
 
 @dataclass(frozen=True)
@@ -236,33 +232,16 @@ class VehicleAt:
             slow = response.slow_s if SLOW in self.free.index else None
             return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
         slopes = [
-            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, _TIMES[by])
+            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, TIMES[by])
             for part in flight.stretches
         ]
         # The number is the logarithm of the slow time.
         return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
 
-    def rotors_at_samples(self, flight: PlaybackFlight) -> Rotors:
-        """Give what drives the vehicle at the samples of a flight, with derivatives by the times of the response."""
-
-        def filled(terms: Callable[..., Array], *by: TimeOfResponse) -> Array:
-            found = np.zeros((len(flight), 1 + 4 * flight.speed.shape[1]))
-            for part in flight.stretches:
-                found[part] = terms(flight.speed[part], flight.motion.period, flight.hold, *by)
-            return found
-
-        response = self.response
-        slopes = {name: filled(response.slope_at_samples, _TIMES[name]) for name in self.times}
-        # The number is the logarithm of the slow time.
-        by = {
-            self.free.index[name]: slope * (response.slow_s if name == SLOW else 1.0) for name, slope in slopes.items()
-        }
-        return Rotors.of(filled(response.terms_at_samples), by)
-
     @property
     def times(self) -> list[str]:
         """Numbers that are times of the rotors' response."""
-        return [name for name in _TIMES if name in self.free.index]
+        return [name for name in TIMES if name in self.free.index]
 
     @cached_property
     def flown(self) -> Flown:
@@ -278,32 +257,14 @@ class VehicleAt:
     @cached_property
     def differentiated(self) -> Flown:
         """The same with the derivatives by all numbers."""
-        return self._flown(self._with_derivatives(MOTION), self.inertia_by)
+        return self._flown(self.with_derivatives(MOTION), self.inertia_by)
 
     @cached_property
     def polynomial(self) -> Flown:
         """The same as a polynomial of its numbers, coefficients in SI."""
         return self._flown(Polynomial.number, np.zeros((0, 3, 3)))
 
-    @cached_property
-    def known(self) -> Mapping[str, Value]:
-        """Numbers of `polynomial` and of `BODY`, with derivatives by the free numbers, by place."""
-        number, index, by = self._with_derivatives(0), self.free.index, self.inertia_by
-        known = {name: number(name) for name in (*index, DRAG_OVER_THRUST)}
-        for name, entry in zip(INERTIA_PARAMETERS, INERTIA_ENTRIES, strict=True):
-            known[name] = Tangent(self.inertia[entry], dict(enumerate(by[:, *entry].tolist())))
-        return known | {BODY_MASS: Tangent(self.mass, {index[LOG_MASS]: self.mass} if LOG_MASS in index else {})}
-
-    def product(self, factors: Sequence[str]) -> Value:
-        """Multiply `known` numbers; those that are not there are what they are in a model without them."""
-        return prod((self.known.get(name, float(name in (THRUST, DRAG))) for name in factors), start=1.0)
-
-    @property
-    def in_use(self) -> frozenset[str]:
-        """Numbers that are not 0."""
-        return frozenset(name for name, place in self.free.index.items() if self.values[place])
-
-    def _with_derivatives(self, first: int) -> Callable[[str], Value]:
+    def with_derivatives(self, first: int) -> Callable[[str], Value]:
         """Give numbers by name, with derivatives by places from the first on."""
         return acting_numbers(
             self.free, lambda name: Tangent(self.get(name, 0.0), {first + self.free.index[name]: 1.0})

@@ -9,12 +9,12 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import Balances, PastBalances, averaged
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
-from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
+from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of
 from cpfls_cli.playback.table import Airflow
 from tests.builders.playback_flights import STATED, flown, truth
 
 FREE = FreeNumbers(STATED, blocks_of(STATED), Airflow(np.array([0.0, 1.0]), 0))
-SCALES = np.array([number.scale for number in FREE.numbers])
+NAMED = replace(FREE, chosen=tuple(block for block in FREE.chosen if block not in LEARNED))
 
 
 @pytest.fixture(scope="module")
@@ -27,11 +27,10 @@ def flights():
     return [run, again, replace(other, setpoints=asked, stretches=(slice(0, 500), slice(500, len(other))))]
 
 
-def somewhere(seed=0):
+def somewhere(seed=0, free=FREE):
     """Numbers near the stated ones, none of them where its derivative could vanish."""
-    away = 0.05 * SCALES * np.random.default_rng(seed).standard_normal(len(SCALES))
-    low, high = (np.array([getattr(number, end) for number in FREE.numbers]) for end in ("low", "high"))
-    return np.clip([number.start for number in FREE.numbers] + away, low, high)
+    start, scale, low, high = np.array([(each.start, each.scale, each.low, each.high) for each in free.numbers]).T
+    return np.clip(start + 0.05 * scale * np.random.default_rng(seed).standard_normal(len(start)), low, high)
 
 
 def balances_of(flights, kind=Balances):
@@ -45,11 +44,11 @@ def squares(sums):
 
 
 def test_slopes_are_difference_quotients_for_every_number(flights):
-    balances, values, step = balances_of(flights), somewhere(), 1e-4
-    here = balances.sums(FREE, values)
-    for place, number in enumerate(FREE.numbers):
-        moved = step * SCALES * np.eye(len(values))[place]
-        ahead, behind = (squares(balances.sums(FREE, each)) for each in (values + moved, values - moved))
+    balances, values, step = balances_of(flights), somewhere(free=NAMED), 1e-4
+    here = balances.sums(NAMED, values)
+    for place, number in enumerate(NAMED.numbers):
+        moved = step * number.scale * np.eye(len(values))[place]
+        ahead, behind = (squares(balances.sums(NAMED, each)) for each in (values + moved, values - moved))
         # A product's slope has that of either factor.
         slopes = np.stack([own[..., 0, 1 + place] + own[..., 1 + place, 0] for own in here[:3]])
         own = np.stack([each[..., 1 + place, 1 + place] for each in here[:3]])
