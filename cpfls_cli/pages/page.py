@@ -18,7 +18,7 @@ from cpfls_cli.pages.identified_figures import COMPARED
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.report.canvas import pictures
+from cpfls_cli.report.canvas import figure_html, pictures
 from cpfls_cli.report.content import (
     Block,
     Box,
@@ -33,7 +33,6 @@ from cpfls_cli.report.content import (
     Tone,
     unfolded,
 )
-from cpfls_cli.report.figure_tables import figure_html
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.source import Document

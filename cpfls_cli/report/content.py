@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
-
-from cpfls_cli.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
-
-Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
 
 
 STRUCK = re.compile(r"~~([^~]*)~~(?= impossible)")
@@ -102,46 +98,6 @@ class Table:
         return [[entry if isinstance(entry, Cell) else Cell(entry) for entry in row] for row in self.rows]
 
 
-@dataclass(frozen=True)
-class Series:
-    """One curve, set of points, bars, band, map or mark of a figure.
-
-    Attributes
-    ----------
-    label : str
-        As in the legend; empty where it has none.
-    x, y : array, shape (points,)
-        Of a mark, which is a level or a span, the ends; infinite where it goes from edge to edge.
-    low, high : array, shape (points,), or None
-        Ends of a band or of error bars.
-    value : array, shape (points,), or None
-        Colour of a map.
-    spread : tuple of (array, array), or None
-        Samples evenly spread over a curve of which only the extremes are drawn.
-    """
-
-    label: str
-    form: Drawn
-    x: Array
-    y: Array
-    low: Array | None = None
-    high: Array | None = None
-    value: Array | None = None
-    spread: tuple[Array, Array] | None = None
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One set of axes of a figure, with the words that stand at positions of its axes in place of numbers."""
-
-    title: str
-    x_label: str
-    y_label: str
-    series: Sequence[Series]
-    x_names: Mapping[float, str] = field(default_factory=dict)
-    y_names: Mapping[float, str] = field(default_factory=dict)
-
-
 class Picture(Protocol):
     """A figure that is drawn when somebody asks what it looks like: not every form of a page shows it."""
 
@@ -151,8 +107,8 @@ class Picture(Protocol):
         ...
 
     @property
-    def panels(self) -> Sequence[Panel]:
-        """The numbers behind it."""
+    def rows(self) -> Sequence[tuple[str, ...]]:
+        """What it draws, for who does not see it: panel, curve, x, y."""
         ...
 
     def figure(self) -> Figure:

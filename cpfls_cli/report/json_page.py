@@ -1,22 +1,17 @@
-"""A report as JSON: sections, facts, tables, figures with their data, provenance."""
+"""A report as JSON: sections, facts, tables, words of figures, provenance."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from cpfls_cli.report.content import STRUCK, Block, Facts, Folded, Panel, Plot, Series, Table, Text
+from cpfls_cli.report.content import STRUCK, Block, Facts, Folded, Plot, Table, Text
 from cpfls_cli.report.source import Document, Source
-
-_DIGITS = 6
 
 
 def json_page(document: Document) -> str:
-    """Write a document as one JSON object; numbers have six digits, null if unknown or at the edge of a panel."""
+    """Write a document as one JSON object; figures by their words."""
     page = {
         "title": document.title,
         "cpfls_version": document.version,
@@ -40,8 +35,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Text():
             return {"kind": block.kind, "text": block.text, "tone": block.tone}
         case Plot():
-            words = {"name": block.name, "caption": block.caption, "description": block.description}
-            return {"kind": "figure", **words, "panels": [_panel(panel) for panel in block.picture.panels]}
+            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
         case _:
             return {"kind": block.kind, **asdict(block)}
 
@@ -67,26 +61,6 @@ def _table(table: Table) -> dict[str, Any]:
         "rows": [[_bare(cell.text) for cell in line] for line in cells],
         "marked": marked,
     }
-
-
-def _panel(panel: Panel) -> dict[str, Any]:
-    named: Mapping[str, Any] = {
-        key: [{"at": _rounded(at), "word": word} for at, word in names.items()]
-        for key, names in (("x_names", panel.x_names), ("y_names", panel.y_names))
-        if names
-    }
-    words = {"title": panel.title, "x_label": panel.x_label, "y_label": panel.y_label}
-    return {**words, **named, "series": [_series(series) for series in panel.series]}
-
-
-def _series(series: Series) -> dict[str, Any]:
-    columns = {key: getattr(series, key) for key in ("x", "y", "low", "high", "value")}
-    numbers = {key: [_rounded(value) for value in values] for key, values in columns.items() if values is not None}
-    return {"label": series.label, "form": series.form, **numbers}
-
-
-def _rounded(value: float) -> float | None:
-    return float(f"{value:.{_DIGITS}g}") + 0.0 if np.isfinite(value) else None
 
 
 def _origin(origin: Source) -> dict[str, Any]:
