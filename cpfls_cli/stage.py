@@ -33,9 +33,7 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import figure_html, picture_of, pictures
-from cpfls_cli.report.content import Box, Heading, Section, Text
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.outcome import Command, Outcome, caution_texts
+from cpfls_cli.report.content import Box, Command, Form, Heading, Outcome, Section, Text, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import plain
 

@@ -1,17 +1,28 @@
-"""What a page is made of: sections of text, facts, tables, figures with the numbers behind them, and details."""
+"""What a command has to say: text, facts, tables, figures and details for people, a summary for machines."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
+
+
+class Form(StrEnum):
+    """What a report is written as."""
+
+    HTML = "html"
+    MARKDOWN = "md"
+    JSON = "json"
 
 
 STRUCK = re.compile(r"~~([^~]*)~~(?= impossible)")
@@ -136,11 +147,9 @@ class Plot:
 
 @dataclass(frozen=True)
 class Listing:
-    """Verbatim text that can be folded away, or is folded out from the start."""
+    """Verbatim text."""
 
-    summary: str
     text: str
-    shown: bool = False
     kind: ClassVar[str] = "listing"
 
 
@@ -207,3 +216,42 @@ class Section:
     def tables(self) -> list[str]:
         """Names of its tables, also of those folded away, in order."""
         return [block.name for block in unfolded(self.blocks) if isinstance(block, Table)]
+
+
+Command = Sequence[str | Path]
+"""Words of a command line; a string is what a person does by hand."""
+
+
+def command_line(command: Command) -> str:
+    """Write a command so that it can be pasted, and what is done by hand as it is."""
+    return command if isinstance(command, str) else shlex.join(map(str, command))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command has to say.
+
+    Attributes
+    ----------
+    summary : mapping
+        For machines (``--json``).
+    blocks : tuple of Block
+        For people, on standard output; texts of tone ``warning`` go to standard error.
+    exit_code : int
+        Not 0 where the work was stopped.
+    next : tuple of Command
+        To go on with, with the names of this run.
+    written : Path or None
+        File or folder that the command wrote.
+    """
+
+    summary: Mapping[str, Any]
+    blocks: tuple[Block, ...] = ()
+    exit_code: int = 0
+    next: tuple[Command, ...] = ()
+    written: Path | None = None
+
+
+def caution_texts(cautions: Iterable[str]) -> Iterator[Text]:
+    """Write what speaks against a model: the first is seen however many notes there are."""
+    return (Text(each, "warning", always=index == 0) for index, each in enumerate(cautions))

@@ -14,8 +14,7 @@ from cpfls_cli.cli.options import Common
 from cpfls_cli.cli.terminal import progress_bar, tell
 from cpfls_cli.errors import visible
 from cpfls_cli.page import said
-from cpfls_cli.report.content import Folded, Text
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.content import Folded, Outcome, Text
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
 

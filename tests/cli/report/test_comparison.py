@@ -13,7 +13,7 @@ from cpfls_cli import store
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.pages.comparison import differences
-from cpfls_cli.pages.source import unique_labels
+from cpfls_cli.report.source import unique_labels
 from cpfls_cli.store import read
 from tests.builders.evidence_artifacts import curves, steps, verdict
 from tests.builders.identified_models import EVIDENCE_PARTS, with_parts

@@ -7,9 +7,7 @@ import pytest
 
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.pages.page import written
-from cpfls_cli.report.content import Listing, Section
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.source import Document
+from cpfls_cli.report.content import Form, Listing, Section
 from tests.builders.command_line import undrawn
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
@@ -109,5 +107,5 @@ def test_hostile_words_stay_words_in_markdown(report):
 
 
 def test_a_listing_cannot_end_its_own_fence():
-    page = written(Document("T", "1", [Section("a", "A", [Listing("B", "``` ````\n# c")])], []), Form.MARKDOWN)
+    page = written("T", "1", [Section("a", "A", [Listing("``` ````\n# c")])], [], Form.MARKDOWN)
     assert page.count("`````text\n``` ````\n# c\n`````\n") == 1
