@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -86,39 +86,22 @@ def _of_template(template: str, name: str, title: str, sources: Sources) -> Sect
     return Section(name, title, page.blocks(page.words(f"report_{template}", sources, added=WORDS)))
 
 
-def _compared_vehicles(sources: Sources) -> Section | None:
-    """Compare the constants of several vehicles; None for fewer than two."""
-    if len(sources.vehicles) < 2:
-        return None
-    return _of_template("vehicles", "vehicles", "The vehicles side by side", sources)
-
-
-def _compared_models(sources: Sources) -> Section | None:
-    """Compare identified models with each other; None for fewer than two."""
-    models = sources.models
-    if len(models) < 2:
-        return None
+def _compared_models(models: Sequence[Source[IdentifiedModel]]) -> Section:
+    """Compare identified models with each other."""
     text = page.words("identify_compared", models, added=OF_IDENTIFIED)
-    return Section(
-        "comparison",
-        "The models side by side",
-        page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-"),
-    )
+    blocks = page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-")
+    return Section("comparison", "The models side by side", blocks)
 
 
-def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
+def _of_stage(name: str, sources: Sources) -> list[Section]:
     """Make the sections of all results of a stage."""
-
-    def sections(sources: Sources) -> list[Section]:
-        own = [source for source in sources.all if source.stage == name]
-        shown = stage_named(name).together(own) if own else ()
-        several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
-        return [
-            stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
-            for number, source in enumerate(shown, start=1)
-        ]
-
-    return sections
+    own = [source for source in sources.all if source.stage == name]
+    shown = stage_named(name).together(own) if own else ()
+    several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
+    return [
+        stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
+        for number, source in enumerate(shown, start=1)
+    ]
 
 
 _Lack = tuple[type, str, str]
@@ -213,31 +196,11 @@ _EXACT = (
     "fuzzy model can beat that here; the row measures how close it comes."
 )
 _HASH_SHOWN = 12
-_SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
-    _summary_section,
-    _compared_models,
-    _of_stage("identify"),
-    _of_stage("diagnose"),
-    _of_stage("extend"),
-    _compared_vehicles,
-    _of_stage("vehicle"),
-    _of_stage("compare"),
-    partial(_of_template, "stated_vehicle", "stated-vehicle", "Vehicle"),
-    _of_stage("trajectory"),
-    _of_stage("simulate"),
-    _of_stage("import"),
-    _of_stage("reduce"),
-    _of_stage("sweep"),
-    _of_stage("predict"),
-    _of_stage("twin"),
-    _of_stage("response"),
-    _of_stage("tune"),
-    _of_stage("replay"),
-    _of_stage("trend"),
-    _of_stage("changed"),
-    _of_stage("_flight_numbers"),
-    partial(_of_template, "provenance", "provenance", "Provenance"),
+_ORDER = (
+    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce", "sweep"),
+    *("predict", "twin", "response", "tune", "replay", "trend", "changed"),
 )
+"""Stages whose results a report shows, answers first; what it does not name comes last."""
 
 
 @dataclass(frozen=True)
@@ -253,8 +216,19 @@ class Page:
 
 def sections_of(sources: Sources) -> list[Section]:
     """List what there is to say of artifacts, section by section."""
-    made = (make(sources) for make in _SECTIONS)
-    return [each for own in made if own for each in (own if isinstance(own, list) else [own])]
+    made = [_summary_section(sources)]
+    if len(sources.models) > 1:
+        made.append(_compared_models(sources.models))
+    of_stages = {
+        name: _of_stage(name, sources) for name in dict.fromkeys((*_ORDER, *(own.stage for own in sources.all)))
+    }
+    for name, sections in of_stages.items():
+        if name == "vehicle" and len(sources.vehicles) > 1:
+            made.append(_of_template("vehicles", "vehicles", "The vehicles side by side", sources))
+        made += sections
+        if name == "compare":
+            made.append(_of_template("stated_vehicle", "stated-vehicle", "Vehicle", sources))
+    return [*made, _of_template("provenance", "provenance", "Provenance", sources)]
 
 
 def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
