@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import (
     check_folder,
