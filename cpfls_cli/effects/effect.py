@@ -254,16 +254,6 @@ def hub_wrench(hubs: Array, force: Array) -> Array:
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
 
 
-def thrust_wrench(hubs: Array, thrust: Array) -> Array:
-    """Sum changes of thrust along body z to a wrench, shape (time, 6).
-
-    `hubs`: shape (rotor, 3), m; `thrust`: shape (time, rotor), N.
-    """
-    force = np.zeros((*thrust.shape, 3))
-    force[..., 2] = thrust
-    return hub_wrench(hubs, force)
-
-
 def wrench_change(before: Signals, after: Signals) -> Columns:
     """Compute the change of wrench by another actuation as a column."""
     return Columns(stack(after.wrench - before.wrench))
