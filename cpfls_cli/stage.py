@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import (
     check_folder,
@@ -32,11 +32,8 @@ from cpfls_cli.artifacts.output import (
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
-from cpfls_cli.report.canvas import picture_of, pictures
-from cpfls_cli.report.content import Box, Heading, Section, Text
-from cpfls_cli.report.figure_tables import figure_html
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.outcome import Command, Outcome, caution_texts
+from cpfls_cli.report.canvas import figure_html, picture_of, pictures
+from cpfls_cli.report.content import Box, Command, Form, Heading, Outcome, Section, Text, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import plain
 

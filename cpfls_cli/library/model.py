@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.playback.motion import State
     from cpfls_cli.playback.rotors import Hold
-    from cpfls_cli.report.outcome import Outcome
+    from cpfls_cli.report.content import Outcome
     from cpfls_cli.stage import Run
 
 

@@ -25,7 +25,7 @@ from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, 
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.simulators.corrected import corrected
 from cpfls_cli.simulators.formats import is_simulator_file, read_model

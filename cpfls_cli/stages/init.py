@@ -31,8 +31,8 @@ from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import number
-from cpfls_cli.report.outcome import Command
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
 from cpfls_cli.simulators.formats import read_model

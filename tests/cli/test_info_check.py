@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import stage_module
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.result import datasets
 from cpfls_cli.stage import loaded

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import cpfls_cli
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
 from tests.builders.artifacts import read_result, with_fields
@@ -199,8 +200,11 @@ def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 
 
-@pytest.mark.usefixtures("undrawn", "data_of_figures")
-def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
+def bands_of(axes):
+    return [path.vertices for own in axes.collections if own.get_label().startswith("95 %") for path in own.get_paths()]
+
+
+def test_bands_of_a_prediction_are_drawn(pipeline, tmp_path):
     prediction, output = read_result(pipeline.prediction), tmp_path / "banded.h5"
     bands = {
         f"{key}_{end}": getattr(prediction, key) + sign * 0.25
@@ -208,20 +212,12 @@ def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
         for end, sign in (("low", -1), ("high", 1))
     }
     with_fields(pipeline.prediction, output, **bands)
-    page = json.loads(report(output, form="json").text)
-    figures = {
-        block["name"]: block for part in page["sections"] for block in part["blocks"] if block["kind"] == "figure"
-    }
-    drawn = [
-        series
-        for panel in figures["predict-1-torques"]["panels"]
-        for series in panel["series"]
-        if series["form"] == "band"
-    ]
-    assert len(drawn) == 3
-    assert np.array(drawn[0]["high"]) - np.array(drawn[0]["low"]) == pytest.approx(0.5, rel=1e-3)
-    forms = [series["form"] for panel in figures["predict-1-inertia-matrix"]["panels"] for series in panel["series"]]
-    assert forms.count("band") == 4
+    figures = cpfls_cli.read(output).figures()
+    drawn = [bands_of(axes) for axes in figures["predict-1-torques"].axes]
+    assert list(map(len, drawn)) == [1, 1, 1]
+    at_start = drawn[0][0][drawn[0][0][:, 0] == 0.0, 1]
+    assert np.ptp(at_start) == pytest.approx(0.5, rel=1e-3)
+    assert sum(len(bands_of(axes)) for axes in figures["predict-1-inertia-matrix"].axes) == 4
 
 
 @pytest.mark.usefixtures("undrawn")
