@@ -173,6 +173,12 @@ class Effect:
         return not self.coefficients
 
     @property
+    def follows_state(self) -> bool:
+        """Whether it acts at an instant on what free runs know: air velocity, body rate and rotors."""
+        elsewhere = self.carried is not None or self.rate_derivative or self.needs & {"height", "attitude"}
+        return self.acts is not None and not elsewhere
+
+    @property
     def is_lag(self) -> bool:
         """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
         if self.actuation is None:

@@ -97,10 +97,8 @@ class ModelEffect(NamedTuple):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether it follows from what free runs know: air velocity, body rate and rotors."""
-        known = self.effect
-        elsewhere = known.carried is not None or known.rate_derivative or known.needs & {"height", "attitude"}
-        return known.acts is not None and not (self.is_filter or elsewhere)
+        """Whether it follows from what free runs know."""
+        return self.effect.follows_state and not self.is_filter
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""

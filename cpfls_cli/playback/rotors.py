@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.lag import Lagged, delayed, lagged
 from cpfls_cli.result import about
 
@@ -44,14 +44,24 @@ class RotorResponse:
         A speed that stays until the next sample jumps there: taken is the middle of the jump. Parameters and shape as
         `rotor_terms_by_step`.
         """
-        mean, end, start = lagged(delayed(speed, self.delay_s / period, hold), self.lag_s / period, hold)
-        jumps = hold == "previous" and self.lag_s < _SHORTEST_S
-        acting = 0.5 * (start + mean) if jumps else start
-        slow = lagged(mean**2, self.slow_s / period, "previous").start
-        change = (end - start) / period
-        acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
-        one = np.ones((len(speed), 1))
-        return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
+        times = self.delay_s, self.lag_s, self.slow_s
+        return np.asarray(_terms_at_samples(speed, period, hold, *times), dtype=float)
+
+    def slope_at_samples(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
+        """Differentiate `terms_at_samples` by one of the times."""
+        times = ("delay_s", "lag_s", "slow_s")
+        moved = [getattr(self, name) + (1j * _STEP if name == by else 0.0) for name in times]
+        return np.asarray(_terms_at_samples(speed, period, hold, *moved).imag / _STEP)
+
+
+def _terms_at_samples(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
+    mean, end, start = lagged(delayed(speed, delay_s / period, hold), lag_s / period, hold)
+    jumps = hold == "previous" and np.real(lag_s) < _SHORTEST_S
+    acting = 0.5 * (start + mean) if jumps else start
+    slow = lagged(mean**2, slow_s / period, "previous").start
+    change = (end - start) / period
+    acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
+    return np.hstack([np.ones((len(speed), 1)), acting, acting**2, acceleration, slow - acting**2])
 
 
 def rotor_terms_by_step(

@@ -12,15 +12,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
-from cpfls_cli.vehicle.rotors import allocation_matrix
-from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Functions, Value, dot, minus, plus, times
 
 
@@ -38,13 +33,11 @@ class Airflow(NamedTuple):
     breakpoints: Array
     order: int
 
-
-def airflow_terms(airflow: Airflow) -> int:
-    """Count the terms of a remainder: each column of the system times the speed, and times its square."""
-    if len(airflow.breakpoints) == 0:
-        return 0
-    features = 1 + (2 * airflow.order if airflow.order else 1)
-    return max(len(airflow.breakpoints) - 1, 1) * features * 2
+    @property
+    def columns(self) -> int:
+        """Count the columns of the system; none without rules."""
+        features = 1 + (2 * self.order if self.order else 1)
+        return max(len(self.breakpoints) - 1, 1) * features if len(self.breakpoints) else 0
 
 
 @result
@@ -125,27 +118,6 @@ def _blended(by_rule: Sequence[Value], breakpoints: Sequence[float], turn: Value
     return total
 
 
-def airflow_of(remainder: Remainder | None) -> Airflow:
-    """Describe the terms of a remainder to the compiled loops."""
-    if remainder is None:
-        return Airflow(np.zeros(0), 0)
-    return Airflow(remainder.breakpoints, remainder.harmonic_order)
-
-
-def rotor_weights(vehicle: VehicleSettings, thrust_linear: float, response: RotorResponse) -> Array:
-    """Weigh the terms of the rotors alone, shape (6, 1 + 4 rotors)."""
-    rotors = len(vehicle.rotors)
-    thrust, *torque = allocation_matrix(vehicle)
-    wrench = np.vstack([torque, np.zeros((2, rotors)), thrust])
-    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / thrust.sum())
-    table = np.zeros((6, 1 + 4 * rotors))
-    table[:, 1 : 1 + rotors] = thrust_linear * hover * wrench
-    table[:, 1 + rotors : 1 + 2 * rotors] = wrench
-    slow = response.slow_roll_pitch, response.slow_roll_pitch, response.slow_yaw
-    table[:3, 1 + 3 * rotors :] = np.array(slow)[:, None] * wrench[:3]
-    return table
-
-
 def lever_weights(centre: Array, forces: Array) -> Array:
     """Weigh the torque ``-c x F`` of forces about a centre of mass.
 
@@ -165,31 +137,6 @@ def lever_weights(centre: Array, forces: Array) -> Array:
     return table
 
 
-def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array:
-    """Weigh the terms for a unit of each coefficient of an effect.
-
-    Returns
-    -------
-    array, shape (coefficient, 6, 34, 1 + 4 rotors)
-
-    Raises
-    ------
-    ComputationError
-        If the effect is no polynomial of motion and rotor speeds.
-    """
-    known = effect(name)
-    found = polynomial(wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
-    if found is None:
-        raise ComputationError(f"the effect {name} is not a polynomial of motion and rotor speeds")
-    return with_slow(found, probe)
-
-
-def with_slow(weights: Array, probe: Probe) -> Array:
-    """Add the columns of slow actuation, in which no effect of the catalogue has weights."""
-    slow = np.zeros((*weights.shape[:3], len(probe.signals.vehicle.rotors)))
-    return np.concatenate([weights, slow], axis=3)
-
-
 @cache
 def wrench_of_numbers() -> Effect:
     """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
@@ -202,14 +149,3 @@ def wrench_of_numbers() -> Effect:
         return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
 
     return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns, rate_derivative=False)
-
-
-def remainder_weights(remainder: Remainder, rotors: int) -> Array:
-    """Weigh the terms of a remainder, shape (6, terms, 1 + 4 rotors)."""
-    terms = airflow_terms(airflow_of(remainder))
-    table = np.zeros((6, len(STATE_TERMS) + terms, 1 + 4 * rotors))
-    at = len(STATE_TERMS) + np.arange(0, terms, 2)
-    for row, by_column in zip(remainder.rows, remainder.coefficients, strict=True):
-        table[row, at, 1 : 1 + rotors] = by_column[:, :1] / rotors
-        table[row, at + 1, 0] = by_column[:, 1]
-    return table

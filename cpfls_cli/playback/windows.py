@@ -149,9 +149,15 @@ class Rotors(NamedTuple):
     push: Vector | None = None
 
     @classmethod
-    def of(cls, terms: Array) -> Rotors:
-        """Take what drives vehicles from terms of the rotors, shape (time, 1 + 4 rotors)."""
-        speed, acceleration, slow = (each.T for each in _rotor_motion(terms))
+    def of(cls, terms: Array, terms_by: Mapping[int, Array] = {}) -> Rotors:
+        """Take what drives vehicles from terms of the rotors, shape (time, 1 + 4 rotors), and their derivatives."""
+        values = [each.T for each in _rotor_motion(terms)]
+        by: list[dict[int, Value]] = [{}, {}, {}]
+        for place, each in terms_by.items():
+            faster, change, late = (own.T for own in _divided(each))
+            for own, moved in zip(by, (faster, change, late + 2.0 * values[0] * faster), strict=True):
+                own[place] = moved
+        speed, acceleration, slow = (Tangent(x, own) if own else x for x, own in zip(values, by, strict=True))
         return cls(speed, acceleration, slow)
 
 
