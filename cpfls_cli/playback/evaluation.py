@@ -32,8 +32,8 @@ from cpfls_cli.playback.parameters import (
     Physical,
     unit_wrenches,
 )
+from cpfls_cli.playback.remainder import Airflow, learned_wrench
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import Airflow, learned_wrench
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -111,27 +111,18 @@ class VehicleAt:
         )
 
     @cached_property
-    def log_counted(self) -> Array:
-        """Inertia, as logarithms of ratios, in units of which coefficients of torque are counted, shape (3,)."""
-        return np.array([self.get(name, 0.0) for name in self.free.counting])
+    def _acting_number(self) -> Callable[[str], Value]:
+        return acting_numbers(self.free, lambda name: self.get(name, 0.0))
 
     @cached_property
     def coefficients(self) -> Mapping[str, float]:
         """Coefficients of effects and remainder in SI, by name."""
-        return {
-            name: float(self.values[self.free.index[name]] * np.exp(share @ self.log_counted))
-            for name, share in self.free.shares.items()
-        }
+        return {name: float(self._acting_number(name)) for name in self.free.shares}
 
     @property
     def mass(self) -> float:
         """Mass, kg."""
         return self.free.vehicle.mass_kg * float(np.exp(self.get(LOG_MASS, 0.0)))
-
-    @property
-    def drag_over_thrust(self) -> float:
-        """By how much more the drag factor differs from the stated one than the thrust factor does."""
-        return self.get(DRAG, 1.0) / self.get(THRUST, 1.0)
 
     @cached_property
     def vehicle(self) -> VehicleSettings:
@@ -155,7 +146,8 @@ class VehicleAt:
         effects, stated = [], self.free.vehicle
         # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
         rotors = tuple(
-            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self.drag_over_thrust) for each in stated.rotors
+            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self._acting_number(DRAG_OVER_THRUST))
+            for each in stated.rotors
         )
         flown = replace(stated, rotors=rotors)
         for block in self.free.effects:
@@ -250,7 +242,7 @@ class VehicleAt:
         key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
         function, given = traced_wrench(*key), tuple(self.values.tolist())
         return replace(
-            self._flown(acting_numbers(self.free, lambda name: self.get(name, 0.0)), np.zeros((0, 3, 3))),
+            self._flown(self._acting_number, np.zeros((0, 3, 3))),
             traced=lambda *motion: function(*motion, given),
         )
 
