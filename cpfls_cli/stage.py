@@ -399,7 +399,10 @@ class Stage:
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
             store.require_sound(output / f"{name}.h5", each)
-        with filled_folder(output, self._names(fills)) as folder:
+        for path in run.texts:
+            refuse_inputs(path, run.inputs)
+        with filled_folder(output, [*self._names(fills), *(path.name for path in run.texts)]) as folder:
+            write_files({folder / path.name: text for path, text in run.texts.items()})
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)
