@@ -31,13 +31,12 @@ from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
-from cpfls_cli.simulators.model import Rotor, behind
+from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
-_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
@@ -125,37 +124,42 @@ class _Corrections:
         before, text = stated.scale * stated.value, f"{new:.4g}"
         if not found.contradicts(stated.value):
             self._keep(f"{name} {before:.4g} agrees with the flights, {text} [{low:.4g}, {high:.4g}]")
-            return
-        if stated.span is not None:
-            if self.edits.get(stated.span, text.encode()) != text.encode():
-                self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
-                return
+        elif stated.span is not None and self.edits.get(stated.span, text.encode()) != text.encode():
+            self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
+        elif stated.span is not None:
             self.edits[stated.span] = text.encode()
+            self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
         elif room is not None and self.of.model.format == "sdf":
-            self._put(room, f"<{name}>{text}</{name}>")
+            self.put(room, f"<{name}>{text}</{name}>")
+            self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
         else:
             self.elsewhere.append(f"{name} = {text} [{low:.4g}, {high:.4g}]: {stated.where}; write it there")
-            return
+
+    def note(
+        self, file: Path, name: str, where: str, numbers: tuple[float, float, float, float], words: str, whom: str
+    ) -> None:
+        """Take note of a change: before, after, and the ends of the interval."""
+        before, after, low, high = numbers
         change = Change(
-            file=self.names[stated.span.file if stated.span is not None else room.file if room else self.of.model.file],
+            file=self.names[file],
             element=name,
-            where=stated.where,
+            where=where,
             before=float(f"{before:.6g}"),
-            after=float(text),
+            after=after,
             low=low,
             high=high,
             sentence=words,
         )
-        self.changes.setdefault((name, change.before, change.after), (change, []))[1].append(whom)
+        self.changes.setdefault((name, change.before, after), (change, []))[1].append(whom)
 
-    def _put(self, room: Node, line: str) -> None:
-        at, raw = behind(room), raw_bytes(room.file)
-        first = room.children[0].start if room.children else room.start
+    def put(self, room: Node, line: str) -> None:
+        """Put an element behind the last child of another one, indented as the first is."""
+        raw, first, last = raw_bytes(room.file), room.children[0].start, room.children[-1].close
         indent = raw[raw.rfind(b"\n", 0, first) + 1 : first]
-        lead = b"\n" + (indent if not indent.strip() else b"")
-        end = raw.find(b">", at.start) + 1
+        end = raw.index(b">", last) + 1
         place = Span(room.file, end, end)
-        self.put_in[place] = self.put_in.get(place, b"") + lead + line.encode()
+        text = b"\n" + (indent if not indent.strip() else b"") + line.encode()
+        self.put_in[place] = self.put_in.get(place, b"") + text
 
     def _keep(self, sentence: str) -> None:
         if sentence not in self.unchanged:
@@ -298,15 +302,15 @@ def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mappin
         if not first.entries or not straight:
             if found.contradicts(total):
                 made.elsewhere.append(
-                    f"{_ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
+                    f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
                     f"kg m^2, and not {total:.4g}: {first.inertia_at} states it in other axes, or not; change it there"
                 )
             continue
         rest = total - float(first.inertia[INERTIA_ENTRIES[entry]])
         own = _Found(*(each - rest for each in found))
-        words = f"moment of inertia {_ENTRIES[entry]} of {{whom}} is {{share}}"
+        words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
-        made.replace(_ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
+        made.replace(ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
 
 
 def _room(made: _Corrections, body: object) -> Node | None:
@@ -359,43 +363,22 @@ def _drag_factor(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     model = made.of.model
     first, share = model.bodies[0], model.mass_kg / model.bodies[0].mass.value
+    place, moved = [float(each) for each in first.centre], False
     for axis, name in enumerate("xyz"):
-        moved = numbers.get(f"c_{name}")
-        if moved is None:
+        own = numbers.get(f"c_{name}")
+        if own is None:
             continue
-        now = float(first.centre[axis])
-        found = _Found(*(now + share * each for each in (moved.value, moved.low, moved.high)))
-        words = f"centre of mass of the vehicle is {1e3 * abs(moved.value):.3g} mm {_WAYS[axis][int(moved.value < 0)]}"
-        if first.place:
-            made.replace(f"pose {name}", first.place[axis], found, words, first.name, None)
-        elif found.contradicts(now):
-            _put_place(made, axis, found, words)
-
-
-def _put_place(made: _Corrections, axis: int, found: _Found, words: str) -> None:
-    """Put a place into an inertial that has none, or into the one that was put in for another axis."""
-    first = made.of.model.bodies[0]
-    if first.node is None or made.of.model.format != "sdf":
-        made.elsewhere.append(f"{words}: {first.inertia_at} states no place; write it there")
-        return
-    values = [0.0] * 6
-    mark = next((place for place, text in made.put_in.items() if b"<pose>" in text), None)
-    if mark is not None:
-        text = made.put_in.pop(mark).decode()
-        values = [float(word) for word in text.partition("<pose>")[2].partition("</pose>")[0].split()]
-    values[axis] = found.value
-    made._put(first.node, f"<pose>{' '.join(f'{value:.4g}' for value in values)}</pose>")
-    change = Change(
-        file=made.names[first.node.file],
-        element=f"pose {'xyz'[axis]}",
-        where=f"{first.node.where}: no <pose>",
-        before=0.0,
-        after=float(f"{found.value:.4g}"),
-        low=found.low,
-        high=found.high,
-        sentence=words,
-    )
-    made.changes[change.element, 0.0, change.after] = change, [first.name]
+        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
+        if first.place or first.node is None or model.format != "sdf":
+            stated = first.place[axis] if first.place else Stated(place[axis], first.inertia_at)
+            made.replace(f"pose {name}", stated, found, words, first.name, None)
+        elif found.contradicts(place[axis]):
+            values = (place[axis], float(f"{found.value:.4g}"), found.low, found.high)
+            made.note(first.node.file, f"pose {name}", f"{first.node.where}: no <pose>", values, words, first.name)
+            place[axis], moved = found.value, True
+    if moved and first.node is not None:
+        made.put(first.node, f"<pose>{' '.join(f'{each:.4g}' for each in place)} 0 0 0</pose>")
 
 
 def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
