@@ -5,8 +5,8 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 - ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
   as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
   where the yaw torque follows the thrust, as it does where the file states their ratio.
-- ``rotor_mismatch``: thrust of single rotors; what clockwise rotors drag more is their ratio of torque to thrust.
-- ``drag_factor_error``: the ratio of torque to thrust.
+- ``rotor_mismatch``: thrust of single rotors, by the pattern that was found; what clockwise rotors drag more than they
+  lift is their ratio of torque to thrust. ``drag_factor_error``: that ratio of all.
 - ``com_offset``: the centre of the first link moves so that that of the vehicle does.
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.effects.catalogue.rotor_mismatch import gains
+from cpfls_cli.effects.catalogue.rotor_mismatch import gain_modes
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
@@ -40,6 +40,7 @@ from cpfls_cli.words import joined
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
+_TOGETHER = ("parameter_error", "rotor_mismatch", "drag_factor_error")
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
@@ -90,6 +91,24 @@ class _Found(NamedTuple):
 
 
 _ONE = _Found(1.0, 1.0, 1.0)
+
+
+def _significant(factor: _Found) -> _Found:
+    """Give a factor, or 1 with as wide an interval where it may be that."""
+    return factor if factor.contradicts(1.0) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+
+
+def _part(number: Estimate | None, times: float) -> _Found:
+    return (
+        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
+    )
+
+
+def _sum(*parts: _Found) -> _Found:
+    """Add what is independent to 1."""
+    value = 1.0 + sum(part.value for part in parts)
+    below, above = (hypot(*(part[end] - part.value for part in parts)) for end in (1, 2))
+    return _Found(value, value - below, value + above)
 
 
 def _factor(number: Estimate | None) -> _Found:
@@ -168,7 +187,7 @@ class _Corrections:
     def of_rotors(self, kind: str, found: Callable[[int, float], _Found], words: str) -> bool:
         """Correct a number of each rotor; False where the format does not know it."""
         name = _TAGS[self.of.model.format].get(kind)
-        if name is None or any(getattr(rotor, kind) is None for rotor in self.rotors):
+        if name is None or not self.rotors or any(getattr(rotor, kind) is None for rotor in self.rotors):
             return False
         for index, rotor in enumerate(self.rotors):
             stated: Stated = getattr(rotor, kind)
@@ -228,12 +247,14 @@ def _sizes(change: Change) -> dict[str, str]:
 
 
 def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
+    named = {each.name: {number.name: number for number in each.numbers} for each in effects}
+    together = {key: number for name in _TOGETHER for key, number in named.get(name, {}).items()}
+    if together:
+        _of_rotors(made, together)
     for each in effects:
-        numbers = {number.name: number for number in each.numbers}
-        rule = _RULES.get(each.name)
-        if rule is not None:
-            rule(made, numbers)
-        elif not each.of_log:
+        if each.name in _RULES:
+            _RULES[each.name](made, named[each.name])
+        elif each.name not in _TOGETHER and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
@@ -265,27 +286,47 @@ def _not_held(made: _Corrections, each: NamedEffect | str) -> None:
     )
 
 
-def _parameter_error(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    scale = _factor(numbers.get("thrust_scale"))
-    scale = scale if scale.contradicts(1.0) else _Found(1.0, *(1.0 + end - scale.value for end in scale[1:]))
-    if scale.value != 1.0 and not made.of_rotors(
-        "thrust", lambda _, stated: scale.times(stated), "thrust of {whom} is {share}"
-    ):
+def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
+    scale = _significant(_factor(numbers.get("thrust_scale")))
+    lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
+    modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
+
+    def thrust(index: int, stated: float) -> _Found:
+        own = [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
+        return scale.with_factor(_sum(*own, _part(lifts, spins[index]))).times(stated)
+
+    def turning(index: int, stated: float) -> _Found:
+        own = _sum(_part(drags, -spins[index]), _part(lifts, -spins[index]))
+        return _factor(numbers.get("error")).with_factor(own).times(stated)
+
+    differ = "difference_1" in numbers
+    words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
+    if ("thrust_scale" in numbers or differ) and not made.of_rotors("thrust", thrust, words):
         made.elsewhere.append(
-            f"thrust is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the file, whose controls "
+            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the file, whose controls "
             "are thrusts: scale gear or gainprm by it"
         )
+    if "error" in numbers or drags is not None:
+        for kind in ("ratio", "torque"):
+            made.of_rotors(kind, turning, "yaw torque over thrust of {whom} is {share}")
+    _moments(made, numbers, scale)
+
+
+def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> None:
     # About z the torque follows the thrust where the file states the ratio of the two.
     follows = all(rotor.torque is None for rotor in made.rotors)
-    factors = [
-        _factor(numbers.get(f"inertia_{axis}")).with_factor(scale if axis != "z" or follows else _ONE) for axis in "xyz"
-    ]
-    if scale.value != 1.0 and follows and "inertia_z" not in numbers and made.rotors[0].ratio is not None:
+    if scale.value != 1.0 and follows and made.rotors and "inertia_z" not in numbers:
         name = _TAGS[made.of.model.format].get("ratio", "their ratio")
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    _inertia(made, {index: factor for index, factor in enumerate(factors) if numbers.get(f"inertia_{'xyz'[index]}")})
+    factors = {
+        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+        for index, axis in enumerate("xyz")
+        if f"inertia_{axis}" in numbers
+    }
+    _inertia(made, factors)
 
 
 def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
@@ -321,43 +362,6 @@ def _room(made: _Corrections, body: object) -> Node | None:
 def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     found = list(numbers.values())
     _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
-
-
-def _mismatch(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    pairs = [numbers.get(f"difference_{mode}") for mode in (1, 2)]
-    ends = [
-        gains(made.vehicle, np.array([0.0 if each is None else getattr(each, end) for each in pairs]))
-        for end in ("value", "low", "high")
-    ]
-
-    def of(index: int, stated: float) -> _Found:
-        value, *both = (stated * (1 + float(each[index])) for each in ends)
-        return _Found(value, min(value, *both), max(value, *both))
-
-    if not made.of_rotors("thrust", of, "thrust of {whom} is {share}; or the opposite rotor is as much the other way"):
-        _not_held(made, "rotor_mismatch")
-    drags = numbers.get("drag_imbalance")
-    if drags is not None and (drags.low > 0 or drags.high < 0):
-        for kind in ("ratio", "torque"):
-            made.of_rotors(
-                kind, lambda i, stated: _turning(made, i, drags).times(stated), "yaw torque of {whom}: {share}"
-            )
-    lifts = numbers.get("lift_imbalance")
-    if lifts is not None and (lifts.low > 0 or lifts.high < 0):
-        made.unchanged.append("counter-clockwise rotors lift another share than they turn the body by: no number of it")
-
-
-def _turning(made: _Corrections, index: int, drags: Estimate) -> _Found:
-    spin = made.vehicle.rotors[index].spin
-    ends = [1 - spin * each for each in (drags.value, drags.low, drags.high)]
-    return _Found(ends[0], min(ends), max(ends))
-
-
-def _drag_factor(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    factor, words = _factor(numbers["error"]), "yaw torque of {whom} is {share}"
-    held = [made.of_rotors(kind, lambda _, stated: factor.times(stated), words) for kind in ("ratio", "torque")]
-    if not any(held):
-        _not_held(made, "drag_factor_error")
 
 
 def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
@@ -416,10 +420,7 @@ def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 
 
 _RULES: dict[str, Callable[[_Corrections, Mapping[str, Estimate]], None]] = {
-    "parameter_error": _parameter_error,
     "products_of_inertia": _products,
-    "rotor_mismatch": _mismatch,
-    "drag_factor_error": _drag_factor,
     "com_offset": _centre,
     "motor_lag": _lag,
     "rotor_drag": _drag,
