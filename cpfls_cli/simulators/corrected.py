@@ -304,8 +304,8 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
     if ("thrust_scale" in numbers or differ) and not made.of_rotors("thrust", thrust, words):
         made.elsewhere.append(
-            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the file, whose controls "
-            "are thrusts: scale gear or gainprm by it"
+            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the "
+            "file, whose controls are thrusts: scale gear or gainprm by it"
         )
     if "error" in numbers or drags is not None:
         for kind in ("ratio", "torque"):
