@@ -321,8 +321,8 @@ class Model:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
         model = modelled(self._path, record)
-        if model.beside_table:
-            parts = ", ".join(model.beside_table)
+        if model.unsimulated:
+            parts = ", ".join(model.unsimulated)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")
         return model
 
