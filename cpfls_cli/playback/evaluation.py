@@ -33,7 +33,7 @@ from cpfls_cli.playback.parameters import (
     unit_wrenches,
 )
 from cpfls_cli.playback.remainder import Airflow, learned_wrench
-from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
+from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -225,7 +225,7 @@ class VehicleAt:
             slow = response.slow_s if SLOW in self.free.index else None
             return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
         slopes = [
-            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, TIMES[by])
+            response.slope_by_step(flight.speed[part], flight.motion.period, flight.hold, TIMES[by])
             for part in flight.stretches
         ]
         # The number is the logarithm of the slow time.
