@@ -108,7 +108,7 @@ _MAKERS = {
     "flight": "simulate` or `cpfls import",
     "twin": "simulate",
     "selection": "reduce",
-    "prediction": "predict",
+    "prediction": "replay",
     "gains": "tune",
     "disagreement": "compare",
     "diagnosis": "diagnose",

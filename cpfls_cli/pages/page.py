@@ -45,7 +45,6 @@ from cpfls_cli.report.content import (
 from cpfls_cli.report.numbers import UNKNOWN, plain
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stage import stage_named
-from cpfls_cli.validation.prediction import AlongFlight
 
 
 def _summary_section(sources: Sources) -> Section:
@@ -114,11 +113,6 @@ _LACKS: tuple[_Lack, ...] = (
     ),
     (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
     (IdentifiedModel, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
-    (
-        AlongFlight,
-        "Figure 7 and the inertia matrix along a flight",
-        "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
-    ),
 )
 _GAP_LACKS: tuple[_Lack, ...] = (
     (
@@ -198,7 +192,7 @@ _EXACT = (
 _HASH_SHOWN = 12
 _ORDER = (
     *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce", "sweep"),
-    *("predict", "twin", "response", "tune", "replay", "trend", "changed"),
+    *("twin", "response", "tune", "replay", "trend", "changed"),
 )
 """Stages whose results a report shows, answers first; what it does not name comes last."""
 

@@ -342,7 +342,7 @@ class PastBalances(Balances):
     def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Signals]) -> Any:
         """Average all columns over windows, by stretch, each as its own flight."""
         return [
-            (number, part, windowed(bands[0], part, form, signals[number]))
+            (number, part, averaged(bands[0], part, _seen(part)), windowed(bands[0], part, form, signals[number]))
             for number in self.path
             for part in (replace(self.flights[number], stretches=(each,)) for each in self.flights[number].stretches)
         ]
@@ -361,9 +361,9 @@ class PastBalances(Balances):
 
     def _new(self, band: Windows, form: Form, kept: Any, weights: Array) -> Iterator[Rows]:
         rows = [np.stack([own[:, axis] @ weights[axis] for axis in form.slices], axis=1) for *_, own in kept]
-        seen = [averaged(band, part, _seen(part)) for _, part, _ in kept]
+        seen = [each for _, _, each, _ in kept]
         new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
-        for (number, part, _), own, predicted in zip(kept, new, expected, strict=True):
+        for (number, part, *_), own, predicted in zip(kept, new, expected, strict=True):
             middles = middles_of(band, part)
             flat, known = (each.reshape(len(own), -1) for each in (own, predicted))
             yield Rows(number, flat, known, middles[len(middles) - len(own) :])

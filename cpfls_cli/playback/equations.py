@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.parameters import DRAG, LOG_MASS, SLOW, THRUST
@@ -104,8 +104,7 @@ class Equations:
         at, index = self.at, self.at.free.index
         number = at.with_derivatives(0)
         known = {name: number(name) for name in (*index, DRAG_OVER_THRUST)}
-        for name, entry in zip(INERTIA_PARAMETERS, INERTIA_ENTRIES, strict=True):
-            known[name] = Tangent(at.inertia[entry], dict(enumerate(at.inertia_by[:, *entry].tolist())))
+        known |= dict(zip(INERTIA_PARAMETERS, at.inertia_entries, strict=True))
         return known | {_MASS: Tangent(at.mass, {index[LOG_MASS]: at.mass} if LOG_MASS in index else {})}
 
     def product(self, factors: Sequence[str]) -> Value:

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, of_thrust
 from cpfls_cli.playback.motion import Body
@@ -32,8 +32,8 @@ from cpfls_cli.playback.parameters import (
     Physical,
     unit_wrenches,
 )
-from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import Airflow, learned_wrench
+from cpfls_cli.playback.remainder import Airflow, learned_wrench
+from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -48,6 +48,7 @@ from cpfls_cli.vehicle.values import (
     Vector,
     dot,
     times,
+    value_of,
 )
 
 TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
@@ -73,30 +74,30 @@ class VehicleAt:
         return float(self.values[self.free.index[name]]) if name in self.free.index else otherwise
 
     @cached_property
-    def root_inertia(self) -> Array:
-        """Roots of the ratios of the moments of inertia to the stated ones, shape (3,)."""
-        return np.exp(0.5 * np.array([self.get(name, 0.0) for name in LOG_INERTIA]))
+    def inertia_entries(self) -> tuple[Value, ...]:
+        """Entries of the inertia tensor by `INERTIA_ENTRIES`, kg m^2, with derivatives by the numbers, by place."""
+        free, given = self.free, self.with_derivatives(0)
+        logs, products = (
+            [given(name) if name in free.index else 0.0 for name in each] for each in (LOG_INERTIA, PRODUCT_NAMES)
+        )
+        root = [ARRAYS.exp(0.5 * log) for log in logs]
+        stated = six_parameters(free.vehicle.inertia_kg_m2).tolist()
+        tensor = [entry + own for entry, own in zip(stated, (0.0, 0.0, 0.0, *products), strict=True)]
+        pairs = zip(tensor, INERTIA_ENTRIES, strict=True)
+        return tuple(root[row] * entry * root[column] for entry, (row, column) in pairs)
 
     @cached_property
     def inertia(self) -> Array:
         """Inertia tensor, shape (3, 3), kg m^2."""
-        tensor = symmetric(self.free.vehicle.inertia_kg_m2) + symmetric(
-            [0.0, 0.0, 0.0, *(self.get(name, 0.0) for name in PRODUCT_NAMES)]
-        )
-        return np.asarray(self.root_inertia[:, None] * tensor * self.root_inertia)
+        return symmetric([value_of(entry) for entry in self.inertia_entries])
 
-    @cached_property
+    @property
     def inertia_by(self) -> Array:
         """Derivatives of the inertia tensor by each number, shape (number, 3, 3), kg m^2."""
-        index, root = self.free.index, self.root_inertia
-        derivatives = np.zeros((len(index), 3, 3))
-        for axis, name in enumerate(LOG_INERTIA):
-            if name in index:
-                derivatives[index[name], axis] += 0.5 * self.inertia[axis]
-                derivatives[index[name], :, axis] += 0.5 * self.inertia[:, axis]
-        for name, (row, column) in zip(PRODUCT_NAMES, INERTIA_ENTRIES[3:], strict=True):
-            if name in index:
-                derivatives[index[name], [row, column], [column, row]] = root[row] * root[column]
+        derivatives = np.zeros((len(self.free.index), 3, 3))
+        for (row, column), entry in zip(INERTIA_ENTRIES, self.inertia_entries, strict=True):
+            for place, slope in entry.by.items() if isinstance(entry, Tangent) else ():
+                derivatives[place, [row, column], [column, row]] = slope
         return derivatives
 
     @property
@@ -111,27 +112,18 @@ class VehicleAt:
         )
 
     @cached_property
-    def log_counted(self) -> Array:
-        """Inertia, as logarithms of ratios, in units of which coefficients of torque are counted, shape (3,)."""
-        return np.array([self.get(name, 0.0) for name in self.free.counting])
+    def _acting_number(self) -> Callable[[str], Value]:
+        return acting_numbers(self.free, lambda name: self.get(name, 0.0))
 
     @cached_property
     def coefficients(self) -> Mapping[str, float]:
         """Coefficients of effects and remainder in SI, by name."""
-        return {
-            name: float(self.values[self.free.index[name]] * np.exp(share @ self.log_counted))
-            for name, share in self.free.shares.items()
-        }
+        return {name: float(self._acting_number(name)) for name in self.free.shares}
 
     @property
     def mass(self) -> float:
         """Mass, kg."""
         return self.free.vehicle.mass_kg * float(np.exp(self.get(LOG_MASS, 0.0)))
-
-    @property
-    def drag_over_thrust(self) -> float:
-        """By how much more the drag factor differs from the stated one than the thrust factor does."""
-        return self.get(DRAG, 1.0) / self.get(THRUST, 1.0)
 
     @cached_property
     def vehicle(self) -> VehicleSettings:
@@ -155,7 +147,8 @@ class VehicleAt:
         effects, stated = [], self.free.vehicle
         # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
         rotors = tuple(
-            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self.drag_over_thrust) for each in stated.rotors
+            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self._acting_number(DRAG_OVER_THRUST))
+            for each in stated.rotors
         )
         flown = replace(stated, rotors=rotors)
         for block in self.free.effects:
@@ -232,7 +225,7 @@ class VehicleAt:
             slow = response.slow_s if SLOW in self.free.index else None
             return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
         slopes = [
-            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, TIMES[by])
+            response.slope_by_step(flight.speed[part], flight.motion.period, flight.hold, TIMES[by])
             for part in flight.stretches
         ]
         # The number is the logarithm of the slow time.
@@ -250,7 +243,7 @@ class VehicleAt:
         key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
         function, given = traced_wrench(*key), tuple(self.values.tolist())
         return replace(
-            self._flown(acting_numbers(self.free, lambda name: self.get(name, 0.0)), np.zeros((0, 3, 3))),
+            self._flown(self._acting_number, np.zeros((0, 3, 3))),
             traced=lambda *motion: function(*motion, given),
         )
 

@@ -5,8 +5,8 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 - ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
   as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
   where the yaw torque follows the thrust, as it does where the file states their ratio.
-- ``rotor_mismatch``: thrust of single rotors; what clockwise rotors drag more is their ratio of torque to thrust.
-- ``drag_factor_error``: the ratio of torque to thrust.
+- ``rotor_mismatch``: thrust of single rotors, by the pattern that was found; what clockwise rotors drag more than they
+  lift is their ratio of torque to thrust. ``drag_factor_error``: that ratio of all.
 - ``com_offset``: the centre of the first link moves so that that of the vehicle does.
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
@@ -25,22 +25,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.effects.catalogue.rotor_mismatch import gains
+from cpfls_cli.effects.catalogue.rotor_mismatch import gain_modes
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
-from cpfls_cli.simulators.model import Rotor, behind
+from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
-_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
+_TOGETHER = ("parameter_error", "rotor_mismatch", "drag_factor_error")
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
@@ -93,6 +93,24 @@ class _Found(NamedTuple):
 _ONE = _Found(1.0, 1.0, 1.0)
 
 
+def _significant(factor: _Found) -> _Found:
+    """Give a factor, or 1 with as wide an interval where it may be that."""
+    return factor if factor.contradicts(1.0) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+
+
+def _part(number: Estimate | None, times: float) -> _Found:
+    return (
+        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
+    )
+
+
+def _sum(*parts: _Found) -> _Found:
+    """Add what is independent to 1."""
+    value = 1.0 + sum(part.value for part in parts)
+    below, above = (hypot(*(part[end] - part.value for part in parts)) for end in (1, 2))
+    return _Found(value, value - below, value + above)
+
+
 def _factor(number: Estimate | None) -> _Found:
     return _ONE if number is None else _Found(1 + number.value, 1 + number.low, 1 + number.high)
 
@@ -125,37 +143,42 @@ class _Corrections:
         before, text = stated.scale * stated.value, f"{new:.4g}"
         if not found.contradicts(stated.value):
             self._keep(f"{name} {before:.4g} agrees with the flights, {text} [{low:.4g}, {high:.4g}]")
-            return
-        if stated.span is not None:
-            if self.edits.get(stated.span, text.encode()) != text.encode():
-                self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
-                return
+        elif stated.span is not None and self.edits.get(stated.span, text.encode()) != text.encode():
+            self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
+        elif stated.span is not None:
             self.edits[stated.span] = text.encode()
+            self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
         elif room is not None and self.of.model.format == "sdf":
-            self._put(room, f"<{name}>{text}</{name}>")
+            self.put(room, f"<{name}>{text}</{name}>")
+            self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
         else:
             self.elsewhere.append(f"{name} = {text} [{low:.4g}, {high:.4g}]: {stated.where}; write it there")
-            return
+
+    def note(
+        self, file: Path, name: str, where: str, numbers: tuple[float, float, float, float], words: str, whom: str
+    ) -> None:
+        """Take note of a change: before, after, and the ends of the interval."""
+        before, after, low, high = numbers
         change = Change(
-            file=self.names[stated.span.file if stated.span is not None else room.file if room else self.of.model.file],
+            file=self.names[file],
             element=name,
-            where=stated.where,
+            where=where,
             before=float(f"{before:.6g}"),
-            after=float(text),
+            after=after,
             low=low,
             high=high,
             sentence=words,
         )
-        self.changes.setdefault((name, change.before, change.after), (change, []))[1].append(whom)
+        self.changes.setdefault((name, change.before, after), (change, []))[1].append(whom)
 
-    def _put(self, room: Node, line: str) -> None:
-        at, raw = behind(room), raw_bytes(room.file)
-        first = room.children[0].start if room.children else room.start
+    def put(self, room: Node, line: str) -> None:
+        """Put an element behind the last child of another one, indented as the first is."""
+        raw, first, last = raw_bytes(room.file), room.children[0].start, room.children[-1].close
         indent = raw[raw.rfind(b"\n", 0, first) + 1 : first]
-        lead = b"\n" + (indent if not indent.strip() else b"")
-        end = raw.find(b">", at.start) + 1
+        end = raw.index(b">", last) + 1
         place = Span(room.file, end, end)
-        self.put_in[place] = self.put_in.get(place, b"") + lead + line.encode()
+        text = b"\n" + (indent if not indent.strip() else b"") + line.encode()
+        self.put_in[place] = self.put_in.get(place, b"") + text
 
     def _keep(self, sentence: str) -> None:
         if sentence not in self.unchanged:
@@ -164,7 +187,7 @@ class _Corrections:
     def of_rotors(self, kind: str, found: Callable[[int, float], _Found], words: str) -> bool:
         """Correct a number of each rotor; False where the format does not know it."""
         name = _TAGS[self.of.model.format].get(kind)
-        if name is None or any(getattr(rotor, kind) is None for rotor in self.rotors):
+        if name is None or not self.rotors or any(getattr(rotor, kind) is None for rotor in self.rotors):
             return False
         for index, rotor in enumerate(self.rotors):
             stated: Stated = getattr(rotor, kind)
@@ -224,12 +247,14 @@ def _sizes(change: Change) -> dict[str, str]:
 
 
 def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
+    named = {each.name: {number.name: number for number in each.numbers} for each in effects}
+    together = {key: number for name in _TOGETHER for key, number in named.get(name, {}).items()}
+    if together:
+        _of_rotors(made, together)
     for each in effects:
-        numbers = {number.name: number for number in each.numbers}
-        rule = _RULES.get(each.name)
-        if rule is not None:
-            rule(made, numbers)
-        elif not each.of_log:
+        if each.name in _RULES:
+            _RULES[each.name](made, named[each.name])
+        elif each.name not in _TOGETHER and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
@@ -261,27 +286,47 @@ def _not_held(made: _Corrections, each: NamedEffect | str) -> None:
     )
 
 
-def _parameter_error(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    scale = _factor(numbers.get("thrust_scale"))
-    scale = scale if scale.contradicts(1.0) else _Found(1.0, *(1.0 + end - scale.value for end in scale[1:]))
-    if scale.value != 1.0 and not made.of_rotors(
-        "thrust", lambda _, stated: scale.times(stated), "thrust of {whom} is {share}"
-    ):
+def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
+    scale = _significant(_factor(numbers.get("thrust_scale")))
+    lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
+    modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
+
+    def thrust(index: int, stated: float) -> _Found:
+        own = [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
+        return scale.with_factor(_sum(*own, _part(lifts, spins[index]))).times(stated)
+
+    def turning(index: int, stated: float) -> _Found:
+        own = _sum(_part(drags, -spins[index]), _part(lifts, -spins[index]))
+        return _factor(numbers.get("error")).with_factor(own).times(stated)
+
+    differ = "difference_1" in numbers
+    words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
+    if ("thrust_scale" in numbers or differ) and not made.of_rotors("thrust", thrust, words):
         made.elsewhere.append(
-            f"thrust is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the file, whose controls "
-            "are thrusts: scale gear or gainprm by it"
+            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the "
+            "file, whose controls are thrusts: scale gear or gainprm by it"
         )
+    if "error" in numbers or drags is not None:
+        for kind in ("ratio", "torque"):
+            made.of_rotors(kind, turning, "yaw torque over thrust of {whom} is {share}")
+    _moments(made, numbers, scale)
+
+
+def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> None:
     # About z the torque follows the thrust where the file states the ratio of the two.
     follows = all(rotor.torque is None for rotor in made.rotors)
-    factors = [
-        _factor(numbers.get(f"inertia_{axis}")).with_factor(scale if axis != "z" or follows else _ONE) for axis in "xyz"
-    ]
-    if scale.value != 1.0 and follows and "inertia_z" not in numbers and made.rotors[0].ratio is not None:
+    if scale.value != 1.0 and follows and made.rotors and "inertia_z" not in numbers:
         name = _TAGS[made.of.model.format].get("ratio", "their ratio")
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    _inertia(made, {index: factor for index, factor in enumerate(factors) if numbers.get(f"inertia_{'xyz'[index]}")})
+    factors = {
+        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+        for index, axis in enumerate("xyz")
+        if f"inertia_{axis}" in numbers
+    }
+    _inertia(made, factors)
 
 
 def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
@@ -298,15 +343,15 @@ def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mappin
         if not first.entries or not straight:
             if found.contradicts(total):
                 made.elsewhere.append(
-                    f"{_ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
+                    f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
                     f"kg m^2, and not {total:.4g}: {first.inertia_at} states it in other axes, or not; change it there"
                 )
             continue
         rest = total - float(first.inertia[INERTIA_ENTRIES[entry]])
         own = _Found(*(each - rest for each in found))
-        words = f"moment of inertia {_ENTRIES[entry]} of {{whom}} is {{share}}"
+        words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
-        made.replace(_ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
+        made.replace(ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
 
 
 def _room(made: _Corrections, body: object) -> Node | None:
@@ -319,83 +364,25 @@ def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
 
 
-def _mismatch(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    pairs = [numbers.get(f"difference_{mode}") for mode in (1, 2)]
-    ends = [
-        gains(made.vehicle, np.array([0.0 if each is None else getattr(each, end) for each in pairs]))
-        for end in ("value", "low", "high")
-    ]
-
-    def of(index: int, stated: float) -> _Found:
-        value, *both = (stated * (1 + float(each[index])) for each in ends)
-        return _Found(value, min(value, *both), max(value, *both))
-
-    if not made.of_rotors("thrust", of, "thrust of {whom} is {share}; or the opposite rotor is as much the other way"):
-        _not_held(made, "rotor_mismatch")
-    drags = numbers.get("drag_imbalance")
-    if drags is not None and (drags.low > 0 or drags.high < 0):
-        for kind in ("ratio", "torque"):
-            made.of_rotors(
-                kind, lambda i, stated: _turning(made, i, drags).times(stated), "yaw torque of {whom}: {share}"
-            )
-    lifts = numbers.get("lift_imbalance")
-    if lifts is not None and (lifts.low > 0 or lifts.high < 0):
-        made.unchanged.append("counter-clockwise rotors lift another share than they turn the body by: no number of it")
-
-
-def _turning(made: _Corrections, index: int, drags: Estimate) -> _Found:
-    spin = made.vehicle.rotors[index].spin
-    ends = [1 - spin * each for each in (drags.value, drags.low, drags.high)]
-    return _Found(ends[0], min(ends), max(ends))
-
-
-def _drag_factor(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
-    factor, words = _factor(numbers["error"]), "yaw torque of {whom} is {share}"
-    held = [made.of_rotors(kind, lambda _, stated: factor.times(stated), words) for kind in ("ratio", "torque")]
-    if not any(held):
-        _not_held(made, "drag_factor_error")
-
-
 def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     model = made.of.model
     first, share = model.bodies[0], model.mass_kg / model.bodies[0].mass.value
+    place, moved = [float(each) for each in first.centre], False
     for axis, name in enumerate("xyz"):
-        moved = numbers.get(f"c_{name}")
-        if moved is None:
+        own = numbers.get(f"c_{name}")
+        if own is None:
             continue
-        now = float(first.centre[axis])
-        found = _Found(*(now + share * each for each in (moved.value, moved.low, moved.high)))
-        words = f"centre of mass of the vehicle is {1e3 * abs(moved.value):.3g} mm {_WAYS[axis][int(moved.value < 0)]}"
-        if first.place:
-            made.replace(f"pose {name}", first.place[axis], found, words, first.name, None)
-        elif found.contradicts(now):
-            _put_place(made, axis, found, words)
-
-
-def _put_place(made: _Corrections, axis: int, found: _Found, words: str) -> None:
-    """Put a place into an inertial that has none, or into the one that was put in for another axis."""
-    first = made.of.model.bodies[0]
-    if first.node is None or made.of.model.format != "sdf":
-        made.elsewhere.append(f"{words}: {first.inertia_at} states no place; write it there")
-        return
-    values = [0.0] * 6
-    mark = next((place for place, text in made.put_in.items() if b"<pose>" in text), None)
-    if mark is not None:
-        text = made.put_in.pop(mark).decode()
-        values = [float(word) for word in text.partition("<pose>")[2].partition("</pose>")[0].split()]
-    values[axis] = found.value
-    made._put(first.node, f"<pose>{' '.join(f'{value:.4g}' for value in values)}</pose>")
-    change = Change(
-        file=made.names[first.node.file],
-        element=f"pose {'xyz'[axis]}",
-        where=f"{first.node.where}: no <pose>",
-        before=0.0,
-        after=float(f"{found.value:.4g}"),
-        low=found.low,
-        high=found.high,
-        sentence=words,
-    )
-    made.changes[change.element, 0.0, change.after] = change, [first.name]
+        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
+        if first.place or first.node is None or model.format != "sdf":
+            stated = first.place[axis] if first.place else Stated(place[axis], first.inertia_at)
+            made.replace(f"pose {name}", stated, found, words, first.name, None)
+        elif found.contradicts(place[axis]):
+            values = (place[axis], float(f"{found.value:.4g}"), found.low, found.high)
+            made.note(first.node.file, f"pose {name}", f"{first.node.where}: no <pose>", values, words, first.name)
+            place[axis], moved = found.value, True
+    if moved and first.node is not None:
+        made.put(first.node, f"<pose>{' '.join(f'{each:.4g}' for each in place)} 0 0 0</pose>")
 
 
 def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
@@ -433,10 +420,7 @@ def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 
 
 _RULES: dict[str, Callable[[_Corrections, Mapping[str, Estimate]], None]] = {
-    "parameter_error": _parameter_error,
     "products_of_inertia": _products,
-    "rotor_mismatch": _mismatch,
-    "drag_factor_error": _drag_factor,
     "com_offset": _centre,
     "motor_lag": _lag,
     "rotor_drag": _drag,

@@ -129,7 +129,7 @@ class Node:
         return self.error(f"{of}{text!r} is not {wanted}{template}")
 
     def _spans(self, attribute: str | None) -> list[Span | None]:
-        raw = _raw(self.file)
+        raw = raw_bytes(self.file)
         tag = _TAG.match(raw, self.start)
         if tag is None:
             return []
@@ -146,7 +146,8 @@ class Node:
 _READ: dict[Path, bytes] = {}
 
 
-def _raw(file: Path) -> bytes:
+def raw_bytes(file: Path) -> bytes:
+    """Give the bytes of a file as they were read."""
     return _READ[file]
 
 
@@ -212,8 +213,3 @@ def read_xml(file: Path) -> Node:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
     assert isinstance(root, Node), "a file without an element is no XML"
     return root
-
-
-def raw_bytes(file: Path) -> bytes:
-    """Give the bytes of a file as they were read."""
-    return _raw(file)

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, pose, rotated
+from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, rotated, turning
 
 _TURNING = ("hinge", "slide", "ball")
 _SMALL = 1e-9
@@ -168,16 +167,12 @@ def _gather(whole: _File, body: Node, placed: Array, above: str, bodies: list[Bo
     for child in body.all("body"):
         joints = [joint for joint in child.all("joint") if joint.attributes.get("type", "hinge") in _TURNING]
         if joints:
-            raise joints[0].error(
-                f"the body {child.name} turns on a joint, and a study has one rigid body; remove the joint in the file "
-                "that you give"
-            )
+            raise turning(joints[0], f"the body {child.name}")
         _gather(whole, child, placed @ whole.placed(child, child.attributes), named, bodies, sites)
 
 
 def _inertial(whole: _File, body: Node, inertial: Node, placed: Array) -> Body:
     at = placed @ whole.placed(inertial, inertial.attributes)
-    turned = at[:3, :3]
     entries: tuple[Stated, ...] = ()
     if "fullinertia" in inertial.attributes:
         entries = tuple(inertial.numbers("fullinertia", 6))
@@ -187,9 +182,8 @@ def _inertial(whole: _File, body: Node, inertial: Node, placed: Array) -> Body:
         entries = (*inertial.numbers("diaginertia", 3), still, still, still)
     else:
         raise inertial.error("has no diaginertia and no fullinertia; write one of them")
-    inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
-    place = tuple(inertial.numbers("pos", 3)) if "pos" in inertial.attributes else ()
-    return Body(body.name, inertial.number("mass"), at[:3, 3], inertia, turned, entries, place, inertial)
+    place = inertial.numbers("pos", 3) if "pos" in inertial.attributes else []
+    return part_of(body.name, inertial.number("mass"), entries, at, place, inertial)
 
 
 def _geom(whole: _File, geom: Node, placed: Array, named: str) -> Body | None:

@@ -10,10 +10,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.inertia import INERTIA_ENTRIES
-from cpfls_cli.simulators.document import Node, Span, Stated
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
+from cpfls_cli.simulators.document import Node, Stated
 
-_GRAVITY = 9.81
+GRAVITY = 9.81
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+"""Names of the entries of an inertia in files."""
 _STRAIGHT = 0.9998
 """Cosine of one degree: up to there an axis of thrust is that of the body."""
 
@@ -94,6 +96,14 @@ class Rotor:
     node: Node | None = None
 
     @property
+    def lift(self) -> float | None:
+        """Largest thrust, N; None where the file does not state it."""
+        if self.most is not None:
+            return self.most.value
+        both = self.thrust is not None and self.speed_max is not None
+        return self.thrust.value * self.speed_max.value**2 if both and self.thrust and self.speed_max else None
+
+    @property
     def drag_factor(self) -> float | None:
         """Yaw torque over squared speed, N m s^2."""
         if self.torque is not None:
@@ -169,6 +179,13 @@ class SimulatorModel:
         return min(known, key=lambda each: each.value) if known and len(known) == len(speeds) else None
 
     @property
+    def lift(self) -> float | None:
+        """Largest thrust of all rotors, N; None where the file does not state it."""
+        lifts = [rotor.lift for rotor in self.rotors]
+        known = [lift for lift in lifts if lift is not None]
+        return sum(known) if known and len(known) == len(lifts) else None
+
+    @property
     def where_of_mass(self) -> str:
         """Where the mass stands."""
         with_mass = [body for body in self.bodies if body.mass.value > 0]
@@ -176,13 +193,7 @@ class SimulatorModel:
         return self.bodies[0].mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")
 
 
-def masses_of(body: Body) -> None:
-    """Refuse a part that no body is: of a negative mass, or without a positive inertia.
-
-    Raises
-    ------
-    InputError
-    """
+def _require_body(body: Body) -> None:
     if body.mass.value < 0:
         raise InputError(f"{body.mass.where}: a mass of {body.mass.value:g} kg; write one above 0")
     if body.mass.value > 0 and np.linalg.eigvalsh(body.inertia).min() < 0:
@@ -199,7 +210,7 @@ def checked(model: SimulatorModel) -> SimulatorModel:
     InputError
     """
     for body in model.bodies:
-        masses_of(body)
+        _require_body(body)
     if not model.mass_kg > 0:
         raise InputError(f"{model.file}: no link has a mass; write one, such as <mass>1.5</mass>")
     for rotor in model.rotors:
@@ -208,22 +219,33 @@ def checked(model: SimulatorModel) -> SimulatorModel:
                 f"{rotor.where}: pushes along {np.round(rotor.axis, 3).tolist()}, not along z of the body; a study has "
                 "rotors that lift along z alone"
             )
-    lifts = [_most(rotor) for rotor in model.rotors]
-    known = [lift for lift in lifts if lift is not None]
-    if known and len(known) == len(lifts) and sum(known) < model.mass_kg * _GRAVITY:
+    lift, weight = model.lift, model.mass_kg * GRAVITY
+    if lift is not None and lift < weight:
         raise InputError(
-            f"{model.file}: {model.mass_kg:.4g} kg weigh {model.mass_kg * _GRAVITY:.3g} N, and its {len(known)} rotors "
-            f"lift at most {sum(known):.3g} N: it cannot hover; check the mass ({model.bodies[0].mass.where}), and "
+            f"{model.file}: {model.mass_kg:.4g} kg weigh {weight:.3g} N, and its {len(model.rotors)} rotors lift at "
+            f"most {lift:.3g} N: it cannot hover; check the mass ({model.bodies[0].mass.where}), and "
             f"thrust and limit of the rotors ({model.rotors[0].where})"
         )
     return model
 
 
-def _most(rotor: Rotor) -> float | None:
-    if rotor.most is not None:
-        return rotor.most.value
-    both = rotor.thrust is not None and rotor.speed_max is not None
-    return rotor.thrust.value * rotor.speed_max.value**2 if both and rotor.thrust and rotor.speed_max else None
+def part_of(
+    name: str,
+    mass: Stated,
+    entries: Sequence[Stated],
+    at: Array,
+    place: Sequence[Stated] = (),
+    node: Node | None = None,
+) -> Body:
+    """Make a part of its inertia as stated, in the axes of the pose `at`, shape (4, 4)."""
+    turned = at[:3, :3]
+    inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
+    return Body(name, mass, at[:3, 3], inertia, turned, tuple(entries), tuple(place), node)
+
+
+def turning(node: Node, what: str) -> InputError:
+    """Make the error of a joint that turns."""
+    return node.error(f"{what} turns, and a study has one rigid body; fix it in the file that you give")
 
 
 def rotated(rpy: Sequence[float]) -> Array:
@@ -255,9 +277,3 @@ def pose(rotation: Array, place: Sequence[float] | Array) -> Array:
     made = np.eye(4)
     made[:3, :3], made[:3, 3] = rotation, place
     return made
-
-
-def behind(node: Node) -> Span:
-    """Give the place behind the last child of an element."""
-    last = node.children[-1] if node.children else node
-    return Span(node.file, last.close, node.close)

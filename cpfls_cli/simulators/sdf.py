@@ -17,9 +17,18 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, pose, rotated
+from cpfls_cli.simulators.model import (
+    ENTRIES,
+    Body,
+    Rotor,
+    SimulatorModel,
+    of_quaternion,
+    part_of,
+    pose,
+    rotated,
+    turning,
+)
 
 MOTOR = re.compile(r"multicopter-motor-model|gazebo_motor_model")
 """In the names of the files of the plugins: gz-sim's, PX4's and RotorS'."""
@@ -33,7 +42,6 @@ DEFAULTS = {
     "rollingMomentCoefficient": 1e-6,
 }
 """Of the plugins, where the file does not state a number."""
-ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 CANNOT = (
     "drag of the body, ground effect, a delay and the voltage: no element of the motor plugin",
     "a rotor's own gyroscopic torque: Gazebo makes it of the link, at a speed that rotorVelocitySlowdownSim divides",
@@ -227,10 +235,7 @@ def _rigid(parts: _Parts, base: str, spinning: set[str], notes: list[str]) -> li
             if other in held or other not in parts.links:
                 continue
             if name not in spinning and _turns(parts.joints[name]):
-                raise parts.joints[name].error(
-                    f"the joint {name} turns, and a study has one rigid body; fix it in the file that you give "
-                    "(type='fixed')"
-                )
+                raise turning(parts.joints[name], f"the joint {name}")
             held.append(other)
             open_.append(other)
     loose = [name for name in parts.links if name not in held]
@@ -259,11 +264,8 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
         for index, (entry, node) in enumerate(zip(ENTRIES, stated, strict=True))
     )
     own = inertial.first("pose")
-    whole = placed @ _pose(own)
-    turned = whole[:3, :3]
-    inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
-    place = tuple(own.numbers()[:3]) if own is not None and own.text.strip() else ()
-    return Body(name, mass_node.number(), whole[:3, 3], inertia, turned, entries, place, inertial)
+    place = own.numbers()[:3] if own is not None and own.text.strip() else []
+    return part_of(name, mass_node.number(), entries, placed @ _pose(own), place, inertial)
 
 
 def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inverse: Array) -> Rotor:

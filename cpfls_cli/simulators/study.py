@@ -12,10 +12,9 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
 from cpfls_cli.simulators.document import Stated
-from cpfls_cli.simulators.model import Rotor, SimulatorModel
+from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 
 _PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
-_GRAVITY = 9.81
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -81,9 +80,7 @@ class VehicleOf:
     @property
     def lifts(self) -> float | None:
         """Largest thrust over the weight; None where the file does not state it."""
-        lifts = [_most(rotor) for rotor in self.model.rotors]
-        known = [lift for lift in lifts if lift is not None]
-        return sum(known) / (self.mass_kg * _GRAVITY) if known and len(known) == len(lifts) else None
+        return None if self.model.lift is None else self.model.lift / (self.mass_kg * GRAVITY)
 
     @property
     def rotors(self) -> list[RotorLine]:
@@ -122,14 +119,6 @@ def _besides(rotor: Rotor) -> Iterator[str]:
             continue
         down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
         yield f"{words} {stated.value:g} {unit}{down} ({stated.where})"
-
-
-def _most(rotor: Rotor) -> float | None:
-    if rotor.most is not None:
-        return rotor.most.value
-    if rotor.thrust is None or rotor.speed_max is None:
-        return None
-    return rotor.thrust.value * rotor.speed_max.value**2
 
 
 def _short(values: list[float]) -> list[float]:

@@ -15,16 +15,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, pose, rotated
+from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
 
 RPM = 30 / np.pi
 _GRAVITY = 9.8
 """Of gym-pybullet-drones, in whose weight `thrust2weight` counts."""
 _PROPELLER = re.compile(r"prop(\d+)_link")
 _SPINS = (1, -1, 1, -1)
-_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 CANNOT = (
     "how fast rotors follow their commands: gym-pybullet-drones has rotors without lag",
     "the direction in which rotors turn: gym-pybullet-drones has it in its code, and the racer's the other way round",
@@ -75,10 +73,7 @@ def _placed(root: Node, links: dict[str, Node]) -> dict[str, Array]:
             if child not in links:
                 raise joint.error(f"its child {child!r} is not in the file; correct <child>")
             if joint.attributes.get("type") != "fixed":
-                raise joint.error(
-                    f"the joint {joint.name} turns, and a study has one rigid body; fix it in the file that you give "
-                    "(type='fixed')"
-                )
+                raise turning(joint, f"the joint {joint.name}")
             found[child] = found[above] @ _origin(joint.first("origin"))
             open_.append(child)
     loose = [name for name in links if name not in found]
@@ -107,9 +102,7 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     mass_node, inertia_node = (None if inertial is None else inertial.first(tag) for tag in ("mass", "inertia"))
     if inertial is None or mass_node is None:
         notes.append(f"{link.where} states no mass, and counts as none")
-        return Body(
-            link.name, Stated(0.0, f"{link.where}: states no mass"), placed[:3, 3], np.zeros((3, 3)), placed[:3, :3]
-        )
+        return part_of(link.name, Stated(0.0, f"{link.where}: states no mass"), (), placed)
     mass = mass_node.number("value")
     if inertia_node is None:
         raise inertial.error("has a mass and no <inertia>; write ixx to izz")
@@ -117,14 +110,11 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
         inertia_node.number(entry)
         if entry in inertia_node.attributes
         else Stated(0.0, f"{inertia_node.where}: no {entry}")
-        for entry in _ENTRIES
+        for entry in ENTRIES
     )
     own = inertial.first("origin")
-    whole = placed @ _origin(own)
-    turned = whole[:3, :3]
-    inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
-    place = tuple(own.numbers("xyz", 3)) if own is not None and "xyz" in own.attributes else ()
-    return Body(link.name, mass, whole[:3, 3], inertia, turned, entries, place, inertial)
+    place = own.numbers("xyz", 3) if own is not None and "xyz" in own.attributes else []
+    return part_of(link.name, mass, entries, placed @ _origin(own), place, inertial)
 
 
 def _rotors(file: Path, root: Node, properties: Node, bodies: tuple[Body, ...]) -> tuple[Rotor, ...]:

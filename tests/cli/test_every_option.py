@@ -73,7 +73,6 @@ LINES = (
     f"sweep study.yaml flight.h5 -o sweep.h5 {LEARN} --resume",
     "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --write-config found.yaml --anyway",
     "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --resume # nothing to resume",
-    "predict study.yaml model.h5 flight.h5 -o 7.h5",
     "replay study.yaml vehicle flight.h5 -o 8.h5 --horizon 0.2 --every 50 --hold linear",
     "replay study.yaml vehicle.h5 flight.h5 -o 9.h5 --history 0.1 # holds no forecast that uses the past",
     "response study.yaml flight.h5 -o 10.h5 --csv 10.csv",

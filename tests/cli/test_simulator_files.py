@@ -104,6 +104,11 @@ def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):
     assert mine.read_bytes() == before
 
 
+def test_other_commands_say_how_to_make_a_config(refuse, folder, tmp_path):
+    (message,) = refuse("compare", folder / "mine.sdf", folder / "log0.csv", "-o", tmp_path / "gap.h5")
+    assert "mine.sdf: is a simulator's file, not a config (YAML); `cpfls init --from " in message
+
+
 def test_a_file_that_states_too_little_says_what_to_write(refuse, folder, tmp_path):
     mine = tmp_path / "mine.xml"
     mine.write_text(

@@ -1,19 +1,12 @@
-"""Torque and force as a table: weights of terms of the motion times terms of the rotors, and what they come from."""
+"""What a model has no name for: torque and force over the direction of the airflow, learned."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
+from collections.abc import Callable, Sequence
 from math import pi
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.values import Functions, Value, dot, minus, plus, times
@@ -116,36 +109,3 @@ def _blended(by_rule: Sequence[Value], breakpoints: Sequence[float], turn: Value
     for rule, here in reversed(list(zip(wide, blended, strict=False))):
         total = functions.where(turn < breakpoints[rule + 1], here, total)
     return total
-
-
-def lever_weights(centre: Array, forces: Array) -> Array:
-    """Weigh the torque ``-c x F`` of forces about a centre of mass.
-
-    Parameters
-    ----------
-    centre : array, shape (3,), m
-        Where it is, from where the forces have their levers from.
-    forces : array, shape (6, ...)
-        Weights of torque and force.
-
-    Returns
-    -------
-    array, shape (6, ...)
-    """
-    table = np.zeros_like(forces)
-    table[:3] = -np.cross(centre, forces[3:], axisb=0, axisc=0)
-    return table
-
-
-@cache
-def wrench_of_numbers() -> Effect:
-    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
-
-    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-        assert VEHICLE_NUMBERS.columns is not None
-        given = VEHICLE_NUMBERS.columns(signals, shape)
-        assert given.momentum is not None
-        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
-        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
-
-    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns, rate_derivative=False)
