@@ -204,13 +204,7 @@ data/%/unseen.h5: data/%/unseen-trajectory.h5 data/%/.part/simulate.yaml
 data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/unseen.h5 data/%/.part/identify.yaml
 	$(CPFLS) identify configs/$*.yaml $< --selection data/$*/selection.h5 --validate data/$*/unseen.h5 -o $@ --force
 
-data/%/prediction.h5: data/%/model.h5 data/%/flight.h5
-	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
-
-data/%/prediction-unseen.h5: data/%/model.h5 data/%/unseen.h5
-	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
-
-ARTIFACTS := trajectory flight unseen selection model prediction prediction-unseen
+ARTIFACTS := trajectory flight unseen selection model
 
 # The page of a study of the paper holds its claims too.
 REPORT = $(CPFLS) report $(1) -o $(2) --force
@@ -247,10 +241,7 @@ $(REAL)/selection.h5: $(REAL)/log119.h5 $(REAL)/.part/reduce.yaml
 $(REAL)/model.h5: $(REAL)/log119.h5 $(REAL)/selection.h5 $(REAL)/log149.h5 $(REAL)/.part/identify.yaml
 	$(CPFLS) identify configs/crazyflie.yaml $< --selection $(REAL)/selection.h5 --validate $(REAL)/log149.h5 -o $@ --force
 
-$(REAL)/prediction%.h5: $(REAL)/model.h5 $(REAL)/log%.h5
-	$(CPFLS) predict configs/crazyflie.yaml $^ -o $@ --force
-
-REAL_ARTIFACTS := log119 log149 selection model prediction119 prediction149
+REAL_ARTIFACTS := log119 log149 selection model
 $(REAL)/report.html: $(REAL_ARTIFACTS:%=$(REAL)/%.h5) $(REAL)/.part/report.yaml
 	$(CPFLS) report configs/crazyflie.yaml $(filter %.h5,$^) -o $@ --force
 

@@ -77,7 +77,6 @@ SCENARIOS: dict[str, list[str]] = {
         f"simulate {ROOT}/configs/quick.yaml path.h5 -o flight.h5",
         f"reduce {ROOT}/configs/quick.yaml flight.h5 -o selection.h5",
         f"identify {ROOT}/configs/quick.yaml flight.h5 --selection selection.h5 -o model.h5",
-        f"predict {ROOT}/configs/quick.yaml model.h5 flight.h5 -o prediction.h5",
         f"report {ROOT}/configs/quick.yaml *.h5 -o report.html",
         "export model.h5 -o model.c --force",
     ],

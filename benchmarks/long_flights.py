@@ -1,8 +1,7 @@
-"""Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
+"""Time per sample and peak memory of reduction and identification, from 5e3 to 5e6 samples.
 
 Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
-peak memory is read at its end. A model with effects predicts a flight of 40 s with rotor speeds, tiled; with --effects
-that is all.
+peak memory is read at its end.
 """
 
 from __future__ import annotations
@@ -19,20 +18,16 @@ from time import perf_counter
 import h5py
 import numpy as np
 
-from benchmarks.blind.cases import make
-from benchmarks.blind.generator import generate, write
-from benchmarks.blind_study.fly import config as config_of
 from benchmarks.shared.measure import program, seconds, table
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of
-from cpfls_cli.flights.flight import MOTION, Flight
+from cpfls_cli.flights.flight import MOTION
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.identification.evaluator import Problem, decode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.store import read
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
 NOISE = 0.01
@@ -41,18 +36,16 @@ BUDGET = 4
 SMALL = ("--set", "identification.population=10", "--set", "identification.generations=2")
 
 
-def main(most: int = SIZES[-1], *, effects: bool = False, one: Path | None = None) -> None:
+def main(most: int = SIZES[-1], *, one: Path | None = None) -> None:
     if one:
         print(json.dumps(measure(one)))
         return
     sizes = [size for size in SIZES if size <= most]
-    if not effects:
-        of_identified_models(sizes)
-    of_effects(sizes)
+    of_identified_models(sizes)
 
 
 def of_identified_models(sizes: list[int]) -> None:
-    """Reduce, evaluate and predict flights of these sizes; print and draw it."""
+    """Reduce and evaluate flights of these sizes; print it."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         flight, model = Path(folder) / "flight.h5", Path(folder) / "model.h5"
@@ -63,38 +56,12 @@ def of_identified_models(sizes: list[int]) -> None:
             write_tiled(flight, samples)
             one = in_own_process(flight)
             reduced = by_command("reduce", Path(folder) / "selection.h5", flight)
-            prediction = Path(folder) / "prediction.h5"
-            predicted = by_command("predict", prediction, model, flight)
-            size = prediction.stat().st_size / 2**20
-            rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced, *predicted, size))
-            prediction.unlink()
+            rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced))
     columns = (
         "samples | evaluation, us per sample | local search, us per sample | peak memory, MB | "
-        "`cpfls reduce` to 685, s | its peak memory, MB | `cpfls predict`, s | its peak memory, MB  | its file, MB"
+        "`cpfls reduce` to 685, s | its peak memory, MB"
     )
     table("long_flights", columns, rows)
-
-
-def of_effects(sizes: list[int]) -> None:
-    """Predict flights of these sizes by a model with effects."""
-    rows, rng = [], np.random.default_rng(1)
-    case = make("timing", "pair", "sixkg", ("com_offset", "rotor_drag"), rng)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        study, model, flight, output = (folder / own for own in ("study.yaml", "gap", "flight.h5", "prediction.h5"))
-        write(generate(case, rng, 40.0), folder, "mid", "white", rng)
-        study.write_text(config_of(folder / "vehicle.json"), encoding="utf-8")
-        logs = sorted(folder.glob("train_*.csv"))
-        by_command("gap", model, *logs, config=study)
-        by_command("import", flight, logs[0], config=study)
-        flown, origin = read(flight, Flight)
-        signals = {name: values for name, values in flown.signals.items() if name != "time"}
-        for samples in sizes:
-            write_over_and_over(flight, samples, signals, float(flown.time[1]), origin.config, 0.0)
-            predicted = by_command("predict", output, model / "extended.h5", flight, config=study)
-            rows.append((samples, *predicted, output.stat().st_size / 2**20))
-    columns = "samples | `cpfls predict` of a model with effects, s | its peak memory, MB | its file, MB"
-    table("long_flights_effects", columns, rows)
 
 
 def write_tiled(path: Path, samples: int) -> None:

@@ -54,16 +54,12 @@ FlownArgument = Annotated[
         metavar="TRAJECTORY", help="Made by `cpfls trajectory`; or a flight or log, whose setpoints --autopilot flies."
     ),
 ]
-FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`.")]
 TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
 LogsArgument = Annotated[
     list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
-]
-ModelArgument = Annotated[
-    Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 FlightsArgument = Annotated[

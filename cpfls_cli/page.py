@@ -103,6 +103,12 @@ def code(text: object) -> Markup:
     return Markup(f"{fence}{pad}{shown}{pad}{fence}")
 
 
+def listing(text: str) -> Markup:
+    """Write text verbatim, of several lines."""
+    fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
+    return Markup(f"{fence}text\n{text.rstrip()}\n{fence}")
+
+
 def toned(value: Any, tone: Tone) -> Markup:
     """Write a highlighted value."""
     return Markup(f"{escaped(value)} {{{tone}}}" if tone in TONES else escaped(value))
@@ -198,7 +204,9 @@ def _environment(folder: Path, added: _Added) -> Environment:
         lstrip_blocks=True,
     )
     made.filters.update(_FILTERS)
-    made.globals.update(np=np, table=table, zip=zip, column=column, quoted=shlex.quote, **added.names)
+    made.globals.update(
+        np=np, listing=listing, said=said, table=table, zip=zip, column=column, quoted=shlex.quote, **added.names
+    )
     functions = {name: each for name, each in added.names.items() if callable(each)}
     made.filters.update(functions)
     made.tests.update(functions)
@@ -365,11 +373,20 @@ def _blocks(
             caption = _plain_line(node.text)
             yield Plot(f"{prefix}{node.name}", caption, pictures[node.name], caption)
         elif node.kind == "words":
+            title: SyntaxTreeNode | None = None
             for each in SyntaxTreeNode(_markdown().parse(node.text)).children:
+                if each.attrs.get("class") == "caption":
+                    title = each
+                    continue
                 for block in _blocks_of(each):
-                    if prefix and isinstance(block, Table):
-                        block = replace(block, name=f"{prefix}table-{next(numbers)}")
-                    yield block
+                    if isinstance(block, Table) and title is not None:
+                        name = str(title.attrs["id"]).removesuffix("-caption")
+                        yield replace(block, name=name, caption=_plain(title))
+                    elif isinstance(block, Table) and prefix:
+                        yield replace(block, name=f"{prefix}table-{next(numbers)}")
+                    else:
+                        yield block
+                title = None
 
 
 def _plain_line(text: str) -> str:
@@ -392,7 +409,7 @@ def _blocks_of(node: SyntaxTreeNode) -> Iterator[Block]:
     elif node.type == "table":
         yield _table(node)
     elif node.type in {"fence", "code_block"}:
-        yield Listing("", node.content)
+        yield Listing(node.content)
 
 
 def _items(node: SyntaxTreeNode) -> Iterator[Block]:

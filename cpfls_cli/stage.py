@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import (
     check_folder,
@@ -32,11 +32,8 @@ from cpfls_cli.artifacts.output import (
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
-from cpfls_cli.report.canvas import picture_of, pictures
-from cpfls_cli.report.content import Box, Heading, Section, Text
-from cpfls_cli.report.figure_tables import figure_html
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.outcome import Command, Outcome, caution_texts
+from cpfls_cli.report.canvas import figure_html, picture_of, pictures
+from cpfls_cli.report.content import Box, Command, Form, Heading, Outcome, Section, Text, caution_texts
 from cpfls_cli.report.source import Source, source_of_result
 from cpfls_cli.result import plain
 
@@ -78,28 +75,6 @@ class Filled:
     texts: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     kept: str = ""
     grows: bool = False
-
-
-@dataclass
-class Parts:
-    """A result in parts along its axis ``STREAMED``, of which no more than one is in memory.
-
-    What does not lie along it is that of the last part, which stands for the whole in what is said.
-
-    Attributes
-    ----------
-    rows : int
-        In all parts together.
-    """
-
-    parts: Iterator[Any]
-    rows: int
-    last: Any = None
-
-    def __iter__(self) -> Iterator[Any]:
-        for part in self.parts:
-            self.last = part
-            yield part
 
 
 @dataclass
@@ -224,7 +199,7 @@ class Stage:
     Attributes
     ----------
     function : callable
-        Takes a `Run` and what its command line says. It gives a result, or its `Parts`; or, of a stage that fills a
+        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a
         folder, results by name, with a page each; or None in a dry run; or the outcome of a command that goes on.
     kind : type
         Class of the result.
@@ -324,18 +299,13 @@ class Stage:
                 return _would(run, self)
             if isinstance(found, Outcome):
                 return found
-            streamed = isinstance(found, Parts)
-            if isinstance(found, Parts):
-                # What there is to say is known behind the last part.
-                store.write_parts(run.output, found, found.rows, run.origin(self.name))
-                found = found.last
             results = dict(found) if self.folder else {"": found}
             if self.fills and run.writes:
                 run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
-            if run.writes and not streamed and (self.fills or hasattr(self.kind, "FORMAT")):
+            if run.writes and (self.fills or hasattr(self.kind, "FORMAT")):
                 self._write(run, run.output, results)
             elif not run.dry_run:
                 write_files(run.texts)
@@ -402,7 +372,10 @@ class Stage:
         held = {name: each for name, each in results.items() if each is not None}
         for name, each in held.items():
             store.require_sound(output / f"{name}.h5", each)
-        with filled_folder(output, self._names(fills)) as folder:
+        for path in run.texts:
+            refuse_inputs(path, run.inputs)
+        with filled_folder(output, [*self._names(fills), *(path.name for path in run.texts)]) as folder:
+            write_files({folder / path.name: text for path, text in run.texts.items()})
             for name, each in held.items():
                 stage, before = parts[name]
                 origin = run.origin(stage, name)

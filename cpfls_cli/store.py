@@ -19,9 +19,8 @@ import h5py
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.gate import Origin as Origin
-from cpfls_cli.artifacts.gate import dataset_of, held_format, identified, opened_file
+from cpfls_cli.artifacts.gate import dataset_of, held_format, identified, opened_file, stage_module
 from cpfls_cli.artifacts.gate import format_name as format_name
 from cpfls_cli.artifacts.gate import read_origin as read_origin
 from cpfls_cli.artifacts.output import sealed_output

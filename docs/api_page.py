@@ -14,8 +14,8 @@ import griffe
 
 ROOT = Path(__file__).parents[1]
 WIDTH = 120
-OTHERS = ("playback.motion.State", "artifacts.spec.DatasetSpec")
-"""Classes that no name of the interface stands for: what `Model.state` and `Artifact.about` give."""
+OTHERS = ("playback.motion.State", "artifacts.spec.DatasetSpec", "flights.prediction.AlongFlight")
+"""Classes that no name of the interface stands for: what `Model.state`, `Artifact.about` and `Model.predict` give."""
 
 HEAD = """\
 # The Python interface
@@ -37,8 +37,8 @@ model.to_c("vehicle.c")
 ```
 
 Arrays are of NumPy; `to_xarray` and `to_pandas` need the extra `notebook`. What a command would note on standard error
-is a Python warning. Figures show themselves after `%matplotlib inline`. `predict` and `replay` give what the commands
-write, byte by byte where linear algebra has one thread (`OPENBLAS_NUM_THREADS=1`), as the commands give it.
+is a Python warning. Figures show themselves after `%matplotlib inline`. `replay` gives what the command writes,
+byte by byte where linear algebra has one thread (`OPENBLAS_NUM_THREADS=1`).
 
 The names below are kept: one is renamed or removed in a major version alone, and a test lists them. All else in the
 package may change with any version. This page is printed from the docstrings by `make docs/api.md`.

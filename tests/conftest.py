@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import sys
 
 import pytest
 from hypothesis import settings
@@ -11,6 +12,10 @@ from tests.builders import command_line, compiled_loops
 
 # A shell without job control has what it starts in the background ignore interrupts, and all that this starts in turn.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Two workers and hundreds of processes import the same modules: they are compiled once, whatever the environment says.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # What is written is read on the same machine: waiting for its disk takes ten ms a file, and no test asks for it.
 os.fsync = lambda _: None

@@ -23,9 +23,9 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.identification.scores import MODEL, TRAINING
-from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 

@@ -15,10 +15,10 @@ from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColu
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting, Sweep, spread
-from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 

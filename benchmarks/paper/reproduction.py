@@ -41,12 +41,16 @@ from benchmarks.paper.search_claims import (
     TYPICAL_CONDITION_CLAIM,
     TYPICAL_ERRORS_CLAIM,
 )
+from cpfls_cli.flights.flight import MOTION
+from cpfls_cli.flights.prediction import AlongFlight
 from cpfls_cli.fuzzy.inputs import seesaw
 from cpfls_cli.fuzzy.membership import breakpoints
-from cpfls_cli.identification.scores import MODEL, TRAINING
-from cpfls_cli.report.canvas import line, plot, style_of
+from cpfls_cli.identification.scores import AXES, MODEL, TRAINING
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.report.source import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,6 +101,7 @@ def reproduction_section(sources: PaperSources) -> Section:
         _rules(),
         _figures(compared_figures(sources)),
         seesaw_figure("figure-1-seesaw"),
+        *(_error_figure("figure-7-error", *own) for own in _along_own_flights(sources)[:1]),
     ]
     return Section("reproduction", "Reproduction of the paper", blocks)
 
@@ -285,21 +290,40 @@ def partitions_compared() -> ComparedFigure:
     return ComparedFigure("6: partitions", printed, ours, _reading(agrees), why)
 
 
+def _along_own_flights(sources: PaperSources) -> list[tuple[Source, Source]]:
+    """List models with the flights that they learned from, where both are given."""
+    pairs = ((model, sources.by_hash(model.made_from("flight"))) for model in sources.models)
+    return [(model, flight) for model, flight in pairs if flight is not None]
+
+
 def _error_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 7: the torque error."""
     title, printed = "7: torque error", "below 10 % of the torque along the training path"
-    shown = [
-        model
-        for prediction in sources.predictions
-        for model in sources.models
-        if model.sha256 == prediction.made_from("model") and model.made_from("flight") == prediction.made_from("flight")
-    ]
+    shown = _along_own_flights(sources)
     if not shown:
-        return _not_shown(title, printed, "Missing: a prediction along the flight that its model learned from.")
-    largest, axis = shown[0].record.judged.worst(MODEL, TRAINING)
+        return _not_shown(title, printed, "Missing: a model and the flight that it learned from.")
+    largest, axis = shown[0][0].record.judged.worst(MODEL, TRAINING)
     agrees = largest < PRINTED_RELATIVE_ERROR
     why = "Relative to the largest torque of each axis; the absolute errors belong to torques of other sizes."
     return ComparedFigure(title, printed, f"at most {percent(largest, 2)} ({axis})", _agreement(agrees), why)
+
+
+def _error_figure(name: str, model: Source, flight: Source) -> Plot:
+    """Draw Figure 7: the torque error of a model along a flight."""
+    own = flight.record
+    motion = Motion(*(own.signals[each] for each in MOTION))
+    error = AlongFlight.of(model.record.functions, own.time, motion, own.torque, None).error
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(AXES))
+        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
+            line(axes, own.time, error[:, index], **style_of(0))
+            axes.set_title(f"error on {axis}")
+            axes.set_ylabel("N m")
+        panels[-1].set_xlabel("time, s")
+
+    caption = f"Figure 7. Torque error (flight minus model) of {model.label} along {flight.label}."
+    return plot(name, caption, "Torque error on roll, pitch and yaw over time", 4.6, draw)
 
 
 def seesaw_figure(name: str) -> Plot:

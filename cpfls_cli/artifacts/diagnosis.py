@@ -24,6 +24,7 @@ from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
+from cpfls_cli.simulators.results import Corrected
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
@@ -72,6 +73,8 @@ class Diagnosis(Conclusion):
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
     learned: tuple[LearnedFlight, ...] = part((), brief=False)
     """Flights that its base learned from."""
+    corrected: Corrected | None = part(None)
+    """The simulator's file that its vehicle is from, with what was found put into it."""
 
     @classmethod
     def of(

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
+from keyword import iskeyword
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
-from cpfls_cli.artifacts.formats import stage_module
 from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, InputFile
 from cpfls_cli.errors import InputError, NotAnArtifactError
@@ -107,7 +108,7 @@ _MAKERS = {
     "flight": "simulate` or `cpfls import",
     "twin": "simulate",
     "selection": "reduce",
-    "prediction": "predict",
+    "prediction": "replay",
     "gains": "tune",
     "disagreement": "compare",
     "diagnosis": "diagnose",
@@ -174,6 +175,19 @@ def origin_of(file: h5py.File) -> Origin:
         cautions=tuple(str(file.attrs["cautions"]).splitlines()),
         version=str(file.attrs["cpfls_version"]),
     )
+
+
+def stage_module(attributes: Mapping[str, Any]) -> str:
+    """Name the module of the stage that made a file, by its root attributes; empty where it holds no result.
+
+    A module ends in a line where Python has the word of its command; one with a line before its name is no command:
+    other stages keep what it makes.
+    """
+    module = str(attributes.get("stage", "")).replace("-", "_")
+    module += "_" * iskeyword(module)
+    names = (module, f"_{module}") if re.fullmatch(r"[a-z]\w*", module) else ()
+    folder = Path(__file__).parents[1] / "stages"
+    return next((name for name in names if (folder / f"{name}.py").is_file()), "")
 
 
 class Known(NamedTuple):

@@ -57,6 +57,8 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
     """
     kind = _kind(given[0])
     if kind not in ("log", "artifact"):
+        if kind is None and command != "gap" and given[0].is_file():
+            _refuse_simulator_file(given[0])
         return
     what = "a log" if kind == "log" else f"a {_format(given[0])}"
     config = next((path for path in given if _kind(path) == "config"), None)
@@ -66,6 +68,14 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
         raise ConfigError(f"{given[0]}: is {what}, and the config comes first: {shlex.join(words)}")
     made = f"`cpfls init {shlex.quote(str(given[0]))} -o study.yaml` writes one for it, and " if kind == "log" else ""
     raise ConfigError(f"{given[0]}: is {what}, not a config (YAML); {made}`cpfls config` prints a commented default")
+
+
+def _refuse_simulator_file(path: Path) -> None:
+    from cpfls_cli.simulators.formats import is_simulator_file
+
+    if is_simulator_file(path):
+        made = shlex.join(["cpfls", "init", "--from", str(path), "-o", "study.yaml"])
+        raise ConfigError(f"{path}: is a simulator's file, not a config (YAML); `{made}` writes one of it")
 
 
 def what_it_is(path: Path) -> str | None:

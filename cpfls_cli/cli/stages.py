@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 STAGES = Path(__file__).parents[1] / "stages"
 ORDER = (
-    *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle", "predict"),
+    *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle"),
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
     *("spread", "info", "check", "config", "effects"),
 )

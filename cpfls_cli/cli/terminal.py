@@ -24,8 +24,7 @@ from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError, visible
 from cpfls_cli.words import broken
 
 if TYPE_CHECKING:
-    from cpfls_cli.report.content import Text
-    from cpfls_cli.report.outcome import Outcome
+    from cpfls_cli.report.content import Outcome, Text
 
 _BAR_WIDTH = 20
 _TELLING = ("diagnosis", "changed", "trend")
@@ -100,8 +99,7 @@ def _show_notes(outcome: Outcome, common: Common) -> None:
 
 def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     """Write an answer, the commands that go on with it, and what more of it there is."""
-    from cpfls_cli.report.content import Text
-    from cpfls_cli.report.outcome import command_line
+    from cpfls_cli.report.content import Text, command_line
     from cpfls_cli.report.terminal import folded_words, terminal_lines
 
     width = _columns()

@@ -173,6 +173,12 @@ class Effect:
         return not self.coefficients
 
     @property
+    def follows_state(self) -> bool:
+        """Whether it acts at an instant on what free runs know: air velocity, body rate and rotors."""
+        elsewhere = self.carried is not None or self.rate_derivative or self.needs & {"height", "attitude"}
+        return self.acts is not None and not elsewhere
+
+    @property
     def is_lag(self) -> bool:
         """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
         if self.actuation is None:
@@ -246,16 +252,6 @@ def hub_wrench(hubs: Array, force: Array) -> Array:
     `hubs`: shape (rotor, 3), m; `force`: shape (time, rotor, 3), N; Result: shape (time, 6).
     """
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
-
-
-def thrust_wrench(hubs: Array, thrust: Array) -> Array:
-    """Sum changes of thrust along body z to a wrench, shape (time, 6).
-
-    `hubs`: shape (rotor, 3), m; `thrust`: shape (time, rotor), N.
-    """
-    force = np.zeros((*thrust.shape, 3))
-    force[..., 2] = thrust
-    return hub_wrench(hubs, force)
 
 
 def wrench_change(before: Signals, after: Signals) -> Columns:

@@ -6,10 +6,9 @@ Polynomials are numbers that the vehicle is evaluated with (`cpfls_cli.vehicle.v
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import combinations_with_replacement, product
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS
-from cpfls_cli.vehicle.values import Each, Functions, Value, Vector
+from cpfls_cli.vehicle.values import Each, Functions, NoPolynomialError, Polynomial, Value, Vector
 
 _AXES = "uvwpqr"
 _PAIRS = (
@@ -32,65 +31,6 @@ _SIGNED = (*(("|u|", axis) for axis in "uvw"), *((f"|{axis}|", axis) for axis in
 TERMS = (*(tuple(each) for each in _PRODUCTS), *_SIGNED)
 """Factors of each term of the motion: air velocity u v w, of the length |u|, and body rate p q r."""
 _PLACES = {tuple(sorted(factors)): place for place, factors in enumerate(TERMS)}
-
-
-class NoPolynomialError(Exception):
-    """Raised where something is no sum of weights."""
-
-
-class Polynomial:
-    """A sum of products of symbols: a coefficient by the sorted names of its factors."""
-
-    __slots__ = ("terms",)
-    __array_ufunc__ = None
-
-    def __init__(self, terms: Mapping[tuple[str, ...], float]) -> None:
-        self.terms = terms
-
-    def __add__(self, other: Value) -> Any:
-        if isinstance(other, Each):
-            return NotImplemented
-        total = dict(self.terms)
-        for factors, value in _terms(other).items():
-            total[factors] = total.get(factors, 0.0) + value
-        return Polynomial(total)
-
-    def __mul__(self, other: Value) -> Any:
-        if isinstance(other, Each):
-            return NotImplemented
-        total: dict[tuple[str, ...], float] = {}
-        for (a, x), (b, y) in product(self.terms.items(), _terms(other).items()):
-            factors = tuple(sorted(a + b))
-            total[factors] = total.get(factors, 0.0) + x * y
-        return Polynomial(total)
-
-    def __neg__(self) -> Polynomial:
-        return Polynomial({factors: -value for factors, value in self.terms.items()})
-
-    def __sub__(self, other: Value) -> Any:
-        return NotImplemented if isinstance(other, Each) else self + -other
-
-    def __rsub__(self, other: Value) -> Any:
-        return -self + other
-
-    def __truediv__(self, other: Value) -> Any:
-        if not isinstance(other, (int, float)):
-            raise NoPolynomialError
-        return self * (1 / other)
-
-    def __pow__(self, power: float) -> Any:
-        if power not in (1, 2, 3):
-            raise NoPolynomialError
-        return math.prod([self] * (int(power) - 1), start=self)
-
-    def _refused(self, _other: Value) -> Any:
-        raise NoPolynomialError
-
-    __radd__, __rmul__, __rtruediv__, __lt__, __gt__ = __add__, __mul__, _refused, _refused, _refused
-
-
-def _terms(x: Value) -> Mapping[tuple[str, ...], float]:
-    return x.terms if isinstance(x, Polynomial) else {(): float(x)}
 
 
 def _root(x: Value) -> Value:
@@ -120,7 +60,7 @@ _FUNCTIONS = Functions(
 
 
 def _symbols(names: Iterable[str]) -> tuple[Polynomial, ...]:
-    return tuple(Polynomial({(name,): 1.0}) for name in names)
+    return tuple(map(Polynomial.number, names))
 
 
 @cache
@@ -156,7 +96,7 @@ def _is_polynomial(one: Acting, vehicle: VehicleSettings, motion: Sequence[Value
 def _weighed(wrench: Vector, rotors: int) -> Array:
     weights, of_rotors = np.zeros((6, len(TERMS), 1 + 4 * rotors)), _of_rotors(rotors)
     for row, component in zip(weights, wrench, strict=True):
-        for factors, value in _terms(component).items():
+        for factors, value in Polynomial.of(component).terms.items():
             moving = tuple(each for each in factors if each in _MOVING)
             turning = tuple(each for each in factors if each not in _MOVING)
             if value and not (moving in _PLACES and turning in of_rotors):

@@ -38,7 +38,6 @@ from cpfls_cli.result import described_fields
 from cpfls_cli.simulation.twin import Twin
 from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
 from cpfls_cli.units import known_unit
-from cpfls_cli.validation.prediction import AlongFlight
 
 _ASKED = "setpoint_"
 _FRAMES = {"body": BODY, "angles": EULER, "world": WORLD}
@@ -137,36 +136,6 @@ def _of_flight(title: str, given: Flight, study: Study) -> View:
         stamps=_stamps(study),
         on_log_clock=bool(np.isfinite(given.begins)),
     )
-
-
-def _of_prediction(title: str, record: AlongFlight, study: Study) -> View:
-    time = _log_time(record.time, record.begins_s)
-    force = None if record.force is None or record.measured_force is None else record.measured_force - record.force
-    held: dict[str, dict[str, Array | None]] = {
-        "torque": {
-            MEASURED: record.measured_torque,
-            MODEL: record.torque,
-            DIFFERENCE: record.error,
-            "low": record.torque_low,
-            "high": record.torque_high,
-        },
-        "body_torque": {MODEL: record.body_torque},
-        "force": {MEASURED: record.measured_force, MODEL: record.force, DIFFERENCE: force},
-        "attitude": {MEASURED: record.attitude},
-        "extrapolates": {MODEL: record.extrapolates.astype(float)},
-    }
-    abouts = {own.name: own.about for own in described_fields(AlongFlight)}
-    tracks = []
-    for name, values in held.items():
-        known = {what: own for what, own in values.items() if own is not None}
-        own = abouts[name]
-        if known and own is not None:
-            spec = DatasetSpec(name, own.axes, own.unit, own.frame, own.text)
-            axes = _axes(spec, next(iter(known.values())))
-            words = {"unit": own.unit, "frame": own.frame, "description": own.text}
-            name = "outside" if name == "extrapolates" else name
-            tracks.append(Track(name=name, time=time, values=known, axes=axes, **words))
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=bool(np.isfinite(record.begins_s)))
 
 
 def _of_replay(title: str, given: Playback, study: Study) -> View:
@@ -362,7 +331,6 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
 
 _KINDS: dict[Any, Callable[[str, Any, Study], View]] = {
     Flight: _of_flight,
-    AlongFlight: _of_prediction,
     Playback: _of_replay,
     Disagreement: _of_disagreement,
     Diagnosis: _of_diagnosis,

@@ -1,5 +1,6 @@
 """Zero-phase low-pass filter and time derivative of uniformly sampled signals, and body rates from an attitude."""
 
+from functools import cache
 from math import ceil
 
 import numpy as np
@@ -24,12 +25,20 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
         return values
     if cutoff_hz >= rate_hz / 2:
         raise SettingError("lowpass_hz", f"is not below half of the log's rate, {rate_hz / 2:.4g} Hz")
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     # Turned about its ends, so that level and slope go on while the filter settles.
     padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))
-    sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    sections = _sections(order, cutoff_hz, rate_hz)
     return np.asarray(sosfiltfilt(sections, values.astype(float), axis=0, padlen=padding))
+
+
+@cache
+def _sections(order: int, cutoff_hz: float, rate_hz: float) -> Array:
+    """Design a filter once: a log asks hundreds of times for the same, and filtering takes less time than designing."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 def derivative(time: Array, values: Array) -> Array:

@@ -2,51 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import read_origin
-from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import ENOUGH
 from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.flight import MOTION, Flight, require_signals
 from cpfls_cli.flights.recordings import (
     ReadFlight,
-    all_known,
     check_flight,
-    doubts_on_voltage,
-    full_battery,
-    in_volts,
-    longest_known,
     read_flight,
-    signals_of,
     units_of,
 )
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.store import IN_MEMORY, check_rows, count_rows, held_rows, read, read_first, read_rows
+from cpfls_cli.store import IN_MEMORY, check_rows, count_rows, held_rows, read, read_rows
 
 _NEEDED = ("time", *MOTION)
 _TORQUE = "torque"
 _ROTORS = ("rotor-speed", "rotor-command")
-
-STRETCH = 12 * PART
-"""Samples that effects are evaluated on at once, some 2 kB each; whole parts of an artifact."""
-
-_OVERLAP_S = 10.0
-"""What splines, filters and lags remember is far shorter, and a load on a cable finds its swing in two periods."""
 
 
 @dataclass(frozen=True)
@@ -126,103 +110,6 @@ def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
     return source[samples]
 
 
-class FlightStretch(NamedTuple):
-    """Consecutive samples of a flight, with those before and after that they are evaluated with.
-
-    Attributes
-    ----------
-    signals : Signals
-    known : mapping of str to array
-        What was read, by the names of a flight's datasets.
-    own : slice
-        Samples without those of the stretches before and after.
-    """
-
-    signals: Signals
-    known: Mapping[str, Array]
-    own: slice
-
-
-@dataclass(frozen=True)
-class FlightStretches:
-    """The longest part of a flight in which all is known, cut into stretches for the evaluation of effects.
-
-    Attributes
-    ----------
-    name : str
-    rows : callable
-        Reads all signals, by name, from a first row to the one before another.
-    units : mapping of str to str
-        Of the import.
-    known : slice
-        Rows of the flight.
-    overlap : int
-        Samples of a stretch that belong to the one before it, and to the one after it.
-    full : float
-        Voltage of the full battery, V; 0 where the flight states a share.
-    warnings : tuple of str
-    study : Study
-    begins : float
-        Stamp of the log's own clock at time 0, s; NaN where there is none.
-    """
-
-    name: str
-    rows: Callable[[int, int], Mapping[str, Array]]
-    units: Mapping[str, str]
-    known: slice
-    overlap: int
-    full: float
-    warnings: tuple[str, ...]
-    study: Study
-    begins: float
-
-    def __len__(self) -> int:
-        """Count the samples."""
-        return int(self.known.stop - self.known.start)
-
-    def __iter__(self) -> Iterator[FlightStretch]:
-        """Read one stretch after the other."""
-        first, stop = self.known.start, self.known.stop
-        for start in range(first, stop, STRETCH):
-            end = min(start + STRETCH, stop)
-            low, high = max(first, start - self.overlap), min(stop, end + self.overlap)
-            known = self.rows(low, high)
-            signals, _ = signals_of(ReadFlight(self.name, known, self.units, ()), known, self.study)
-            if self.full and signals.voltage is not None:
-                signals = replace(signals, voltage=signals.voltage / self.full)
-            yield FlightStretch(signals, known, slice(start - low, end - low))
-
-
-def flight_stretches(path: Path, study: Study) -> FlightStretches:
-    """Open a flight or import a log in stretches; one of more than `IN_MEMORY` samples stays in its file."""
-    samples = None if is_log(path) else count_rows(path, Flight, "time")
-    if samples is None or samples <= IN_MEMORY:
-        flight = read_flight(path, study)
-        rows, samples = partial(_rows_of, flight.signals), len(flight.signals["time"])
-    else:
-        units = units_of(path, read_origin(path), study)
-        flight = ReadFlight(path.name, {}, units, (), begins=read_first(path, Flight)[0].begins)
-        names = held_rows(path, Flight)
-        check_rows(path, Flight, names)
-        rows = partial(_rows_in, path, names)
-    volts = in_volts(flight.units)
-    known, time, voltage = [], [], []
-    for start in range(0, max(samples, 1), CHUNK):
-        read = rows(start, min(start + CHUNK, samples))
-        known.append(all_known(read))
-        time.append(read["time"])
-        voltage.append(read.get("voltage", np.zeros(0)))
-    clock = np.concatenate(time)
-    best, notes = longest_known(path.name, np.concatenate(known), clock)
-    battery = np.concatenate(voltage)[best]
-    full = float(np.max(battery, initial=0.0)) if volts else 0.0
-    doubts = doubts_on_voltage({"voltage": battery}, flight.units)
-    notes = (*notes, *doubts, *([full_battery(full)] if full and not doubts else []))
-    overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
-    about = ((*flight.warnings, *notes), study, flight.begins)
-    return FlightStretches(path.name, rows, flight.units, best, overlap, full, *about)
-
-
 def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:
     """Hold a flight against itself, its middle where it stays in its file; nothing of a flight of another vehicle.
 
@@ -250,10 +137,6 @@ def _enough_of(path: Path, study: Study) -> ReadFlight:
     names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
     units = units_of(path, read_origin(path), study)
     return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
-
-
-def _rows_of(signals: Mapping[str, Array], start: int, stop: int) -> Mapping[str, Array]:
-    return {name: values[start:stop] for name, values in signals.items()}
 
 
 def _rows_in(path: Path, names: Sequence[str], start: int, stop: int) -> Mapping[str, Array]:

@@ -184,8 +184,8 @@ class Artifact(Mapping[str, Any]):
         """
         from cpfls_cli.config.study import ReportSettings
         from cpfls_cli.pages.page import sections_of
-        from cpfls_cli.pages.source import Sources
         from cpfls_cli.report.content import Plot, unfolded
+        from cpfls_cli.report.source import Sources
 
         sources = [one._source(str(index)) for index, one in enumerate((self, *others))]
         sections = sections_of(Sources(sources, sources[0].vehicle, ReportSettings()))

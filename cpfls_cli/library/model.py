@@ -1,4 +1,4 @@
-"""A model as an object: predictions and replays as the commands make them, single steps, and exports."""
+"""A model as an object: predictions, replays as the command makes them, single steps, and exports."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from cpfls_cli.config.study import Study
+    from cpfls_cli.flights.prediction import AlongFlight
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.playback.motion import State
     from cpfls_cli.playback.rotors import Hold
-    from cpfls_cli.report.outcome import Outcome
+    from cpfls_cli.report.content import Outcome
     from cpfls_cli.stage import Run
 
 
@@ -55,8 +56,8 @@ def load_model(path: str | os.PathLike[str], config: str | os.PathLike[str] | No
     path : str or path
         Made by ``cpfls identify``, ``extend``, ``gap`` or ``vehicle``.
     config : str or path, optional
-        Config of the flights that it is held against, as ``cpfls predict`` and ``cpfls replay`` take one; without it
-        the one that made the model.
+        Config of the flights that it is held against, as ``cpfls replay`` takes one; without it the one that made
+        the model.
 
     Raises
     ------
@@ -115,8 +116,8 @@ class Model:
             return partial(self.export, form=name.removeprefix("to_"))
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
 
-    def predict(self, flight: str | os.PathLike[str] | Artifact) -> Artifact:
-        """Predict torque and inertia along a flight, of a whole vehicle force as well, as ``cpfls predict`` does.
+    def predict(self, flight: str | os.PathLike[str] | Artifact) -> AlongFlight:
+        """Predict torque and inertia along a flight, of a whole vehicle force as well.
 
         Parameters
         ----------
@@ -125,10 +126,15 @@ class Model:
 
         Returns
         -------
-        Artifact
-            Of the format ``cpfls/prediction``, in memory.
+        AlongFlight
+            Arrays by name: of the model, and what was measured.
         """
-        return self._of_stage("predict", model=self._file("predict"), flight=_path_of(flight))
+        from cpfls_cli.flights.prediction import along_flight
+
+        found, noted = along_flight(self._file("predict"), _path_of(flight), self._study)
+        for each in noted:
+            warnings.warn(each, stacklevel=2)
+        return found
 
     def replay(
         self,
@@ -160,11 +166,17 @@ class Model:
         """
         if not flights:
             raise InputError("replay needs at least one flight")
-        from cpfls_cli.arguments import Between
+        from tempfile import TemporaryDirectory
 
-        given = {"flights": [_path_of(flight) for flight in flights], "horizon": horizon_s, "every": every}
-        between = None if hold is None else Between(hold)
-        return self._of_stage("replay", model=self._path, hold=between, history=history_s, **given)
+        from cpfls_cli.arguments import Between
+        from cpfls_cli.stages.replay import replay
+
+        given: dict[str, Any] = {"flights": [_path_of(flight) for flight in flights], "every": every}
+        given |= {"horizon": horizon_s, "history": history_s, "hold": None if hold is None else Between(hold)}
+        with TemporaryDirectory(prefix="cpfls-") as folder:
+            output = Path(folder, "artifact.h5")
+            _warn(replay.run(self._run(output, force=False), model=self._path, **given), 3)
+            return _read(output)
 
     def state(
         self,
@@ -309,8 +321,8 @@ class Model:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
         model = modelled(self._path, record)
-        if model.beside_table:
-            parts = ", ".join(model.beside_table)
+        if model.unsimulated:
+            parts = ", ".join(model.unsimulated)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")
         return model
 
@@ -322,17 +334,6 @@ class Model:
         if self.artifact is None:
             raise InputError(f"{task} needs a model that a command found; a stated vehicle takes replay, step and fly")
         return self._path
-
-    def _of_stage(self, name: str, **given: Any) -> Artifact:
-        """Run a stage, and keep in memory what it writes."""
-        from tempfile import TemporaryDirectory
-
-        from cpfls_cli.stage import loaded
-
-        with TemporaryDirectory(prefix="cpfls-") as folder:
-            output = Path(folder, "artifact.h5")
-            _warn(loaded(name).run(self._run(output, force=False), **given), 4)
-            return _read(output)
 
     def _run(self, output: Path, force: bool) -> Run:
         from cpfls_cli.stage import Run

@@ -16,10 +16,9 @@ from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.load import flat_keys
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING
-from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import model_words, trust_words
-from cpfls_cli.report.content import Cell, Facts, Section, Table, Tone
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, number, percent, r_squared
+from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.validate import Curves
 from cpfls_cli.words import joined
@@ -230,38 +229,20 @@ def _short(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
-def compared_vehicles_section(sources: Sources) -> Section | None:
-    """Set the constants of several vehicles side by side; None for fewer than two."""
-    vehicles = sources.vehicles
-    if len(vehicles) < 2:
-        return None
-    rows: list[list[str | Cell]] = []
+def compared_constants(
+    vehicles: Sequence[Source[Vehicle]],
+) -> Iterator[tuple[Parameter, bool, list[str]]]:
+    """Give each constant of several vehicles, whether two of its values lie apart, and all of them in words."""
     for constants in _constants(vehicles):
         known = [each for each in constants if each is not None]
-        apart = _apart(known)
-        tone: Tone = "warning" if apart else "plain"
-        values = [Cell(_with_interval(each), tone) for each in constants]
-        rows.append([f"{known[0].name}, {known[0].unit}", *values, BEYOND if apart else ""])
-    header = ("Constant", *(vehicle.label for vehicle in vehicles), "Differ")
-    caption = (
-        "Constants with 95 % intervals; in brackets what the flights do not tell. Marked where two of them lie beyond "
-        "the intervals of both."
-    )
-    columns = frozenset(range(len(header)))
-    table = Table("vehicles-compared", caption, header, rows, columns, columns - {0})
-    return Section("vehicles", "The vehicles side by side", [_judged(vehicles), table])
+        yield known[0], _apart(known), list(map(_with_interval, constants))
 
 
 def differing(sources: Sources) -> tuple[str, ...] | None:
     """Name the constants of vehicles that differ beyond their intervals; None of fewer than two vehicles."""
     if len(sources.vehicles) < 2:
         return None
-    listed = ([each for each in constants if each is not None] for constants in _constants(sources.vehicles))
-    return tuple(known[0].name for known in listed if _apart(known))
-
-
-def _judged(models: Sequence[Source[Any]]) -> Facts:
-    return Facts([(model.label, model_words(model.record).sentence) for model in models])
+    return tuple(own.name for own, apart, _ in compared_constants(sources.vehicles) if apart)
 
 
 def _constants(vehicles: Sequence[Source[Vehicle]]) -> Iterator[list[Parameter | None]]:

@@ -29,10 +29,6 @@ _NUMBERS = {
 }
 
 
-_ROUNDED = 0.01
-"""What rounding of shares in whole per cent makes of a sum."""
-
-
 def effect_title(name: str) -> str:
     """Say what people call an effect."""
     return CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ")

@@ -23,8 +23,8 @@ from cpfls_cli.pages.identified_figures import (
     weight_words,
 )
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
-from cpfls_cli.pages.source import Source
 from cpfls_cli.report.numbers import ROUNDING, count, number, percent, printed, probability, r_squared, with_interval
+from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import at_most
 from cpfls_cli.validation.bands import band
 from cpfls_cli.validation.replay import StepErrors

@@ -15,7 +15,6 @@ from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY
 from cpfls_cli.pages.comparison import FLOOR_TICK, compared_curves, compared_parts
-from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
@@ -31,6 +30,7 @@ from cpfls_cli.report.canvas import (
     style_of,
 )
 from cpfls_cli.report.numbers import number, plain
+from cpfls_cli.report.source import Source
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.validate import Curves
 

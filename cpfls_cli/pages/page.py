@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
+from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from cpfls_cli import page
+from cpfls_cli.artifacts.diagnosis import Diagnosis
+from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight, Imported
-from cpfls_cli.pages.comparison import compared_vehicles_section
-from cpfls_cli.pages.identification import WORDS
+from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.comparison import BEYOND, compared_constants
+from cpfls_cli.pages.identification import WORDS as OF_IDENTIFIED
 from cpfls_cli.pages.identified_figures import COMPARED
 from cpfls_cli.pages.model import cautions_of
-from cpfls_cli.pages.provenance import missing, provenance_section, vehicle_section
-from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.report.canvas import pictures
+from cpfls_cli.pages.trust import model_words
+from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.report.canvas import figure_html, pictures
 from cpfls_cli.report.content import (
+    STRUCK,
     Block,
     Box,
     Facts,
     Folded,
+    Form,
     Heading,
     Listing,
     Plot,
@@ -33,10 +42,8 @@ from cpfls_cli.report.content import (
     Tone,
     unfolded,
 )
-from cpfls_cli.report.figure_tables import figure_html
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.json_page import json_page
-from cpfls_cli.report.source import Document
+from cpfls_cli.report.numbers import UNKNOWN, plain
+from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stage import stage_named
 
 
@@ -73,64 +80,121 @@ def _learned_without_noise(model: Source[IdentifiedModel], sources: Sources) -> 
     return not any((*settings["noise"].values(), *settings["relative_noise"].values()))
 
 
-def _compared_models(sources: Sources) -> Section | None:
-    """Compare identified models with each other; None for fewer than two."""
-    models = sources.models
-    if len(models) < 2:
-        return None
-    text = page.words("identify_compared", models, added=WORDS)
-    return Section(
-        "comparison",
-        "The models side by side",
-        page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-"),
-    )
+def _of_template(template: str, name: str, title: str, sources: Sources) -> Section:
+    """Make the section that a template words of all sources."""
+    return Section(name, title, page.blocks(page.words(f"report_{template}", sources, added=WORDS)))
 
 
-def _of_stage(name: str) -> Callable[[Sources], list[Section]]:
+def _compared_models(models: Sequence[Source[IdentifiedModel]]) -> Section:
+    """Compare identified models with each other."""
+    text = page.words("identify_compared", models, added=OF_IDENTIFIED)
+    blocks = page.blocks(text, pictures(COMPARED, "comparison-", models), "comparison-")
+    return Section("comparison", "The models side by side", blocks)
+
+
+def _of_stage(name: str, sources: Sources) -> list[Section]:
     """Make the sections of all results of a stage."""
+    own = [source for source in sources.all if source.stage == name]
+    shown = stage_named(name).together(own) if own else ()
+    several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
+    return [
+        stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
+        for number, source in enumerate(shown, start=1)
+    ]
 
-    def sections(sources: Sources) -> list[Section]:
-        own = [source for source in sources.all if source.stage == name]
-        shown = stage_named(name).together(own) if own else ()
-        several, elsewhere = len(shown) > 1, sources.answered if name == "extend" else ()
-        return [
-            stage_named(name).section(source, number, named=several, drawn=source.sha256 not in elsewhere)
-            for number, source in enumerate(shown, start=1)
-        ]
 
-    return sections
+_Lack = tuple[type, str, str]
+_LACKS: tuple[_Lack, ...] = (
+    (PlannedPath, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
+    (
+        Flight,
+        "Figure 4 and the quality of the flight",
+        "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
+    ),
+    (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
+    (IdentifiedModel, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
+)
+_GAP_LACKS: tuple[_Lack, ...] = (
+    (
+        Disagreement,
+        "where and when model and flights disagree",
+        "cpfls compare CONFIG FLIGHT... -o disagreement.h5",
+    ),
+    (Diagnosis, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
+    (Extended, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
+)
+_SHOWN = {"extended": "extended model"}
 
+
+def missing(sources: Sources) -> dict[str, str]:
+    """Name the formats of which no artifact was given.
+
+    Returns
+    -------
+    dict of str to str
+        One sentence by format, such as ``selection``: what is not shown, and the command that makes it.
+    """
+    listed = _wanted(sources)
+    lacking = {_word(kind): (shows, command) for kind, shows, command in listed if not sources.of_kind(kind)}
+    return {
+        word: f"Not shown, because no {_SHOWN.get(word, word)} was given: {shows}; made by: {command}."
+        for word, (shows, command) in lacking.items()
+    }
+
+
+def _wanted(sources: Sources) -> Iterator[_Lack]:
+    """List what a report of these artifacts could show: nobody who looks for a gap wants a training path."""
+    if not sources.only_gap:
+        yield from _LACKS
+    if sources.gap:
+        yield from _GAP_LACKS[:2]
+        if any(diagnosis.record.effects for diagnosis in sources.diagnoses):
+            yield _GAP_LACKS[2]
+
+
+def _word(wanted: Any) -> str:
+    return "model" if wanted is IdentifiedModel else str(wanted.FORMAT).removeprefix("cpfls/")
+
+
+def _vehicle_rows(sources: Sources) -> Iterator[tuple[str, str]]:
+    vehicle = sources.vehicle
+    yield "gravity g, m/s²", plain(vehicle.gravity_m_s2)
+    yield "mass m, kg", plain(vehicle.mass_kg)
+    yield "rotors", str(len(vehicle.rotors))
+    yield "arm l, m", _range([float(np.hypot(*rotor.position_m[:2])) for rotor in vehicle.rotors])
+    yield "thrust factor k, N s²", _range([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
+    yield "drag factor b, N m s²", _range([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors])
+    for name, moment in zip(INERTIA_PARAMETERS, vehicle.inertia_kg_m2, strict=False):
+        yield f"{name}, kg m²", plain(moment)
+    if not sources.only_gap:
+        times = [source.record.time for source in sources.flights or sources.trajectories]
+        durations = [float(time[-1] - time[0]) for time in times if len(time)]
+        yield "flight time T, s", _range(durations) if times else UNKNOWN
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (plain(float(f"{value:.4g}")) for value in (min(values), max(values)))
+    return low if low == high else f"{low} … {high}"
+
+
+WORDS: Mapping[str, Any] = {
+    "BEYOND": BEYOND,
+    "compared_constants": compared_constants,
+    "model_words": model_words,
+    "vehicle_rows": _vehicle_rows,
+}
+"""What templates of several artifacts know."""
 
 _EXACT = (
     "The flight is simulated without noise by a rigid body, so six inertia parameters reproduce it up to rounding. No "
     "fuzzy model can beat that here; the row measures how close it comes."
 )
 _HASH_SHOWN = 12
-_SECTIONS: Sequence[Callable[[Sources], Section | list[Section] | None]] = (
-    _summary_section,
-    _compared_models,
-    _of_stage("identify"),
-    _of_stage("diagnose"),
-    _of_stage("extend"),
-    compared_vehicles_section,
-    _of_stage("vehicle"),
-    _of_stage("compare"),
-    vehicle_section,
-    _of_stage("trajectory"),
-    _of_stage("simulate"),
-    _of_stage("import"),
-    _of_stage("reduce"),
-    _of_stage("sweep"),
-    _of_stage("predict"),
-    _of_stage("twin"),
-    _of_stage("response"),
-    _of_stage("tune"),
-    _of_stage("replay"),
-    _of_stage("trend"),
-    _of_stage("changed"),
-    _of_stage("_flight_numbers"),
-    provenance_section,
+_ORDER = (
+    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce", "sweep"),
+    *("twin", "response", "tune", "replay", "trend", "changed"),
 )
+"""Stages whose results a report shows, answers first; what it does not name comes last."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +210,19 @@ class Page:
 
 def sections_of(sources: Sources) -> list[Section]:
     """List what there is to say of artifacts, section by section."""
-    made = (make(sources) for make in _SECTIONS)
-    return [each for own in made if own for each in (own if isinstance(own, list) else [own])]
+    made = [_summary_section(sources)]
+    if len(sources.models) > 1:
+        made.append(_compared_models(sources.models))
+    of_stages = {
+        name: _of_stage(name, sources) for name in dict.fromkeys((*_ORDER, *(own.stage for own in sources.all)))
+    }
+    for name, sections in of_stages.items():
+        if name == "vehicle" and len(sources.vehicles) > 1:
+            made.append(_of_template("vehicles", "vehicles", "The vehicles side by side", sources))
+        made += sections
+        if name == "compare":
+            made.append(_of_template("stated_vehicle", "stated-vehicle", "Vehicle", sources))
+    return [*made, _of_template("provenance", "provenance", "Provenance", sources)]
 
 
 def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
@@ -158,7 +233,7 @@ def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
 def page_of(sources: Sources, sections: Sequence[Section], version: str, form: Form = Form.HTML) -> Page:
     """Write sections about artifacts as one page: those of `sections_of`, and what a study adds of its own."""
     return Page(
-        text=written(Document(sources.title, version, sections, sources.all), form),
+        text=written(sources.title, version, sections, sources.all, form),
         sections=tuple(section.name for section in sections),
         figures=tuple(name for section in sections for name in section.plots),
         tables=tuple(name for section in sections for name in section.tables),
@@ -166,20 +241,25 @@ def page_of(sources: Sources, sections: Sequence[Section], version: str, form: F
     )
 
 
-def written(document: Document, form: Form) -> str:
+def written(title: str, version: str, sections: Sequence[Section], origins: Sequence[Source], form: Form) -> str:
     """Write a report in a form."""
     if form is Form.JSON:
-        return json_page(document)
-    files = ", ".join(f"{page.escaped(each.label)} {page.code(each.sha256[:_HASH_SHOWN])}" for each in document.origins)
-    parts = [f"# {page.escaped(document.title)}", f"Made by cpfls {page.escaped(document.version)} from {files}."]
-    for section in document.sections:
+        listed = [
+            {"name": section.name, "title": section.title, "blocks": list(map(_block, section.blocks))}
+            for section in sections
+        ]
+        whole = {"title": title, "cpfls_version": version, "sections": listed, "artifacts": list(map(_origin, origins))}
+        return json.dumps(whole, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+    files = ", ".join(f"{page.escaped(each.label)} {page.code(each.sha256[:_HASH_SHOWN])}" for each in origins)
+    parts = [f"# {page.escaped(title)}", f"Made by cpfls {page.escaped(version)} from {files}."]
+    for section in sections:
         parts += [f"## {page.escaped(section.title)} {{#{section.name}}}", *_words(section.blocks)]
     text = "\n\n".join(parts)
     if form is Form.MARKDOWN:
         return page.markdown(text)
-    shown = (block for section in document.sections for block in unfolded(section.blocks))
+    shown = (block for section in sections for block in unfolded(section.blocks))
     figures = {block.name: partial(figure_html, block.picture) for block in shown if isinstance(block, Plot)}
-    return page.html(document.title, text, figures)
+    return page.html(title, text, figures)
 
 
 def _words(blocks: Iterable[Block]) -> Iterator[str]:
@@ -200,9 +280,7 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
                 more = f" [{page.said(block.see[1])}](#{block.see[0]})" if block.see else ""
                 yield f"![{page.said(block.caption)}{more}]({block.name})"
             case Listing():
-                fence = "`" * max(3, 1 + max(map(len, re.findall("`+", block.text)), default=0))
-                yield f"::: {page.said(block.summary)}{' {open wide}' if block.shown else ''}"
-                yield f"{fence}text\n{block.text.rstrip()}\n{fence}\n:::"
+                yield page.listing(block.text)
             case Folded():
                 yield f"::: {page.said(block.summary)}{' {open wide}' if block.shown else ''}"
                 yield from _words(block.blocks)
@@ -216,3 +294,57 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
 def _toned(text: str, tone: Tone) -> Markup:
     """Write a text or a cell with its tone."""
     return Markup(f"{page.said(text)} {{{tone}}}") if tone != "plain" and text.strip() else page.said(text)
+
+
+def _block(block: Block) -> dict[str, Any]:
+    match block:
+        case Table():
+            return _table(block)
+        case Folded():
+            return {"kind": block.kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
+        case Facts():
+            return {"kind": block.kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
+        case Text():
+            return {"kind": block.kind, "text": block.text, "tone": block.tone}
+        case Plot():
+            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
+        case _:
+            return {"kind": block.kind, **asdict(block)}
+
+
+def _bare(text: str) -> str:
+    """Leave out what strikes a number through; the word behind it stays."""
+    return STRUCK.sub(r"\1", text)
+
+
+def _table(table: Table) -> dict[str, Any]:
+    cells = table.cells
+    marked = [
+        {"row": row, "column": column, "tone": cell.tone}
+        for row, line in enumerate(cells)
+        for column, cell in enumerate(line)
+        if cell.tone != "plain"
+    ]
+    return {
+        "kind": table.kind,
+        "name": table.name,
+        "caption": table.explained,
+        "header": list(table.header),
+        "rows": [[_bare(cell.text) for cell in line] for line in cells],
+        "marked": marked,
+    }
+
+
+def _origin(origin: Source) -> dict[str, Any]:
+    header = origin.header
+    return {
+        "file": origin.label,
+        "format": origin.format,
+        "cpfls_version": header.version,
+        "seed": header.seed,
+        "sha256": origin.sha256,
+        "config_sha256": origin.config_sha256,
+        "inputs": {role: asdict(file) for role, file in header.inputs.items()},
+        "cautions": list(header.cautions),
+        "config": header.config,
+    }

@@ -44,8 +44,6 @@ _TONES: tuple[Tone, ...] = ("plain", "good", "note", "warning")
 KnownBy = Iterable[tuple[str, Collection[str]]]
 """Flights by file name, each with the hashes of its file and of its log."""
 
-NOT_SEEN = "a flight that it did not learn from"
-
 
 def trust_words(trust: str) -> Words:
     """Put a word of trust as people read it; one that a newer program wrote stands as it is."""
@@ -84,30 +82,13 @@ def _with_part(flight: LearnedFlight) -> str:
     return f"{flight.name} (sha256 {flight.sha256[:12]}{part})"
 
 
-def seen_words(model: AnyModel, hashes: Collection[str]) -> str:
-    """Say what part of a flight a model learned from, or that it did not.
-
-    Parameters
-    ----------
-    hashes : collection of str
-        SHA-256 of the flight, and of the log that it was imported from where that is known.
-    """
-    learned = model.learned_from
-    flight = part_learned(learned, hashes)
-    if flight is None:
-        return "a flight that it was chosen on" if model.chosen_on & set(hashes) else NOT_SEEN
-    which = "the flight" if len(learned) == 1 else "one of the flights"
-    part = "" if flight.whole else f" ({_part(flight)}; the rest was held out)"
-    return f"{which} that it learned from{part}"
-
-
 def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy) -> Iterator[str]:
     """Warn of flights that judge a model and that it has learned from.
 
     Parameters
     ----------
     judged : iterable of (str, collection of str)
-        File name and hashes, as for `seen_words`, of each flight.
+        Of each flight its file name, and the SHA-256 of the file and of the log that it was imported from.
     """
     for name, hashes in judged:
         flight = part_learned(learned, hashes)

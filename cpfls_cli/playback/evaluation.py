@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, of_thrust
 from cpfls_cli.playback.motion import Body
@@ -32,16 +32,28 @@ from cpfls_cli.playback.parameters import (
     Physical,
     unit_wrenches,
 )
-from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
-from cpfls_cli.playback.table import Airflow, learned_wrench, rotor_weights
+from cpfls_cli.playback.remainder import Airflow, learned_wrench
+from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
 from cpfls_cli.playback.windows import MOTION, Flown
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import ARRAY_SYMBOLS, Graph, traced_in_two
-from cpfls_cli.vehicle.values import ARRAYS, Functions, Tangent, Value, Vector, dot, times
+from cpfls_cli.vehicle.values import (
+    ARRAYS,
+    Functions,
+    Polynomial,
+    Tangent,
+    Value,
+    Vector,
+    dot,
+    times,
+    value_of,
+)
 
-_TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
+TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
+DRAG_OVER_THRUST = "drag_over_thrust"
+"""By how much more the drag factor differs from the stated one than the thrust factor does."""
 
 
 @dataclass(frozen=True)
@@ -61,17 +73,31 @@ class VehicleAt:
         return float(self.values[self.free.index[name]]) if name in self.free.index else otherwise
 
     @cached_property
-    def root_inertia(self) -> Array:
-        """Roots of the ratios of the moments of inertia to the stated ones, shape (3,)."""
-        return np.exp(0.5 * np.array([self.get(name, 0.0) for name in LOG_INERTIA]))
+    def inertia_entries(self) -> tuple[Value, ...]:
+        """Entries of the inertia tensor by `INERTIA_ENTRIES`, kg m^2, with derivatives by the numbers, by place."""
+        free, given = self.free, self.with_derivatives(0)
+        logs, products = (
+            [given(name) if name in free.index else 0.0 for name in each] for each in (LOG_INERTIA, PRODUCT_NAMES)
+        )
+        root = [ARRAYS.exp(0.5 * log) for log in logs]
+        stated = six_parameters(free.vehicle.inertia_kg_m2).tolist()
+        tensor = [entry + own for entry, own in zip(stated, (0.0, 0.0, 0.0, *products), strict=True)]
+        pairs = zip(tensor, INERTIA_ENTRIES, strict=True)
+        return tuple(root[row] * entry * root[column] for entry, (row, column) in pairs)
 
     @cached_property
     def inertia(self) -> Array:
         """Inertia tensor, shape (3, 3), kg m^2."""
-        tensor = symmetric(self.free.vehicle.inertia_kg_m2) + symmetric(
-            [0.0, 0.0, 0.0, *(self.get(name, 0.0) for name in PRODUCT_NAMES)]
-        )
-        return np.asarray(self.root_inertia[:, None] * tensor * self.root_inertia)
+        return symmetric([value_of(entry) for entry in self.inertia_entries])
+
+    @property
+    def inertia_by(self) -> Array:
+        """Derivatives of the inertia tensor by each number, shape (number, 3, 3), kg m^2."""
+        derivatives = np.zeros((len(self.free.index), 3, 3))
+        for (row, column), entry in zip(INERTIA_ENTRIES, self.inertia_entries, strict=True):
+            for place, slope in entry.by.items() if isinstance(entry, Tangent) else ():
+                derivatives[place, [row, column], [column, row]] = slope
+        return derivatives
 
     @property
     def response(self) -> RotorResponse:
@@ -85,50 +111,18 @@ class VehicleAt:
         )
 
     @cached_property
-    def rotor_table(self) -> Array:
-        """Weights of the rotors alone, shape (6, 1 + 4 rotors)."""
-        weights = rotor_weights(self.free.vehicle, self.get(LAW, 0.0), self.response)
-        thrust, drag = self.get(THRUST, 1.0), self.get(DRAG, 1.0)
-        return np.array([thrust, thrust, drag, thrust, thrust, thrust])[:, None] * weights
-
-    @cached_property
-    def log_counted(self) -> Array:
-        """Inertia, as logarithms of ratios, in units of which coefficients of torque are counted, shape (3,)."""
-        return np.array([self.get(name, 0.0) for name in self.free.counting])
+    def _acting_number(self) -> Callable[[str], Value]:
+        return acting_numbers(self.free, lambda name: self.get(name, 0.0))
 
     @cached_property
     def coefficients(self) -> Mapping[str, float]:
         """Coefficients of effects and remainder in SI, by name."""
-        return {
-            name: float(self.values[self.free.index[name]] * np.exp(column.share @ self.log_counted))
-            for name, column in self.free.columns.items()
-        }
-
-    @cached_property
-    def table(self) -> Array:
-        """Weights of torque and force, shape (6, terms, 1 + 4 rotors)."""
-        table = np.zeros(self.free.table_shape)
-        table[:, 0] += self.rotor_table
-        for name, coefficient in self.coefficients.items():
-            if coefficient:
-                table += coefficient * self.free.columns[name].scaled(self.drag_over_thrust)
-        return table * self.forces_by_mass
+        return {name: float(self._acting_number(name)) for name in self.free.shares}
 
     @property
     def mass(self) -> float:
         """Mass, kg."""
         return self.free.vehicle.mass_kg * float(np.exp(self.get(LOG_MASS, 0.0)))
-
-    @property
-    def drag_over_thrust(self) -> float:
-        """By how much more the drag factor differs from the stated one than the thrust factor does."""
-        return self.get(DRAG, 1.0) / self.get(THRUST, 1.0)
-
-    @cached_property
-    def forces_by_mass(self) -> Array:
-        """What rows of the weights are multiplied with: runs divide forces by the stated mass; shape (6, 1, 1)."""
-        share = self.free.vehicle.mass_kg / self.mass
-        return np.array([1.0, 1.0, 1.0, share, share, share])[:, None, None]
 
     @cached_property
     def vehicle(self) -> VehicleSettings:
@@ -152,7 +146,8 @@ class VehicleAt:
         effects, stated = [], self.free.vehicle
         # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
         rotors = tuple(
-            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self.drag_over_thrust) for each in stated.rotors
+            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self._acting_number(DRAG_OVER_THRUST))
+            for each in stated.rotors
         )
         flown = replace(stated, rotors=rotors)
         for block in self.free.effects:
@@ -229,7 +224,7 @@ class VehicleAt:
             slow = response.slow_s if SLOW in self.free.index else None
             return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
         slopes = [
-            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, _TIMES[by])
+            response.slope_by_step(flight.speed[part], flight.motion.period, flight.hold, TIMES[by])
             for part in flight.stretches
         ]
         # The number is the logarithm of the slow time.
@@ -238,7 +233,7 @@ class VehicleAt:
     @property
     def times(self) -> list[str]:
         """Numbers that are times of the rotors' response."""
-        return [name for name in _TIMES if name in self.free.index]
+        return [name for name in TIMES if name in self.free.index]
 
     @cached_property
     def flown(self) -> Flown:
@@ -247,34 +242,57 @@ class VehicleAt:
         key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
         function = traced_wrench(*key)(tuple(self.values.tolist()))
         return replace(
-            self._flown(*acting_at(self.free, lambda name: self.get(name, 0.0)), np.zeros((0, 3, 3))),
+            self._flown(self._acting_number, np.zeros((0, 3, 3))),
             traced=lambda air, rate, *rotors: function(air, rate, rotors),
         )
 
     @cached_property
     def differentiated(self) -> Flown:
         """The same with the derivatives by all numbers."""
+        return self._flown(self.with_derivatives(MOTION), self.inertia_by)
 
-        def number(name: str) -> Value:
-            return Tangent(self.get(name, 0.0), {MOTION + self.free.index[name]: 1.0})
+    @cached_property
+    def polynomial(self) -> Flown:
+        """The same as a polynomial of its numbers, coefficients in SI."""
+        return self._flown(Polynomial.number, np.zeros((0, 3, 3)))
 
-        return self._flown(*acting_at(self.free, number), inertia_derivatives(self))
+    def with_derivatives(self, first: int) -> Callable[[str], Value]:
+        """Give numbers by name, with derivatives by places from the first on."""
+        return acting_numbers(
+            self.free, lambda name: Tangent(self.get(name, 0.0), {first + self.free.index[name]: 1.0})
+        )
 
-    def _flown(self, acting: tuple[Acting, ...], drag_scale: Value, inertia_by: Array) -> Flown:
+    def _flown(self, number: Callable[[str], Value], inertia_by: Array) -> Flown:
+        acting, drag_scale = acting_at(self.free, number)
         body = Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
         vehicle = Vehicle(self.free.vehicle, acting)
         return Flown(vehicle, body, inertia_by, self.free.index.get(LOG_MASS), drag_scale)
 
 
-def acting_at(
+def acting_numbers(
     free: FreeNumbers, number: Callable[[str], Value], functions: Functions = ARRAYS
-) -> tuple[tuple[Acting, ...], Value]:
+) -> Callable[[str], Value]:
+    """Give numbers as they act, by name, of any kind: coefficients in SI, not in units of the inertia."""
+    index = free.index
+    counted = [number(name) if name in index else 0.0 for name in free.counting]
+
+    def given(name: str) -> Value:
+        if name == DRAG_OVER_THRUST:
+            thrust, drag = (number(each) if each in index else 1.0 for each in (THRUST, DRAG))
+            return drag / thrust
+        share = free.shares.get(name)
+        return number(name) if share is None else number(name) * functions.exp(dot(share.tolist(), counted))
+
+    return given
+
+
+def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[Acting, ...], Value]:
     """List what acts on a vehicle of free numbers, and the ratio of the drag factors that effects share.
 
     Parameters
     ----------
     number : callable
-        Gives each free number by name, of any kind.
+        See `acting_numbers`.
     """
     index, hover = free.index, scales.hover_speed(free.vehicle)
 
@@ -291,26 +309,21 @@ def acting_at(
     def rotors(see: Instant, p: Numbers) -> Wrench:
         return rotor_wrench(see.moved(thrust_scale=thrust, drag_scale=drag), p)
 
-    counted = [given(name, 0.0) for name in free.counting]
-
-    def coefficient(name: str) -> Value:
-        return number(name) * functions.exp(dot(free.shares[name].tolist(), counted))
-
     acting = [Acting("rotors", rotors, numbers)]
     for block in free.effects:
         known = CATALOGUE[block]
         assert known.acts is not None, "blocks have it"
         acts = of_thrust(known.acts) if known.of_all_forces else known.acts
-        own = {each.name.split(".")[1]: coefficient(each.name) for each in free.of_block(block)}
+        own = {each.name.split(".")[1]: number(each.name) for each in free.of_block(block)}
         acting.append(Acting(block, acts, own))
     learned = [block for block in free.blocks if block in LEARNED]
     if learned:
         names = [each.name for block in learned for each in free.of_block(block)]
         values = np.empty(len(names), dtype=object)
-        values[:] = [coefficient(name) for name in names]
+        values[:] = [number(name) for name in names]
         remainder = free.remainder(learned, np.zeros(len(names)))
         acting.append(Acting("remainder", learned_wrench(remainder, values.reshape(remainder.coefficients.shape))))
-    return tuple(acting), drag / thrust
+    return tuple(acting), number(DRAG_OVER_THRUST)
 
 
 @lru_cache(maxsize=256)
@@ -325,7 +338,7 @@ def traced_wrench(
     symbols = dict(zip(free.index, graph.inputs("number", len(free.numbers)), strict=True))
     air, rate = (graph.inputs(name, 3) for name in ("air", "rate"))
     rotors = graph.inputs("rotors", 3)
-    acting, drag_scale = acting_at(free, symbols.__getitem__, ARRAY_SYMBOLS)
+    acting, drag_scale = acting_at(free, acting_numbers(free, symbols.__getitem__, ARRAY_SYMBOLS))
     see = Instant(
         vehicle,
         rotors[0],
@@ -338,68 +351,3 @@ def traced_wrench(
     )
     numbers, motion = ("number", tuple(symbols.values())), {"air": air, "rate": rate, "rotors": rotors}
     return traced_in_two(graph, numbers, motion, Vehicle(vehicle, acting).wrench(see))
-
-
-def inertia_derivatives(at: VehicleAt) -> Array:
-    """Differentiate the inertia tensor by each number, shape (number, 3, 3), kg m^2."""
-    inertia, root, index = at.inertia, at.root_inertia, at.free.index
-    derivatives = np.zeros((len(index), 3, 3))
-    for axis, name in enumerate(LOG_INERTIA):
-        if name in index:
-            derivatives[index[name], axis] += 0.5 * inertia[axis]
-            derivatives[index[name], :, axis] += 0.5 * inertia[:, axis]
-    for name, (row, column) in zip(PRODUCT_NAMES, INERTIA_ENTRIES[3:], strict=True):
-        if name in index:
-            derivatives[index[name], row, column] = derivatives[index[name], column, row] = root[row] * root[column]
-    return derivatives
-
-
-@dataclass(frozen=True)
-class Evaluated:
-    """A vehicle at values with its derivatives by them, as the compiled loops take it.
-
-    What only derivatives take is evaluated when it is asked for.
-    """
-
-    at: VehicleAt
-
-    @classmethod
-    def of(cls, free: FreeNumbers, values: Array) -> Evaluated:
-        """Evaluate numbers at values, shape (number,)."""
-        return cls(VehicleAt(free, values))
-
-    @cached_property
-    def derivatives(self) -> list[Array | None]:
-        """Of the weights by each number, shape (6, terms, 1 + 4 rotors); None by those of the rotors' response."""
-        return [_weight_derivative(self.at, number.name) for number in self.at.free.numbers]
-
-    @cached_property
-    def inertia_derivatives(self) -> Array:
-        """Derivatives of the inertia tensor by each number, shape (number, 3, 3)."""
-        return inertia_derivatives(self.at)
-
-
-def _weight_derivative(at: VehicleAt, name: str) -> Array | None:
-    """Differentiate the weights of a vehicle by a number; None by one of the rotors' response in time."""
-    if name in _TIMES:
-        return None
-    columns, coefficients = at.free.columns, at.coefficients
-    if name in columns:
-        scaled = np.exp(columns[name].share @ at.log_counted) * columns[name].scaled(at.drag_over_thrust)
-        return np.asarray(scaled * at.forces_by_mass)
-    derivative = np.zeros(at.free.table_shape)
-    if name in at.free.counting:
-        axis = at.free.counting.index(name)
-        for each, column in columns.items():
-            derivative += coefficients[each] * column.share[axis] * column.weights
-    elif name == LOG_MASS:
-        derivative[3:] = -(at.table / at.forces_by_mass)[3:]
-    elif name not in PRODUCT_NAMES:
-        # The weights of the rotors are linear in each of their numbers.
-        moved = at.values.copy()
-        moved[at.free.index[name]] += 1.0
-        derivative[:, 0] = VehicleAt(at.free, moved).rotor_table - at.rotor_table
-        step = {DRAG: 1.0, THRUST: -at.drag_over_thrust}.get(name, 0.0) / at.get(THRUST, 1.0)
-        for each, column in columns.items():
-            derivative[column.drags] += step * coefficients[each] * column.weights[column.drags]
-    return derivative * at.forces_by_mass

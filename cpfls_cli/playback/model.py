@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
@@ -16,20 +16,15 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, m
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.motion import Body
+from cpfls_cli.playback.remainder import Remainder, learned_wrench
 from cpfls_cli.playback.rotors import Hold, RotorResponse
-from cpfls_cli.playback.table import (
-    Remainder,
-    learned_wrench,
-    lever_weights,
-    wrench_of_numbers,
-)
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.motion import Acting, Acts, Vehicle, rotor_wrench
@@ -68,7 +63,7 @@ class ModelEffect(NamedTuple):
     @property
     def effect(self) -> Effect:
         """What it does: of the vehicle's own numbers what is no inertia, of others all."""
-        return wrench_of_numbers() if self.known.kind == "parameter" else self.known
+        return _wrench_of_numbers() if self.known.kind == "parameter" else self.known
 
     @property
     def values(self) -> dict[str, float]:
@@ -97,10 +92,8 @@ class ModelEffect(NamedTuple):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether it follows from what free runs know: air velocity, body rate and rotors."""
-        known = self.effect
-        elsewhere = known.carried is not None or known.rate_derivative or known.needs & {"height", "attitude"}
-        return known.acts is not None and not (self.is_filter or elsewhere)
+        """Whether it follows from what free runs know."""
+        return self.effect.follows_state and not self.is_filter
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
@@ -118,8 +111,8 @@ class VehicleModel:
         "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone", default=0.0
     )
     effects: tuple[ModelEffect, ...] = part(default=())
-    """Polynomials of motion and rotor speeds stand in `weights`; others are evaluated along a measured motion
-    (`along`), or act on what drives the rotors (`filters`)."""
+    """What follows from motion and rotors is simulated; others are evaluated along a measured motion (`along`), or
+    act on what drives the rotors (`filters`)."""
     remainder: Remainder | None = part(default=None)
     fuzzy: InertiaModel | None = part(default=None, kind=InertiaFunctions)
     """Inertia that depends on the attitude, in the place of the vehicle's."""
@@ -162,7 +155,7 @@ class VehicleModel:
         }
         parts = [Acting("rotors", rotor_wrench, numbers)]
         for one in self.effects:
-            if one.name not in self.beside_table:
+            if one.name not in self.unsimulated:
                 acts, known = one.known.acts, one.known
                 assert acts is not None, "what is simulated with the state has it"
                 own = of_thrust(acts) if known.of_all_forces and not one.is_lever else acts
@@ -173,7 +166,7 @@ class VehicleModel:
 
     @property
     def along(self) -> tuple[ModelEffect, ...]:
-        """Effects that are evaluated along a measured motion, being no polynomials."""
+        """Effects that are evaluated along a measured motion."""
         return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.is_simulated))
 
     @property
@@ -205,8 +198,8 @@ class VehicleModel:
         return not (self.thrust_linear or self.remainder or slow or late)
 
     @property
-    def beside_table(self) -> tuple[str, ...]:
-        """Effects that no table of weights holds, by name."""
+    def unsimulated(self) -> tuple[str, ...]:
+        """Effects that are not simulated with the state, by name."""
         return tuple(one.name for one in (*self.filters, *self.along))
 
     @property
@@ -215,7 +208,7 @@ class VehicleModel:
         return next((one.coefficients for one in self.effects if one.is_lever), np.zeros(3))
 
     def require(self, signals: Signals, name: str) -> None:
-        """Refuse a flight that lacks what an effect beside the table needs.
+        """Refuse a flight that lacks what an effect that is not simulated needs.
 
         Parameters
         ----------
@@ -280,12 +273,17 @@ class VehicleModel:
             response = self.response_to(signals)
             rotor = response.terms_at_samples(signals.rotor_speed, signals.period, hold)
         held = self.wrench(self._air(signals), signals.body_rate, rotor)
-        return np.asarray(held + beside + lever_weights(self.centre, beside.T).T)
+        return held + self.with_lever(beside)
+
+    def with_lever(self, wrench: Array) -> Array:
+        """Add the torque of forces about the centre of mass, from where they have their levers; shape (time, 6)."""
+        lever = -np.cross(self.centre, wrench[:, 3:])
+        return np.hstack([wrench[:, :3] + lever, wrench[:, 3:]])
 
     def wrench_beside(self, signals: Signals) -> Array:
-        """Evaluate what the table of weights does not hold, at the samples of a flight.
+        """Evaluate what is not simulated with the state, at the samples of a flight.
 
-        That is what is no polynomial; of a flight that states torque and thrust also what depends on rotor speeds.
+        Of a flight that states torque and thrust that is also what depends on rotor speeds.
 
         Parameters
         ----------
@@ -335,8 +333,7 @@ class VehicleModel:
         rotor : array, shape (time, 1 + 4 rotors)
             See `cpfls_cli.playback.rotors`.
         """
-        torque, force = self.flown.wrench(tuple(air.T), tuple(rate.T), Rotors.of(rotor))
-        return _rows((*torque, *force), len(air))
+        return wrench_along(self.flown, air, rate, rotor)
 
     def wrench_by_part(self, air: Array, rate: Array, rotor: Array) -> dict[str, Array]:
         """Compute the same of each part alone: rotors, effects by name, remainder; parameters as those of `wrench`."""
@@ -352,6 +349,26 @@ class VehicleModel:
 def of_thrust(lever: Acts) -> Acts:
     """Give a lever the thrust of the rotors in place of all forces."""
     return lambda see, p: lever(replace(see, force=(0, 0, see.thrust)), p)
+
+
+@cache
+def _wrench_of_numbers() -> Effect:
+    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert VEHICLE_NUMBERS.columns is not None
+        given = VEHICLE_NUMBERS.columns(signals, shape)
+        assert given.momentum is not None
+        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
+        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
+
+    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns, rate_derivative=False)
+
+
+def wrench_along(flown: Flown, air: Array, rate: Array, rotor: Array) -> Array:
+    """Compute torque and force of a vehicle along a motion; parameters and shape as `VehicleModel.wrench`."""
+    torque, force = flown.wrench(tuple(air.T), tuple(rate.T), Rotors.of(rotor))
+    return _rows((*torque, *force), len(air))
 
 
 def _rows(components: Vector, samples: int) -> Array:

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.table import (
-    Airflow,
-    Remainder,
-    airflow_terms,
-    effect_weights,
-    remainder_weights,
-)
+from cpfls_cli.playback.remainder import Airflow, Remainder
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = "inertia"
@@ -127,24 +120,6 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 
 
 @lru_cache(maxsize=256)
-def _stated_weights(block: str, vehicle: VehicleSettings) -> Array:
-    """Weigh the terms for an effect on the stated vehicle; a search asks for it again and again."""
-    return effect_weights(block, {}, Probe.of(vehicle))
-
-
-@lru_cache(maxsize=256)
-def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
-    """Find the rows of each coefficient that grow with the drag factor, shape (coefficient, 6)."""
-    known, signals = CATALOGUE[block], Probe.of(vehicle).signals
-    if known.columns is None or known.kind != "wrench":
-        return np.zeros((len(known.coefficients), 6), dtype=bool)
-    twice = [replace(rotor, drag_factor_n_m_s2=2 * rotor.drag_factor_n_m_s2) for rotor in vehicle.rotors]
-    other = replace(signals, vehicle=replace(vehicle, rotors=tuple(twice)))
-    stated, changed = (known.columns(each, {}).direct for each in (signals, other))
-    return np.asarray(np.any(changed != stated, axis=0).T, dtype=bool)
-
-
-@lru_cache(maxsize=256)
 def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
     """Evaluate what a unit of each coefficient of an effect does at some motions, shape (coefficient, motion, 6)."""
     known, rotors = CATALOGUE[block], len(vehicle.rotors)
@@ -169,18 +144,22 @@ _MOTIONS = 8
 """Motions at which effects are evaluated to see on what they act."""
 
 
-@lru_cache(maxsize=64)
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
-    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
+    """List the blocks that a vehicle can have: of rotors and body, effects of motion and rotors, and the remainder's.
 
     Numbers that the config does not know are free in every model, so they are not among the choices.
     """
-    probe = Probe.of(vehicle)
-    effects = (
-        name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
-    )
     known = (block for block in _OF_ROTORS if block not in (MASS, COUNTED, AS_STATED, *vehicle.unknown))
+    effects = (
+        name
+        for name, each in CATALOGUE.items()
+        if each.follows_state and each.kind == "wrench" and not each.shapes and each.needs <= _SEEN
+    )
     return (*known, PRODUCTS, *effects, *LEARNED)
+
+
+_SEEN = {"body_rate", "velocity", "rotor_speed", "thrust"}
+"""What effects that are sought may need."""
 
 
 def needs_velocity(block: str) -> bool:
@@ -188,42 +167,6 @@ def needs_velocity(block: str) -> bool:
     return block in (*LEARNED, "thrust_factor", "thrust_law") or (
         block in CATALOGUE and bool(CATALOGUE[block].needs & {"velocity", "force"})
     )
-
-
-@dataclass(frozen=True)
-class Column:
-    """What a coefficient adds to the weights.
-
-    Attributes
-    ----------
-    weights : array, shape (6, terms, 1 + 4 rotors)
-        For a unit.
-    share : array, shape (3,)
-        A coefficient of torque is counted in units of the inertia about the axes on which it acts, so that a fit can
-        change the inertia alone; 0 for one that has a force, which knows no inertia.
-    drags : array of bool, shape (6,)
-        Rows that go with the drag factor, where the others go with the thrust factor.
-    """
-
-    weights: Array
-    share: Array
-    drags: BoolArray
-
-    @classmethod
-    def of(cls, weights: Array, drags: BoolArray) -> Column:
-        """Find the axes on which a coefficient acts."""
-        acts = np.any(weights[:3], axis=(1, 2))
-        free = not np.any(weights[3:])
-        return cls(weights, acts / max(acts.sum(), 1) * float(free), drags)
-
-    @cached_property
-    def dragged(self) -> bool:
-        """Whether any row goes with the drag factor."""
-        return bool(self.drags.any())
-
-    def scaled(self, drag: float) -> Array:
-        """Weights for a unit counted in thrust, with a drag factor that changed by as much more than the thrust's."""
-        return np.where(self.drags[:, None, None], drag * self.weights, self.weights) if self.dragged else self.weights
 
 
 @dataclass(frozen=True)
@@ -260,16 +203,6 @@ class FreeNumbers:
         return {number.name: place for place, number in enumerate(self.numbers)}
 
     @property
-    def used_airflow(self) -> Airflow:
-        """Rules of the remainder; empty where the remainder is not among the blocks."""
-        return self.airflow if LEARNED.keys() & set(self.blocks) else Airflow(np.zeros(0), 0)
-
-    @property
-    def table_shape(self) -> tuple[int, int, int]:
-        """Shape of the weights of torque and force, (6, terms, 1 + 4 rotors)."""
-        return 6, len(STATE_TERMS) + airflow_terms(self.used_airflow), 1 + 4 * len(self.vehicle.rotors)
-
-    @property
     def effects(self) -> tuple[str, ...]:
         """Blocks that are effects of the catalogue and add a wrench."""
         return tuple(each for each in self.blocks if each in CATALOGUE and each not in (*_OF_ROTORS, PRODUCTS))
@@ -303,7 +236,7 @@ class FreeNumbers:
         return tuple(
             Number(f"{block}.{row}_{column}_{power}", "SI", 0.0, sizes[row] / rotor, -np.inf, np.inf, 1.0)
             for row in LEARNED[block]
-            for column in range(airflow_terms(self.airflow) // 2)
+            for column in range(self.airflow.columns)
             for power, rotor in ((0, hover), (1, 1.0))
         )
 
@@ -326,25 +259,6 @@ class FreeNumbers:
             ):
                 found[number.name] = own / max(own.sum(), 1) * (not pushes.any())
         return found
-
-    @cached_property
-    def columns(self) -> dict[str, Column]:
-        """What the coefficients of effects and remainder add to the weights, by name."""
-        columns: dict[str, Column] = {}
-        for block in self.blocks:
-            if block in LEARNED:
-                units, rotors = np.eye(len(self.of_block(block))), len(self.vehicle.rotors)
-                drags = np.zeros((len(units), 6), dtype=bool)
-                weights = np.array([remainder_weights(self.remainder((block,), unit), rotors) for unit in units])
-            elif block in self.effects:
-                weights, drags = _stated_weights(block, self.vehicle), _drag_rows(block, self.vehicle)
-                more = np.zeros((*weights.shape[:2], self.table_shape[1] - weights.shape[2], weights.shape[3]))
-                weights = np.concatenate([weights, more], axis=2)
-            else:
-                continue
-            named = zip(self.of_block(block), weights, drags, strict=True)
-            columns |= {number.name: Column.of(*column) for number, *column in named}
-        return columns
 
     def remainder(self, blocks: Sequence[str], coefficients: Array) -> Remainder:
         """Build the remainder of some of its blocks, from their coefficients in order."""

@@ -13,15 +13,11 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, wrench_along
 from cpfls_cli.playback.motion import Body, MeasuredMotion, State
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import lever_weights
-from cpfls_cli.playback.windows import Flown, Rotors, Steps, errors_of_runs
+from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
-
-_TINY = 1e-12
-"""Sine of an angle, in rad, that is rounding: the axis does not show."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +61,7 @@ class Player:
         """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""
         motion = flight.motion
         air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
-        torque, force = self.flown.wrench(tuple(air.T), tuple(motion.rate.T), Rotors.of(self.rotor))
-        wrench = np.zeros((len(flight), 6))
-        for row, value in enumerate((*torque, *force)):
-            wrench[:, row] = value
+        wrench = wrench_along(self.flown, air, motion.rate, self.rotor)
         return wrench if self.along is None else wrench + self.along
 
 
@@ -93,12 +86,12 @@ def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signa
 
 
 def _along(model: VehicleModel, stated: Array | None, parts: Sequence[Signals]) -> Array | None:
-    """Give what acts over each step beside the table, shape (time, 6); None for nothing."""
+    """Give what acts over each step that is not simulated, shape (time, 6); None for nothing."""
     if stated is None and not model.along:
         return None
     beside = [_by_step(model.wrench_beside(part)) for part in parts]
     total = np.asarray(sum(each for each in (stated, np.concatenate(beside) if beside else None) if each is not None))
-    return np.asarray(total + lever_weights(model.centre, total.T).T)
+    return model.with_lever(total)
 
 
 def _by_step(values: Array) -> Array:
@@ -205,19 +198,15 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     still = in_the_air(flight, player.wind)
     pushes = None if player.observer is None else observed(player, flight, starts)
     found = []
-    for first in range(0, len(starts), _BATCH):
-        own = starts[first : first + _BATCH]
+    for first in range(0, len(starts), MOST_RUNS):
+        own = starts[first : first + MOST_RUNS]
         push = None
         if pushes is not None and player.observer is not None:
             fading = player.observer.fading(still.motion.period, horizon)
-            push = pushes[first : first + _BATCH] * fading[:, None]
+            push = pushes[first : first + MOST_RUNS] * fading[:, None]
         runs = FlownRuns(still.motion, own, flight.translates)
         found.append(errors_of_runs(player.flown, runs, player.steps(own + np.arange(horizon)[:, None], push)))
     return Runs(*(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
-_BATCH = 1_200
-"""Runs at a time: what drives each of them is laid out step by step."""
 
 
 def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
@@ -309,15 +298,4 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     array, shape (..., 3), rad
         In the measured body frame; its length is the geodesic distance.
     """
-    away = measured.swapaxes(-1, -2) @ predicted
-    skew = 0.5 * np.stack(
-        [away[..., 2, 1] - away[..., 1, 2], away[..., 0, 2] - away[..., 2, 0], away[..., 1, 0] - away[..., 0, 1]],
-        axis=-1,
-    )
-    sine: Array = np.sqrt((skew**2).sum(axis=-1))
-    cosine: Array = 0.5 * (away[..., 0, 0] + away[..., 1, 1] + away[..., 2, 2] - 1.0)
-    angle = np.arctan2(sine, cosine)
-    vector = skew * np.expand_dims(np.where(sine > _TINY, angle / np.maximum(sine, _TINY), 1.0), -1)
-    # Half a turn: the axis does not show in the skew part, its length is all that is used.
-    half_turn = np.asarray((sine <= _TINY) & (cosine < 0.0), dtype=bool)
-    return np.asarray(np.where(np.expand_dims(half_turn, -1), [np.pi, 0.0, 0.0], vector))
+    return rotation_errors(measured[..., None], predicted[..., None])[..., 0]

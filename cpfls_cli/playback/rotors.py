@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.lag import Lagged, delayed, lagged
+from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.result import about
 
 Hold = Literal["linear", "previous"]
@@ -36,7 +36,7 @@ class RotorResponse:
 
     def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""
-        return rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s)
+        return np.asarray(rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s), dtype=float)
 
     def terms_at_samples(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
@@ -44,19 +44,32 @@ class RotorResponse:
         A speed that stays until the next sample jumps there: taken is the middle of the jump. Parameters and shape as
         `rotor_terms_by_step`.
         """
-        mean, end, start = lagged(delayed(speed, self.delay_s / period, hold), self.lag_s / period, hold)
-        jumps = hold == "previous" and self.lag_s < _SHORTEST_S
-        acting = 0.5 * (start + mean) if jumps else start
-        slow = lagged(mean**2, self.slow_s / period, "previous").start
-        change = (end - start) / period
-        acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
-        one = np.ones((len(speed), 1))
-        return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
+        return np.asarray(_terms_at_samples(speed, period, hold, self.delay_s, self.lag_s, self.slow_s), dtype=float)
+
+    def slope_by_step(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
+        """Differentiate `terms_by_step` by one of the times."""
+        return np.asarray(rotor_terms_by_step(speed, period, hold, *self._moved(by)).imag / _STEP)
+
+    def slope_at_samples(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
+        """Differentiate `terms_at_samples` by one of the times."""
+        return np.asarray(_terms_at_samples(speed, period, hold, *self._moved(by)).imag / _STEP)
+
+    def _moved(self, by: TimeOfResponse) -> list[complex]:
+        times = {"delay_s": self.delay_s, "lag_s": self.lag_s, "slow_s": self.slow_s}
+        return [time + 1j * _STEP if name == by else time for name, time in times.items()]
 
 
-def rotor_terms_by_step(
-    speed: Array, period: float, hold: Hold, delay_s: float, lag_s: float, slow_s: float | None
-) -> Array:
+def _terms_at_samples(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
+    mean, end, start = lagged(delayed(speed, delay_s / period, hold), lag_s / period, hold)
+    jumps = hold == "previous" and np.real(lag_s) < _SHORTEST_S
+    acting = 0.5 * (start + mean) if jumps else start
+    slow = lagged(mean**2, slow_s / period, "previous").start
+    change = (end - start) / period
+    acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
+    return np.hstack([np.ones((len(speed), 1)), acting, acting**2, acceleration, slow - acting**2])
+
+
+def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
     """Evaluate the terms of the rotors over each step: means of acting speeds, their squares, accelerations, slowness.
 
     Parameters
@@ -66,8 +79,8 @@ def rotor_terms_by_step(
     period : float, s
     hold : {"linear", "previous"}
         What a speed is between samples: a straight line, or what it was at the sample before.
-    delay_s, lag_s, slow_s : float
-        As in `RotorResponse`; None for no slowness, which is left 0.
+    delay_s, lag_s, slow_s : float or complex
+        As in `RotorResponse`, or one that carries a derivative; None for no slowness, which is left 0.
 
     Returns
     -------
@@ -78,26 +91,6 @@ def rotor_terms_by_step(
     squared = mean**2
     slow = squared if slow_s is None else lagged(squared, slow_s / period, "previous").mean
     return np.hstack([np.ones((len(speed), 1)), mean, squared, (end - start) / period, slow - squared])
-
-
-def rotor_terms_slope(speed: Array, period: float, hold: Hold, response: RotorResponse, by: TimeOfResponse) -> Array:
-    """Differentiate `rotor_terms_by_step` by one of the times of the response.
-
-    Signals go through filters that are linear, so that a complex step is taken of their numbers alone.
-    """
-    delay, lag, slow = (time / period for time in (response.delay_s, response.lag_s, response.slow_s))
-    acting, step = delayed(speed, delay, hold), 1j * _STEP / period
-    mean = lagged(acting, lag, hold).mean
-    if by == "slow_s":
-        slope = lagged(mean**2, slow + step, "previous").mean.imag / _STEP
-        return np.hstack([np.zeros((len(speed), 1 + 3 * speed.shape[1])), slope])
-    if by == "delay_s":
-        moved = lagged(delayed(speed, delay + step, hold).imag / _STEP, lag, hold)
-    else:
-        moved = Lagged(*(each.imag / _STEP for each in lagged(acting, lag + step, hold)))
-    square = 2.0 * mean * moved.mean
-    slope = lagged(square, slow, "previous").mean - square
-    return np.hstack([np.zeros((len(speed), 1)), moved.mean, square, (moved.end - moved.start) / period, slope])
 
 
 def steady_terms(speed: Array) -> Array:

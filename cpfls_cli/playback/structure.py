@@ -28,8 +28,8 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
+from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.table import Airflow
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings

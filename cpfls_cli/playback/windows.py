@@ -149,9 +149,24 @@ class Rotors(NamedTuple):
     push: Vector | None = None
 
     @classmethod
-    def of(cls, terms: Array) -> Rotors:
-        """Take what drives vehicles from terms of the rotors, shape (time, 1 + 4 rotors)."""
-        speed, acceleration, slow = (each.T for each in _rotor_motion(terms))
+    def of(cls, terms: Array, terms_by: Mapping[int, Array] = {}, copies: int = 1) -> Rotors:
+        """Take what drives vehicles from terms of the rotors.
+
+        Parameters
+        ----------
+        terms : array, shape (..., 1 + 4 rotors)
+        terms_by : mapping of int to array
+            Their derivatives by numbers, by place.
+        copies : int
+            How often all are given, one after another.
+        """
+        values = [_laid(each, copies) for each in _rotor_motion(terms)]
+        by: list[dict[int, Value]] = [{}, {}, {}]
+        for place, each in terms_by.items():
+            faster, change, late = (_laid(own, copies) for own in _divided(each))
+            for own, moved in zip(by, (faster, change, late + 2.0 * values[0] * faster), strict=True):
+                own[place] = moved
+        speed, acceleration, slow = (Tangent(x, own) if own else x for x, own in zip(values, by, strict=True))
         return cls(speed, acceleration, slow)
 
 
@@ -193,26 +208,20 @@ class Steps(NamedTuple):
 
     def for_both_stages(self) -> Rotors:
         """Give the rotors over all steps of all runs, once for each stage of a step, with derivatives."""
-        values = [_doubled(each) for each in _rotor_motion(self.terms)]
-        by: list[dict[int, Value]] = [{}, {}, {}]
-        for place, each in self.terms_by.items():
-            faster, change, late = (_doubled(own) for own in _divided(each))
-            for own, moved in zip(by, (faster, change, late + 2.0 * values[0] * faster), strict=True):
-                own[MOTION + place] = moved
-        given: list[Value] = [Tangent(x, own) if own else x for x, own in zip(values, by, strict=True)]
-        speed, change, slow = given
-        return Rotors(speed, change, slow, None if self.push is None else self._pushes(self.push))
+        by = {MOTION + place: each for place, each in self.terms_by.items()}
+        push = None if self.push is None else self._pushes(self.push)
+        return Rotors.of(self.terms, by, 2)._replace(push=push)
 
     def _pushes(self, push: Array) -> Vector:
-        by = {MOTION + place: _doubled(each) for place, each in self.push_by.items()}
+        by = {MOTION + place: _laid(each, 2) for place, each in self.push_by.items()}
         return tuple(
-            Tangent(own, {place: each[row] for place, each in by.items()}) for row, own in enumerate(_doubled(push))
+            Tangent(own, {place: each[row] for place, each in by.items()}) for row, own in enumerate(_laid(push, 2))
         )
 
 
-def _doubled(values: Array) -> Array:
-    """Arrange values of steps and runs for both stages, shape (..., 2 step run)."""
-    return np.tile(values.reshape(-1, values.shape[-1]).T, 2)
+def _laid(values: Array, copies: int) -> Array:
+    """Arrange values of steps and runs, shape (..., column), side by side: (column, copies times all)."""
+    return np.tile(values.reshape(-1, values.shape[-1]).T, copies)
 
 
 def _divided(terms: Array) -> tuple[Array, Array, Array]:

@@ -10,15 +10,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from unicodedata import category
 from xml.etree import ElementTree
 
 import numpy as np
+from markupsafe import escape
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.report.content import Panel, Picture, Plot
-from cpfls_cli.report.numbers import plain, power_of_ten
+from cpfls_cli.errors import visible
+from cpfls_cli.report.content import Picture, Plot
+from cpfls_cli.report.numbers import number, plain, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -97,7 +99,10 @@ _AT_THE_END = 1e-9
 """Share of an axis by which rounding may put a tick beyond the end of it."""
 
 _ROWS = 25
-"""Of a table of the data of a figure, at most."""
+"""Of a table of the data of a chart, at most."""
+
+_POINTS = 12
+"""Of a curve that are all listed for who does not see it."""
 
 
 def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
@@ -117,14 +122,14 @@ class _Drawing:
     @cached_property
     def svg(self) -> str:
         with self._drawn() as figure:
-            # A page that shows a figure tells its numbers as well: it is drawn once for both.
-            vars(self)["panels"] = _panels_of(figure)
+            # It is drawn once for both.
+            vars(self)["rows"] = list(_rows(figure))
             return _inline_svg(figure, self.name, self.description)
 
     @cached_property
-    def panels(self) -> list[Panel]:
+    def rows(self) -> list[tuple[str, ...]]:
         with self._drawn() as figure:
-            return _panels_of(figure)
+            return list(_rows(figure))
 
     def figure(self) -> Figure:
         with self._drawn() as figure:
@@ -178,7 +183,7 @@ class _Written:
     """A figure that is HTML already."""
 
     svg: str
-    panels: Sequence[Panel] = ()
+    rows: Sequence[tuple[str, ...]] = ()
 
     def figure(self) -> Figure:
         """Draw nothing."""
@@ -202,20 +207,77 @@ def pictures(figures: Mapping[str, Callable[[Any], str]], prefix: str, given: An
     return {name: picture for name, picture in made if picture is not None}
 
 
-def _panels_of(figure: Figure) -> list[Panel]:
-    from cpfls_cli.report.collect import panels_of
+def figure_html(picture: Picture) -> str:
+    """Write a figure, what it draws folded away as a table."""
+    svg = picture.svg
+    if not picture.rows:
+        return svg
+    head = "".join(f'<th scope="col">{title}</th>' for title in ("Panel", "Curve", "x", "y"))
+    rows = "".join(f"<tr>{''.join(f'<td>{escape(visible(cell))}</td>' for cell in row)}</tr>" for row in picture.rows)
+    table = f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+    return f'<div class="plot">{svg}</div><details><summary>Numbers</summary>{table}</details>'
 
-    return panels_of(figure)
+
+def _rows(figure: Figure) -> Iterator[tuple[str, ...]]:
+    """List panel, curve, x and y of what is drawn: of a long curve its first, lowest, highest and last point."""
+    for axes in figure.axes:
+        words = [_words_at(axis) for axis in (axes.xaxis, axes.yaxis)]
+        sides: tuple[Any, ...] = ("left", "center", "right")
+        title = next(filter(None, map(axes.get_title, sides)), "")
+        x, y = _label(axes, "x") or figure.get_supxlabel(), _label(axes, "y") or figure.get_supylabel()
+        panel = f"{', '.join(filter(None, (title, y)))}{f' over {x}' if x else ''}"
+        for label, points in _curves(axes):
+            places = np.arange(len(points))
+            if len(points) > _POINTS:
+                places = np.unique([0, np.argmin(points[:, 1]), np.argmax(points[:, 1]), len(points) - 1])
+            name = "" if _OWN_LABEL.fullmatch(label) else label.replace(NOT_FIRST, "")
+            for point in points[places]:
+                shown = (own.get(float(at)) or number(float(at) + 0.0, 4) for own, at in zip(words, point, strict=True))
+                yield (panel, name, *shown)
+
+
+def _label(axes: Axes, which: Literal["x", "y"]) -> str:
+    """Find the label of an axis, which may stand at another panel that shares it."""
+    shared: Any = axes.get_shared_x_axes() if which == "x" else axes.get_shared_y_axes()
+    around = (axes, *(other for other in axes.figure.axes if other in shared.get_siblings(axes)))
+    return next(filter(None, (str(getattr(other, f"get_{which}label")()) for other in around)), "")
+
+
+def _words_at(axis: Axis) -> dict[float, str]:
+    """Find the words that a figure wrote at its ticks itself."""
+    from matplotlib.ticker import FixedLocator
+
+    ticks = [float(tick) for tick in axis.get_majorticklocs()]
+    fixed = isinstance(axis.get_major_locator(), FixedLocator)
+    return dict(zip(ticks, axis.get_major_formatter().format_ticks(ticks), strict=True)) if fixed else {}
+
+
+def _curves(axes: Axes) -> Iterator[tuple[str, Array]]:
+    """List the labels of curves, points, bars and bands with their points, shape (points, 2); no levels and spans."""
+    from matplotlib.collections import PathCollection, PolyCollection
+    from matplotlib.container import BarContainer
+
+    for container in axes.containers:
+        if isinstance(container, BarContainer):
+            boxes = np.array([[*bar.get_xy(), bar.get_width(), bar.get_height()] for bar in container]).reshape(-1, 4)
+            flat = container.orientation == "horizontal"
+            yield str(container.get_label()), boxes[:, :2] + boxes[:, 2:] * ((1.0, 0.5) if flat else (0.5, 1.0))
+    drawn: list[tuple[Any, list[Any]]] = [(own, [np.column_stack(own.get_data())]) for own in axes.lines]
+    drawn += [(own, [own.get_offsets()]) for own in axes.collections if isinstance(own, PathCollection)]
+    bands = (own for own in axes.collections if isinstance(own, PolyCollection))
+    drawn += [(own, [path.vertices for path in own.get_paths()]) for own in bands]
+    for artist, pieces in drawn:
+        points = np.ma.filled(np.ma.asarray(np.concatenate(pieces), float), np.nan) if pieces else np.empty((0, 2))
+        if artist.get_transform() == axes.transData or isinstance(artist, PathCollection):
+            known = points[np.isfinite(points).all(axis=1)]
+            if len(known):
+                yield str(artist.get_label()), known
 
 
 def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     """Draw a curve in a style of `Axes.plot`, thinned out so that no peak is lost."""
-    from cpfls_cli.report.collect import SPREAD
-
-    kept, shown = kept_samples(y), evenly_spread(len(y))
-    for curve in axes.plot(x[kept], y[kept], **style):
-        # A table of the curve shows samples of the whole one: extremes alone would make it look rough.
-        setattr(curve, SPREAD, (x[shown], y[shown]))
+    kept = kept_samples(y)
+    axes.plot(x[kept], y[kept], **style)
     plain_ticks(axes.yaxis)
 
 
@@ -290,7 +352,7 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
 
 
 def evenly_spread(samples: int) -> IntArray:
-    """Choose the samples of a curve that a table shows: both ends and some between."""
+    """Choose the samples of a chart's curve that a table shows: both ends and some between."""
     return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _ROWS)).round().astype(int))
 
 

@@ -1,13 +1,14 @@
-"""What a page is made of: sections of text, facts, tables, figures with the numbers behind them, and details."""
+"""What a command has to say: text, facts, tables, figures and details for people, a summary for machines."""
 
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
-
-from cpfls_cli.arrays import Array
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +16,13 @@ if TYPE_CHECKING:
 Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
 
-Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
+
+class Form(StrEnum):
+    """What a report is written as."""
+
+    HTML = "html"
+    MARKDOWN = "md"
+    JSON = "json"
 
 
 STRUCK = re.compile(r"~~([^~]*)~~(?= impossible)")
@@ -102,46 +109,6 @@ class Table:
         return [[entry if isinstance(entry, Cell) else Cell(entry) for entry in row] for row in self.rows]
 
 
-@dataclass(frozen=True)
-class Series:
-    """One curve, set of points, bars, band, map or mark of a figure.
-
-    Attributes
-    ----------
-    label : str
-        As in the legend; empty where it has none.
-    x, y : array, shape (points,)
-        Of a mark, which is a level or a span, the ends; infinite where it goes from edge to edge.
-    low, high : array, shape (points,), or None
-        Ends of a band or of error bars.
-    value : array, shape (points,), or None
-        Colour of a map.
-    spread : tuple of (array, array), or None
-        Samples evenly spread over a curve of which only the extremes are drawn.
-    """
-
-    label: str
-    form: Drawn
-    x: Array
-    y: Array
-    low: Array | None = None
-    high: Array | None = None
-    value: Array | None = None
-    spread: tuple[Array, Array] | None = None
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One set of axes of a figure, with the words that stand at positions of its axes in place of numbers."""
-
-    title: str
-    x_label: str
-    y_label: str
-    series: Sequence[Series]
-    x_names: Mapping[float, str] = field(default_factory=dict)
-    y_names: Mapping[float, str] = field(default_factory=dict)
-
-
 class Picture(Protocol):
     """A figure that is drawn when somebody asks what it looks like: not every form of a page shows it."""
 
@@ -151,8 +118,8 @@ class Picture(Protocol):
         ...
 
     @property
-    def panels(self) -> Sequence[Panel]:
-        """The numbers behind it."""
+    def rows(self) -> Sequence[tuple[str, ...]]:
+        """What it draws, for who does not see it: panel, curve, x, y."""
         ...
 
     def figure(self) -> Figure:
@@ -180,11 +147,9 @@ class Plot:
 
 @dataclass(frozen=True)
 class Listing:
-    """Verbatim text that can be folded away, or is folded out from the start."""
+    """Verbatim text."""
 
-    summary: str
     text: str
-    shown: bool = False
     kind: ClassVar[str] = "listing"
 
 
@@ -251,3 +216,42 @@ class Section:
     def tables(self) -> list[str]:
         """Names of its tables, also of those folded away, in order."""
         return [block.name for block in unfolded(self.blocks) if isinstance(block, Table)]
+
+
+Command = Sequence[str | Path]
+"""Words of a command line; a string is what a person does by hand."""
+
+
+def command_line(command: Command) -> str:
+    """Write a command so that it can be pasted, and what is done by hand as it is."""
+    return command if isinstance(command, str) else shlex.join(map(str, command))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command has to say.
+
+    Attributes
+    ----------
+    summary : mapping
+        For machines (``--json``).
+    blocks : tuple of Block
+        For people, on standard output; texts of tone ``warning`` go to standard error.
+    exit_code : int
+        Not 0 where the work was stopped.
+    next : tuple of Command
+        To go on with, with the names of this run.
+    written : Path or None
+        File or folder that the command wrote.
+    """
+
+    summary: Mapping[str, Any]
+    blocks: tuple[Block, ...] = ()
+    exit_code: int = 0
+    next: tuple[Command, ...] = ()
+    written: Path | None = None
+
+
+def caution_texts(cautions: Iterable[str]) -> Iterator[Text]:
+    """Write what speaks against a model: the first is seen however many notes there are."""
+    return (Text(each, "warning", always=index == 0) for index, each in enumerate(cautions))

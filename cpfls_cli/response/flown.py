@@ -16,8 +16,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import Hold, RotorResponse
-from cpfls_cli.playback.table import rotor_weights
+from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.response.mismatch import (
     NOT_JUDGED,
     ROTATION,
@@ -223,9 +222,10 @@ def _of_rotors(model: VehicleModel, signals: Signals, hold: Hold) -> Array:
     """Evaluate torque and thrust of the rotors at the logged speeds, or as stated, shape (time, 6)."""
     if signals.rotor_speed is None:
         return signals.wrench
-    at_once = RotorResponse()
-    weights = rotor_weights(model.vehicle, model.thrust_linear, at_once)
-    return np.asarray(at_once.terms_at_samples(signals.rotor_speed, signals.period, hold) @ weights.T)
+    rotors = VehicleModel(vehicle=model.vehicle, thrust_linear=model.thrust_linear)
+    still = np.zeros((len(signals), 3))
+    terms = rotors.response.terms_at_samples(signals.rotor_speed, signals.period, hold)
+    return rotors.wrench(still, still, terms)
 
 
 def _acceleration(model: VehicleModel, signals: Signals, torque: Array) -> Array:

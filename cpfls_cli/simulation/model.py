@@ -105,7 +105,7 @@ def in_the_loop(model: VehicleModel) -> tuple[VehicleModel, SimulatedEffects]:
     commands are logged; of another one they stand behind the speeds that are logged.
     """
     apart = [SimulatedEffect(one.known, one.values) for one in (*model.filters, *model.along)]
-    kept = tuple(one for one in model.effects if one.name not in model.beside_table)
+    kept = tuple(one for one in model.effects if one.name not in model.unsimulated)
     response = model.response
     if model.commanded:
         late = late_effects(response)
@@ -117,8 +117,8 @@ def in_the_loop(model: VehicleModel) -> tuple[VehicleModel, SimulatedEffects]:
 
 
 def in_table(model: VehicleModel) -> SimulatedEffects:
-    """List the effects that the table of weights of a model holds."""
-    held = (one for one in model.effects if one.name not in model.beside_table)
+    """List the effects that a model simulates with the state."""
+    held = (one for one in model.effects if one.name not in model.unsimulated)
     return SimulatedEffects(tuple(SimulatedEffect(one.known, one.values) for one in held))
 
 

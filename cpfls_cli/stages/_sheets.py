@@ -83,7 +83,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
     model = modelled(path, record)
-    beside = model.beside_table
+    beside = model.unsimulated
     held = tuple(each for each in model.effects if each.name not in beside)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)

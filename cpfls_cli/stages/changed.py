@@ -24,9 +24,9 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles, once
 from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers, stated_of, with_absent_signals
 from cpfls_cli.logs.formats import formats_in_words
-from cpfls_cli.pages.source import unique_labels
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over
 from cpfls_cli.report.change_words import WORDS
+from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (

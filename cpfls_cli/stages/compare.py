@@ -31,8 +31,8 @@ from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
+from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import plain
-from cpfls_cli.report.outcome import Command
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.weak_form.windows import Recording

@@ -49,7 +49,7 @@ from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
-from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.content import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
 from cpfls_cli.stage import Run, stage

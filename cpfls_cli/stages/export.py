@@ -32,7 +32,7 @@ ModelArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
+        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, replay, "
         "disagreement, diagnosis or response.",
     ),
 ]
@@ -44,7 +44,7 @@ FormatOption = Annotated[
         "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
         "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
         "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
-        "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
+        "flight, replay, gap or response holds, on the log's own clock; default: by the suffix of "
         "FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
     ),
 ]

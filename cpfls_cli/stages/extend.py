@@ -94,5 +94,5 @@ def extended(
     require_body(extension.model, stated)
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChange.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
-    missing = left_out(whole, whole.beside_table, held, study.gap.horizon_s)
+    missing = left_out(whole, whole.unsimulated, held, study.gap.horizon_s)
     return Extended.of(extension, stated, whole, playback, missing)

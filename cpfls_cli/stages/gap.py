@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
+
+import typer
 
 from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
@@ -21,13 +25,17 @@ from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, 
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
+from cpfls_cli.simulators.corrected import corrected
+from cpfls_cli.simulators.formats import is_simulator_file, read_model
+from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
+from cpfls_cli.stages.init import Stated, proposed
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -35,6 +43,17 @@ PARTS = {
     "extended": ("extend", "diagnosis"),
 }
 """Files of the folder, each with the command whose result it is, and what it is made of."""
+
+
+_STUDY = "study.yaml"
+ConfigArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="CONFIG",
+        help="Study config (YAML); or a simulator's own file (SDF, URDF, MJCF), which is corrected.",
+        show_default=False,
+    ),
+]
 
 
 @result
@@ -64,13 +83,26 @@ class Gap:
         return getattr(self.diagnosis, name)
 
 
-@stage(Gap, words={**WORDS, **of_diagnosis.WORDS}, fills=Filled(PARTS), study=True)
-def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, model: ModelOption = None) -> Gap | None:
+@stage(
+    Gap,
+    words={**WORDS, **of_diagnosis.WORDS},
+    fills=Filled(PARTS),
+    study=lambda given: not is_simulator_file(given["config"]),
+)
+def gap(
+    run: Run,
+    config: ConfigArgument,
+    flights: FlightsArgument,
+    held_out: HeldOutOption = None,
+    model: ModelOption = None,
+) -> Gap | None:
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 
-    The search adds one effect after another until nothing more can be named, so once through is all the way.
+    The search adds one effect after another until nothing more can be named, so once through is all the way. Where the
+    model is a simulator's own file, a study is made of it, and the file corrected.
     """
     held_out = held_out or []
+    of_file = _study_of(run, config, [*flights, *held_out]) if is_simulator_file(config) else None
     with_numbers(run, "gap", model)
     why = "" if run.found is None else why_no_body_found(run, run.found)
     if why:
@@ -98,6 +130,8 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     found = of_diagnosis.learned_from(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
+    if of_file is not None:
+        found = _with_file(run, found, of_file)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -112,6 +146,33 @@ def gap(run: Run, flights: FlightsArgument, held_out: HeldOutOption = None, mode
     answer = Gap(disagreement=disagreement, diagnosis=found, extended=extension, refused=refused)
     run.next.append(_next(run, answer, [*flights, *held_out], model))
     return answer
+
+
+def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
+    """Make the study of a simulator's file and the logs that it is compared with."""
+    run.take({"simulator": file})
+    stated = Stated(model=read_model(file))
+    logs = [path for path in flights if path.is_file() and not format_name(path)]
+    made, _, text = proposed(run, logs, stated)
+    if made.asked or made.vehicle is None:
+        raise InputError(
+            f"{file}: does not state all that a gap needs; `cpfls init --from {file} LOG... -o study.yaml` writes a "
+            f"config, then {made.edits}"
+        )
+    run.study = validate(parse_config(text, _STUDY), _STUDY)
+    run.with_config, run.config = True, run.output / _STUDY
+    run.texts[run.config] = text
+    for warning in (*made.vehicle.warnings, *made.contradictions):
+        run.note(warning)
+    return made.vehicle
+
+
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf) -> Diagnosis:
+    """Put what was found into the simulator's file."""
+    flights = [flight.name for flight in found.recorded.values()]
+    said, files = corrected(of, run.study.vehicle, found, flights)
+    run.texts.update({run.output / name: text for name, text in files.items()})
+    return replace(found, corrected=said)
 
 
 def _flights(

@@ -42,8 +42,7 @@ from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.identified_figures import FIGURES
 from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.content import Command, Text
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._stopped import stop_note, without_model

@@ -1,4 +1,4 @@
-"""Look into logs of one vehicle and write a config for them, with the reason of every guess."""
+"""Look into logs of one vehicle, or a simulator's file, and write a config, with the reason of every number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from cpfls_cli.arguments import LogsArgument, moments
+from cpfls_cli.arguments import moments
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.load import ASK, how_to_fill_in, parse_config, validate
 from cpfls_cli.consistency.findings import Finding
@@ -28,13 +28,16 @@ from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
-from cpfls_cli.logs.formats import log_contents
+from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import number
-from cpfls_cli.report.outcome import Command
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
+from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.model import SimulatorModel
+from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
@@ -47,6 +50,19 @@ _SPINS = {1: "ccw", -1: "cw", 0: "turning an unknown way"}
 _PLAIN = re.compile(r"[A-Za-z_][\w./^ -]*")
 _SURFACE = re.compile(r"aileron|elevator|rudder|elevon")
 
+MayLogsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.", show_default=False),
+]
+FromOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        metavar="MODEL",
+        help="A simulator's own file, whose vehicle the config gets: SDF, URDF or MJCF.",
+        show_default=False,
+    ),
+]
 MassOption = Annotated[
     float | None, typer.Option("--mass", metavar="KG", min=1e-6, help="Mass as it flew, with battery, kg.")
 ]
@@ -85,16 +101,20 @@ class Stated:
     inertia_kg_m2: tuple[float, float, float] | None = None
     thrust_factor_n_s2: float | None = None
     drag_factor_n_m_s2: float | None = None
+    model: SimulatorModel | None = None
 
     @property
     def knows_constants(self) -> bool:
         """Whether it is any of what `cpfls vehicle` finds."""
-        return (self.inertia_kg_m2, self.thrust_factor_n_s2, self.drag_factor_n_m_s2) != (None, None, None)
+        known = (self.inertia_kg_m2, self.thrust_factor_n_s2, self.drag_factor_n_m_s2)
+        return self.model is not None or known != (None, None, None)
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
-    """List the keys of the config that only a person can fill in."""
-    keys = [] if stated.mass_kg is not None else ["vehicle.mass_kg"]
+    """List the keys of the config that only a person can fill in; not those of rotors that a simulator's file has."""
+    if stated.model is not None and stated.model.rotors:
+        return ()
+    keys = [] if stated.mass_kg is not None or stated.model is not None else ["vehicle.mass_kg"]
     airframe = proposal.airframe
     if not proposal.rotors:
         keys.append("vehicle.rotors")
@@ -110,8 +130,9 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
 class Proposed:
     """A config for logs; ``--json`` shows all of the proposal."""
 
-    proposal: Proposal
+    proposal: Proposal | None
     stated: Stated
+    vehicle: VehicleOf | None
     output: str = described("file of the config")
     contradictions: tuple[str, ...] = described("what contradicts itself in the leading log", "sentence")
     doubted_guesses: tuple[str, ...] = described("what contradicts a guess", "sentence")
@@ -120,7 +141,9 @@ class Proposed:
     @cached_property
     def asked(self) -> tuple[str, ...]:
         """Keys of the config that only a person can fill in."""
-        return asked_keys(self.proposal, self.stated)
+        if self.proposal is not None:
+            return asked_keys(self.proposal, self.stated)
+        return () if self.vehicle is None else self.vehicle.asked
 
     @property
     def edits(self) -> str:
@@ -133,19 +156,22 @@ class Proposed:
     @property
     def topic(self) -> str:
         """Topic of all columns; empty where there are several."""
-        names = [column for guess in self.proposal.signals for column in guess.columns.columns]
+        signals = () if self.proposal is None else self.proposal.signals
+        names = [column for guess in signals for column in guess.columns.columns]
         topics = {name.partition(".")[0] for name in names if name.count(".") > 1}
         return topics.pop() if len(topics) == 1 and all(name.count(".") > 1 for name in names) else ""
 
     @property
     def rivals(self) -> Iterator[tuple[str, Rival]]:
         """What each guess may be too, with its signal or key."""
+        if self.proposal is None:
+            return
         yield from ((each.signal, rival) for each in self.proposal.signals for rival in each.rivals)
         yield from ((each.key, rival) for each in self.proposal.choices for rival in each.rivals)
 
     def rotor(self, rotor: RotorPlace | None) -> str:
         """Write the line of a rotor."""
-        return _rotor(rotor, self.proposal.airframe, self.stated)
+        return _rotor(rotor, None if self.proposal is None else self.proposal.airframe, self.stated)
 
 
 def _by_topic(names: Sequence[str]) -> Iterator[str]:
@@ -242,7 +268,8 @@ _WORDS = {
 @stage(Proposed, words=_WORDS)
 def init(
     run: Run,
-    logs: LogsArgument,
+    logs: MayLogsArgument = None,
+    model: FromOption = None,
     mass: MassOption = None,
     arm: ArmOption = None,
     scale_to_arm: ScaleOption = False,
@@ -250,12 +277,42 @@ def init(
     thrust_factor: ThrustOption = None,
     drag_factor: DragOption = None,
 ) -> Proposed:
-    """Write a commented config for logs of one vehicle."""
-    stated = Stated(mass, arm, inertia, thrust_factor, drag_factor)
+    """Write a commented config for logs of one vehicle, a simulator's file of it, or both."""
+    if not logs and model is None:
+        raise InputError("Missing argument 'LOG...': give logs, or a simulator's file by --from, or both")
+    file = None
+    if model is not None:
+        run.take({"model": model})
+        file = read_model(model)
+        _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
+    stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
+    made, given, text = proposed(run, logs or (), stated, scale_to_arm=scale_to_arm)
+    run.texts[run.output] = text
+    proposal = made.proposal
+    if proposal is not None:
+        run.also = _summary(proposal, made.asked)
+        # A config that asks for something is refused by every command until it is filled in.
+        run.next += _next(run, proposal, given) if not made.asked else ()
+    return made
+
+
+def _refuse_stated(file: SimulatorModel, *given: object) -> None:
+    if any(each is not None for each in given):
+        raise InputError(
+            f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
+            f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
+        )
+
+
+def proposed(
+    run: Run, logs: Sequence[Path], stated: Stated, *, scale_to_arm: bool = False
+) -> tuple[Proposed, list[Path], str]:
+    """Propose a config: what it is made of, the logs that it is for, each once, and its text."""
     inputs = run.take({f"log-{at}": log for at, log in enumerate(logs)})
+    files = [file for role, file in inputs.items() if role.startswith("log-")]
     firsts: dict[str, Path] = {}
-    for log, file in zip(logs, inputs.values(), strict=True):
+    for log, file in zip(logs, files, strict=True):
         firsts.setdefault(file.sha256, log)
     given, known = list(firsts.values()), []
     for at, log in enumerate(given):
@@ -264,25 +321,27 @@ def init(
         with about(log, InputError):
             one = known_log(str(log), own.topics, own.units, own.parameters, own.system)
             known.append(replace(one, of_file=own.warnings))
-    proposal = propose(known, stated.mass_kg, stated.arm_m, scale_to_arm=scale_to_arm)
+    mass, model = stated.mass_kg, stated.model
+    mass = model.mass_kg if mass is None and model is not None else mass
+    proposal = propose(known, mass, stated.arm_m, scale_to_arm=scale_to_arm) if known else None
+    vehicle = None if model is None else of_log(model, proposal, stated.mass_kg)
     made = Proposed(
         proposal=proposal,
         stated=stated,
+        vehicle=vehicle,
         output=str(run.output),
         contradictions=(),
         doubted_guesses=(),
-        twice=tuple(seen_twice(inputs.values())),
+        twice=tuple(seen_twice(files)),
     )
     text, whole = config_text(made), not made.asked
     if whole and stated.knows_constants:
         # Numbers that the log's rotors make impossible, such as a thrust that lifts nothing.
         validate(parse_config(text, str(run.output)), str(run.output))
+    if proposal is None:
+        return made, given, text
     wrong, doubted = _parted(_findings(text, given[0], whole=whole), guessed_keys(proposal))
-    run.texts[run.output] = text
-    run.also = _summary(proposal, made.asked)
-    # A config that asks for something is refused by every command until it is filled in.
-    run.next += _next(run, proposal, given) if whole else ()
-    return replace(made, contradictions=tuple(wrong), doubted_guesses=tuple(doubted))
+    return replace(made, contradictions=tuple(wrong), doubted_guesses=tuple(doubted)), given, text
 
 
 def _next(run: Run, proposal: Proposal, given: Sequence[Path]) -> Iterator[Command]:

@@ -12,12 +12,11 @@ import typer
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.config.study import Study
 from cpfls_cli.files import read_content
-from cpfls_cli.pages.comparison import BEYOND, differing
-from cpfls_cli.pages.page import report_page
-from cpfls_cli.pages.source import Source, Sources, unique_labels
+from cpfls_cli.pages.comparison import differing
+from cpfls_cli.pages.page import WORDS, report_page
 from cpfls_cli.pages.trust import model_words
-from cpfls_cli.report.forms import Form, form_of
-from cpfls_cli.report.source import source_of_result
+from cpfls_cli.report.content import Form
+from cpfls_cli.report.source import Source, Sources, source_of_result, unique_labels
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
 from cpfls_cli.store import read
@@ -47,10 +46,11 @@ class Report:
     repeated: tuple[str, ...] = about("artifacts that are shown once", "sentence", brief=False, default=())
 
 
-@stage(Report, study=True, words={"BEYOND": BEYOND})
+@stage(Report, study=True, words=WORDS)
 def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> Report | None:
     """Write a report about artifacts."""
-    form = form or form_of(run.output)
+    suffix = run.output.suffix.lower()
+    form = form or {".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSON}.get(suffix, Form.HTML)
     inputs = run.take({str(path): path for path in artifacts})
     if len(artifacts) == 1 and not (own := stage_that_made(artifacts[0])).study:
         return _written(run, own.report(artifacts[0], form))

@@ -36,8 +36,7 @@ from cpfls_cli.report.canvas import (
     plain_ticks,
     style_of,
 )
-from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Command
+from cpfls_cli.report.content import Command, Text
 from cpfls_cli.response.flown import Responses, VehicleResponse, vehicle_responses
 from cpfls_cli.response.mismatch import (
     ACCEPTABLE,

@@ -22,7 +22,7 @@ from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Trac
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.disturbance import still_air_text
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects

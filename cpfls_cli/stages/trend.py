@@ -29,9 +29,9 @@ from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.flights.inputs import numbered_roles, once
 from cpfls_cli.flights.kept_numbers import FOLDER, find_kept, kept_numbers
 from cpfls_cli.logs.formats import formats_in_words, is_log
-from cpfls_cli.pages.source import unique_labels
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, band, in_columns, legend_over
 from cpfls_cli.report.change_words import WORDS, natural_unit
+from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (

@@ -47,8 +47,8 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
+from cpfls_cli.report.content import command_line
 from cpfls_cli.report.numbers import UNKNOWN
-from cpfls_cli.report.outcome import command_line
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.tuning.gains import AskedMargins

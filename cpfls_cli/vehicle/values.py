@@ -6,12 +6,14 @@ Vectors are tuples of components. What is always 0 is a plain 0, takes no part i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import product
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
 Value = Any
-"""A float, an array, a `Tangent` of them, a `tracing.Symbol`, or `Each`."""
+"""A float, an array, a `Tangent` or a `Polynomial` of them, a `tracing.Symbol`, or `Each`."""
 Vector = tuple[Value, ...]
 """Components along x, y, z, or as many as a state has."""
 
@@ -65,7 +67,7 @@ class Tangent:
         return Tangent(value, by)
 
     def __add__(self, other: Value) -> Value:
-        if isinstance(other, Each):
+        if isinstance(other, (Each, Polynomial)):
             return NotImplemented
         if isinstance(other, Tangent):
             return self._merged(plus(self.value, other.value), other)
@@ -78,7 +80,7 @@ class Tangent:
         return (-self).__add__(other)
 
     def __mul__(self, other: Value) -> Value:
-        if isinstance(other, Each):
+        if isinstance(other, (Each, Polynomial)):
             return NotImplemented
         if not isinstance(other, Tangent):
             return self.chained(times(self.value, other), other)
@@ -88,7 +90,7 @@ class Tangent:
         return given if zero(other.value) else given._merged(given.value, self.chained(0, other.value))
 
     def __truediv__(self, other: Value) -> Value:
-        if isinstance(other, (Each, Tangent)):
+        if isinstance(other, (Each, Tangent, Polynomial)):
             return self * other**-1
         return Tangent(0 if zero(self.value) else self.value / other, {at: d / other for at, d in self.by.items()})
 
@@ -132,6 +134,11 @@ def _lifted(function: Callable[[Value], Value], slope: Callable[[Value, Value], 
 
 
 def _array_where(condition: Value, yes: Value, no: Value) -> Value:
+    if isinstance(yes, Polynomial) or isinstance(no, Polynomial):
+        first, second = Polynomial.of(yes).terms, Polynomial.of(no).terms
+        return Polynomial(
+            {at: _array_where(condition, first.get(at, 0), second.get(at, 0)) for at in {**first, **second}}
+        )
     if not (isinstance(yes, Tangent) or isinstance(no, Tangent)):
         return np.where(condition, yes, no)
     ends = [one if isinstance(one, Tangent) else Tangent(one, {}) for one in (yes, no)]
@@ -160,6 +167,9 @@ def _array_rotors(values: Iterable[Value]) -> Value:
 
 
 def _array_total(x: Value) -> Value:
+    if isinstance(x, Polynomial):
+        shape = np.broadcast_shapes(*(np.shape(value_of(value)) for value in x.terms.values()))
+        return x.each(lambda value: _array_total(plus(np.zeros(shape), value)))
     if not isinstance(x, Tangent):
         return x if zero(x) else x.sum(axis=0)
     if zero(x.value):
@@ -177,7 +187,7 @@ def _array_total(x: Value) -> Value:
 
 def _array_extreme(choose: Callable[[Value, Value], Value], first: bool) -> Callable[[Value, Value], Value]:
     def extreme(a: Value, b: Value) -> Value:
-        if not (isinstance(a, Tangent) or isinstance(b, Tangent)):
+        if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
             return choose(a, b)
         larger = value_of(a) > value_of(b)
         return _array_where(larger, *((a, b) if first else (b, a)))
@@ -201,6 +211,80 @@ ARRAYS = Functions(
 )
 """Functions of arrays over time, whose first axis is that of the rotors where there is one value for each of them, and
 of such with derivatives."""
+
+
+class NoPolynomialError(Exception):
+    """Raised where something is no polynomial of numbers that are not known."""
+
+
+class Polynomial:
+    """A sum of products of numbers that are not known, each times a value.
+
+    Attributes
+    ----------
+    terms : mapping of tuple of str to value
+        By the sorted names of the factors.
+    """
+
+    __slots__ = ("terms",)
+    __array_ufunc__ = None
+
+    def __init__(self, terms: Mapping[tuple[str, ...], Value]) -> None:
+        self.terms = terms
+
+    @classmethod
+    def of(cls, value: Value) -> Polynomial:
+        """Take a value that depends on no such number."""
+        return value if isinstance(value, cls) else cls({} if zero(value) else {(): value})
+
+    @classmethod
+    def number(cls, name: str) -> Polynomial:
+        """Make a number that is not known."""
+        return cls({(name,): 1.0})
+
+    def each(self, function: Callable[[Value], Value]) -> Polynomial:
+        """Apply a linear function to the values."""
+        return Polynomial({factors: function(value) for factors, value in self.terms.items()})
+
+    def __add__(self, other: Value) -> Any:
+        if isinstance(other, Each):
+            return NotImplemented
+        total = dict(self.terms)
+        for factors, value in Polynomial.of(other).terms.items():
+            total[factors] = plus(total.get(factors, 0), value)
+        return Polynomial(total)
+
+    def __mul__(self, other: Value) -> Any:
+        if isinstance(other, Each):
+            return NotImplemented
+        total: dict[tuple[str, ...], Value] = {}
+        for (a, x), (b, y) in product(self.terms.items(), Polynomial.of(other).terms.items()):
+            if not zero(value := times(x, y)):
+                factors = tuple(sorted(a + b))
+                total[factors] = plus(total.get(factors, 0), value)
+        return Polynomial(total)
+
+    def __neg__(self) -> Polynomial:
+        return self.each(lambda value: -value)
+
+    def __sub__(self, other: Value) -> Any:
+        return self + minus(0, other)
+
+    def __rsub__(self, other: Value) -> Any:
+        return -self + other
+
+    def __truediv__(self, other: Value) -> Any:
+        return self * (1 / other)
+
+    def __pow__(self, power: float) -> Any:
+        if power not in (1, 2, 3):
+            raise NoPolynomialError
+        return prod([self] * (int(power) - 1), start=self)
+
+    def _refused(self, _other: Value) -> Any:
+        raise NoPolynomialError
+
+    __radd__, __rmul__, __rtruediv__, __lt__, __gt__ = __add__, __mul__, _refused, _refused, _refused
 
 
 class Each:

@@ -57,7 +57,7 @@ def undrawn(*, told=False):
         monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
         if not told:
             monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.svg", "<svg></svg>")
-            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.panels", ())
+            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.rows", ())
         yield
 
 

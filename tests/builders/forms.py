@@ -6,10 +6,8 @@ from html import unescape
 
 from cpfls_cli.config.study import Study
 from cpfls_cli.pages.page import report_page, written
-from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Box, Facts, Folded, Section, Table, Text
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.source import Document
+from cpfls_cli.report.content import Box, Facts, Folded, Form, Section, Table, Text
+from cpfls_cli.report.source import Sources
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
 from tests.builders.command_line import undrawn
 
@@ -54,8 +52,8 @@ def in_all_forms(source, blocks, beside=()):
 
 def blocks_in_all_forms(blocks):
     """Write blocks alone in each form; give the text, one line for each row of a table."""
-    document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
-    pages = {form: written(document, form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
+    sections = [Section("answer", "Answer", blocks)]
+    pages = {form: written("Title", "0", sections, [], form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
     # So wide that no cell is broken.
     shown = [*terminal_lines(blocks, 1000, whole=True), *(warning.text for warning in warnings_of(blocks))]
     return _plain({"terminal": "\n".join(shown), **pages})

@@ -237,8 +237,7 @@ def _readers(stage, path, good):
         "trajectory": ("simulate", good.study, path, *output, "--dry-run"),
         "flight": ("reduce", good.study, path, *output),
         "selection": ("identify", good.study, flight, "--selection", path, *output, "--dry-run"),
-        "model": ("predict", good.study, path, flight, *output),
-        "prediction": ("info", path, "--json"),
+        "model": ("replay", good.study, path, flight, *output, "--every", "100"),
     }
     export = (("export", path, "-o", good.folder / "out.json"),) if stage == "model" else ()
     report = ("report", good.study, path, "-o", good.folder / "out.html")

@@ -15,8 +15,8 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.remainder import Remainder
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import Remainder
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings

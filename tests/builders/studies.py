@@ -46,13 +46,12 @@ identification:
 
 def stages(study, folder):
     """Give the artifacts of a study by stage, and the commands that make them."""
-    paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model", "prediction")}
+    paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model")}
     return paths, {
         "trajectory": ("trajectory", study),
         "flight": ("simulate", study, paths["trajectory"]),
         "selection": ("reduce", study, paths["flight"]),
         "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
-        "prediction": ("predict", study, paths["model"], paths["flight"]),
     }
 
 

@@ -12,9 +12,9 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.polynomials import weights_of
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.remainder import Remainder
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.structure import TriedStructure
-from cpfls_cli.playback.table import Remainder
 from cpfls_cli.playback.vehicle import FoundNumber, Share
 from cpfls_cli.report.source import source_of_result
 from cpfls_cli.vehicle.motion import Acting
@@ -71,7 +71,7 @@ def is_held(known, vehicle):
         return False
     shape = {one.name: one.grid[0] for one in known.shapes}
     numbers = 0.1 * np.ones(0 if known.unit_coefficient else len(known.coefficients))
-    return not VehicleModel(vehicle=vehicle, effects=(ModelEffect(known.name, shape, numbers),)).beside_table
+    return not VehicleModel(vehicle=vehicle, effects=(ModelEffect(known.name, shape, numbers),)).unsimulated
 
 
 def remainder(order, breakpoints=SEVEN_RULES, rows=(0, 2, 5), size=1e-7):

@@ -93,7 +93,7 @@ def test_a_flight_in_the_place_of_a_path_asks_for_its_autopilot(refuse, pipeline
         ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         ("identify", ["model"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         (
-            "predict",
+            "replay",
             ["flight", "flight"],
             "model (made by `cpfls identify`, `cpfls extend`, `cpfls gap` or `cpfls vehicle`)",
         ),
@@ -195,7 +195,7 @@ def test_flight_of_no_samples(refuse, changed, study, tmp_path):
 )
 def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path, value):
     model = changed("model", put(path, value))
-    lines = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
+    lines = refuse("replay", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
     assert all(line.startswith(f"{model}: ") for line in lines)
 
 
@@ -209,7 +209,7 @@ def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline,
         file["uncertainty/coefficients"] = draws
 
     model = changed("model", shorten)
-    (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
+    (line,) = refuse("replay", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
     assert line == (
         f"{model}: model/fuzzy holds [5, 5, 5, 5, 5, 5] breakpoints and 112 coefficients; its structure "
         "needs [5, 5, 5, 5, 5, 5] and 113"
@@ -261,7 +261,7 @@ def test_a_flipped_bit_anywhere_is_seen_by_all_that_read(refuse, pipeline, study
     path = tmp_path / f"{stage}.h5"
     good = pipeline.paths[stage].read_bytes()
     words = (study, path) if stage == "flight" else (study, path, pipeline.flight)
-    read = ("reduce" if stage == "flight" else "predict", *words, "-o", tmp_path / "out.h5")
+    read = ("reduce" if stage == "flight" else "replay", *words, "-o", tmp_path / "out.h5")
     # One in each stretch of the file: metadata, data and the checksum itself.
     for place in np.linspace(8, len(good) - 20, 12).astype(int):
         path.write_bytes(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-STAGES = ("trajectory", "flight", "selection", "model", "prediction")
+STAGES = ("trajectory", "flight", "selection", "model")
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,6 @@ def again(cpfls, pipeline, study, tmp_path_factory):
         ("simulate", study, pipeline.trajectory, "-o", out["flight"]),
         ("reduce", study, pipeline.flight, "-o", out["selection"]),
         ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", out["model"]),
-        ("predict", study, pipeline.model, pipeline.flight, "-o", out["prediction"]),
     )
     for words in commands:
         cpfls.done(*words)

@@ -13,6 +13,8 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.autopilots import found_vehicle
 from tests.builders.changed_flights import flight_table, save
+from tests.builders.gusty_flights import LARGE
+from tests.builders.simulator_files import sdf_of
 from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import TINY
 from tests.builders.vehicle_models import write_vehicle
@@ -60,6 +62,7 @@ LINES = (
     "simulate study.yaml 3.h5 -o 16.h5 --autopilot px4",
     "init rotors.csv -o 5.yaml --mass 6 --arm 0.3 --inertia 0.6,0.6,1.2 --thrust-factor 1e-4 --drag-factor 2e-6",
     "init rotors.csv -o 18.yaml --mass 6 --arm 0.3 --scale-to-arm",
+    "init -o 19.yaml --from mine.sdf --mass 1.6",
     "import study.yaml log.csv -o 6.h5",
     "reduce study.yaml flight.h5 -o selection.h5",
     f"identify study.yaml flight.h5 -o model.h5 --selection selection.h5 {LEARN} --time-limit 0.001",
@@ -68,7 +71,6 @@ LINES = (
     f"sweep study.yaml flight.h5 -o sweep.h5 {LEARN} --resume",
     "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --write-config found.yaml --anyway --quick",
     "vehicle study.yaml flight.h5 -o found.h5 --held-out flight3.h5 --resume # nothing to resume",
-    "predict study.yaml model.h5 flight.h5 -o 7.h5",
     "replay study.yaml vehicle flight.h5 -o 8.h5 --horizon 0.2 --every 50 --hold linear",
     "replay study.yaml vehicle.h5 flight.h5 -o 9.h5 --history 0.1 # holds no forecast that uses the past",
     "response study.yaml flight.h5 -o 10.h5 --csv 10.csv",
@@ -111,6 +113,7 @@ def folder(cpfls, tmp_path_factory):
         "t,roll,pitch,yaw,mx,my,mz",
     )
     save(folder / "rotors.csv", flight_table(1), "t,wx,wy,wz,ax,ay,az,motor_1,motor_2,motor_3,motor_4,volts")
+    (folder / "mine.sdf").write_text(sdf_of(LARGE))
     (folder / "points.csv").write_text("x_m,y_m,z_m\n0,0,1\n1,0,1\n1,1,1\n")
     assert cpfls("trajectory", study, "-o", path).exit_code == 0
     for number in ("", 2, 3):

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+import cpfls_cli
 from cpfls_cli.validation.verdict import Reason, Verdict
 from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
@@ -72,11 +73,12 @@ def test_the_model_of_a_study_is_exported(cpfls, pipeline, tmp_path, form):
 def test_exported_torque_is_that_of_predict(cpfls, pipeline, tmp_path):
     assert cpfls("export", pipeline.model, "--format", "jax", "-o", tmp_path / "quad.py").exit_code == 0
     names = on_numpy((tmp_path / "quad.py").read_text())
-    with h5py.File(pipeline.flight) as flight, h5py.File(pipeline.prediction) as prediction:
+    prediction = cpfls_cli.load_model(pipeline.model).predict(pipeline.flight)
+    with h5py.File(pipeline.flight) as flight:
         motion = [flight[name][::10] for name in ("attitude", "attitude_rate", "attitude_acceleration")]
         torque, body = np.array([names["torque"](*row) for row in zip(*motion, strict=True)]).swapaxes(0, 1)
-        assert np.max(np.abs(torque - prediction["torque"][::10])) < 1e-12 * np.max(np.abs(torque))
-        assert np.max(np.abs(body - prediction["body_torque"][::10])) < 1e-12 * np.max(np.abs(body))
+        assert np.max(np.abs(torque - prediction.torque[::10])) < 1e-12 * np.max(np.abs(torque))
+        assert np.max(np.abs(body - prediction.body_torque[::10])) < 1e-12 * np.max(np.abs(body))
 
 
 def test_equal_models_give_equal_files(cpfls, pipeline, tmp_path):

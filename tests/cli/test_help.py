@@ -18,7 +18,6 @@ COMMANDS = (
     "reduce",
     "identify",
     "sweep",
-    "predict",
     "vehicle",
     "replay",
     "response",

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.formats import stage_module
+from cpfls_cli.artifacts.gate import stage_module
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.result import datasets
 from cpfls_cli.stage import loaded
 from tests.builders.artifacts import edited
 from tests.builders.studies import stages
 
-STAGES = ("trajectory", "flight", "selection", "model", "prediction")
+STAGES = ("trajectory", "flight", "selection", "model")
 
 
 def format_of(stage):
@@ -67,7 +67,7 @@ def test_info_tells_origin_and_content(cpfls, pipeline, stage):
 
 
 @pytest.mark.usefixtures("pipeline")
-@pytest.mark.parametrize("stage", ["trajectory", "selection", "model", "prediction"])
+@pytest.mark.parametrize("stage", ["trajectory", "selection", "model"])
 def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     """Nothing is computed again to read it."""
     _, commands = stages(study, study.parent)
@@ -89,7 +89,6 @@ def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
         ("flight", {"trajectory": "trajectory"}),
         ("selection", {"flight": "flight"}),
         ("model", {"flight": "flight", "selection": "selection"}),
-        ("prediction", {"model": "model", "flight": "flight"}),
     ],
 )
 def test_inputs_are_named_by_role_and_hash(cpfls, pipeline, stage, roles):

@@ -48,7 +48,7 @@ def after(pipeline, study, tmp_path_factory):
             ("trajectory", study, "--set", short, "-o", trajectory),
             ("simulate", study, pipeline.trajectory, "-o", folder / "flight.h5"),
             ("simulate", study, trajectory, "--mode", "closed-loop", "-o", closed),
-            ("predict", study, pipeline.model, pipeline.flight, "-o", folder / "prediction.h5"),
+            ("replay", study, pipeline.model, pipeline.flight, "--every", "50", "-o", folder / "replay.h5"),
             ("export", pipeline.model, "-o", folder / "model.json"),
             ("effects",),
         ],

@@ -50,14 +50,13 @@ def test_a_log_where_no_config_was_given(refuse, log, tmp_path):
         )
 
 
-@pytest.mark.parametrize("command", ["info", "check", "export", "report", "replay", "identify", "reduce", "predict"])
+@pytest.mark.parametrize("command", ["info", "check", "export", "report", "replay", "identify", "reduce"])
 def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
     given = {
         "info": (log,),
         "check": (log,),
         "export": (log,),
         "replay": (study, log, log),
-        "predict": (study, log, log),
     }
     output = () if command in ("info", "check") else ("-o", tmp_path / "out.json")
     (line,) = refuse(command, *given.get(command, (study, log)), *output)

@@ -1,9 +1,12 @@
 """docs/format.md says how a stored model is evaluated; here plain NumPy does so from the file's datasets alone."""
 
+import warnings
+
 import h5py
 import numpy as np
 import pytest
 
+import cpfls_cli
 from tests.builders.artifacts import edited
 
 FUNCTIONS = {
@@ -160,7 +163,7 @@ SMALL = ("ridge.count=2", "generations=1", "validation.enabled=false")
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pipeline, study, tmp_path, name):
     """The inertia to rounding; the torque to what a central difference of it leaves."""
-    model, prediction = tmp_path / "model.h5", tmp_path / "prediction.h5"
+    model = tmp_path / "model.h5"
     changed = [word for key, value in STRUCTURES[name].items() for word in ("--set", f"identification.{key}={value}")]
     small = [word for key in SMALL for word in ("--set", f"identification.{key}")]
     cpfls.done("identify", study, pipeline.flight, "-o", model, *changed, *small)
@@ -171,10 +174,10 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
             file[key][:] = numbers.uniform(0.5, 1.5, file[key].shape) * (
                 key != "model/fuzzy/rigid_body" or "rigid" in name
             )
-    cpfls.done("predict", study, model, pipeline.flight, "-o", prediction)
-    stored = Stored(model)
-    with h5py.File(pipeline.flight) as flight, h5py.File(prediction) as predicted:
+    with warnings.catch_warnings(action="ignore"):
+        predicted = cpfls_cli.load_model(model).predict(pipeline.flight)
+    stored, inertia, torque = Stored(model), predicted.inertia, predicted.torque
+    with h5py.File(pipeline.flight) as flight:
         motion = [flight[key][:] for key in ("attitude", "attitude_rate", "attitude_acceleration")]
-        inertia, torque = predicted["inertia"][:], predicted["torque"][:]
     np.testing.assert_allclose(stored.inertia(motion[0]), inertia, atol=1e-11 * np.abs(inertia).max())
     np.testing.assert_allclose(stored.torque(*motion), torque, atol=2e-6 * np.abs(torque).max())

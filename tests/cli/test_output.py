@@ -81,13 +81,13 @@ def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
     assert line == f"{output}: cannot be written: No space left on device"
 
 
-@pytest.mark.parametrize(("command", "limit"), [("trajectory", 100), ("trajectory", 60_000), ("predict", 60_000)])
+@pytest.mark.parametrize(("command", "limit"), [("trajectory", 100), ("trajectory", 60_000), ("simulate", 60_000)])
 def test_output_larger_than_the_system_allows(pipeline, study, tmp_path, command, limit):
     """A real refusal by the system, in the first and in a later block; HDF5 must not crash when the program ends."""
     # The limit is for all files: of a module compiled anew Python would keep what fits, and fail to load it ever after.
     limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     code = limited.format(limit) + "from cpfls_cli.cli.main import run; sys.argv[0] = 'cpfls'; run()"
-    inputs = (pipeline.model, pipeline.flight) if command == "predict" else ()
+    inputs = (pipeline.trajectory,) if command == "simulate" else ()
     words = [command, study, *inputs, "-o", tmp_path / "out.h5"]
     result = subprocess.run([sys.executable, "-B", "-c", code, *map(str, words)], capture_output=True, text=True)
     assert (result.returncode, result.stdout) == (1, "")
@@ -102,7 +102,7 @@ def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
         assert "this command needs a" in refuse(command, study, pipeline.model, *words)[0]
     assert (
         "this command needs a model (made by `cpfls identify`"
-        in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
+        in refuse("replay", study, pipeline.flight, pipeline.flight, *words)[0]
     )
 
 

@@ -88,7 +88,6 @@ def _of_torque(show):
     show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
     show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
     show("response", "response", "tiny.yaml", "flight.h5", output="response.h5")
-    show("predict", "predict", "tiny.yaml", "model.h5", "flight.h5", output="predicted.h5")
     show("replay", "replay", "tiny.yaml", "model.h5", "flight.h5", output="replay.h5")
     show("report", "report", "tiny.yaml", "model.h5", output="report.md")
     show("export", "export", "model.h5", output="model.json")
@@ -172,7 +171,7 @@ NAMES = (
     *("init", "init of one", "import"),
 )
 """Runs by name."""
-OF_MODELS = ("predict", "replay", "report", "export", "spread")
+OF_MODELS = ("replay", "report", "export", "spread")
 """Of these the words are held beside their flights."""
 OF_OPEN_NUMBERS = (
     "open: trajectory",

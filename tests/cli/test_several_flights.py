@@ -42,37 +42,6 @@ def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
         }
 
 
-def test_what_each_flight_taught_is_said(cpfls, study, pipeline, second, tmp_path):
-    """Of two flights a model has learned from a part each, and has not seen a third one."""
-    model, share = tmp_path / "model.h5", ("--set", "identification.training_share=0.6")
-    cpfls.done("identify", study, pipeline.flight, second, "-o", model, *share)
-    third = tmp_path / "third.h5"
-    noisy = ("--set", "simulation.noise.torque=0.1")
-    cpfls.done("simulate", study, pipeline.trajectory, "-o", third, *noisy)
-    for name, path in (("first", pipeline.flight), ("second", second), ("third", third)):
-        output = tmp_path / f"{name}-prediction.h5"
-        printed = cpfls.done("predict", study, model, path, "-o", output).stdout
-        cpfls.done("report", study, model, output, "-o", tmp_path / f"{name}.md")
-        page = (tmp_path / f"{name}.md").read_text()
-        if name == "third":
-            assert "learned from" not in printed
-            assert f"model.h5 along {path.name}: a flight that it did not learn from" in page
-            continue
-        samples = len(stored(path, "time")[0])
-        part = f"its first {round(0.6 * samples)} of {samples} samples; the rest was held out"
-        told = f"model.h5 along {path.name}: one of the flights that it learned from ({part})"
-        assert told in printed.splitlines()
-        assert told in page.splitlines()
-        assert "did not learn from" not in page
-
-
-def test_a_flight_that_a_model_was_chosen_on_is_no_new_one(cpfls, study, pipeline, second, tmp_path):
-    model, held_out = tmp_path / "model.h5", ("--set", "identification.choice=held-out")
-    cpfls.done("identify", study, pipeline.flight, "--choose-on", second, "-o", model, *held_out)
-    printed = cpfls.done("predict", study, model, second, "-o", tmp_path / "p.h5").stdout
-    assert f"model.h5 along {second.name}: a flight that it was chosen on" in printed.splitlines()
-
-
 def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study, pipeline, second, tmp_path):
     selection, model = tmp_path / "selection.h5", tmp_path / "model.h5"
     share = ("--set", "identification.training_share=0.6")

@@ -13,9 +13,8 @@ from cpfls_cli import compiling
 from cpfls_cli.cli.options import Common
 from cpfls_cli.cli.terminal import progress_bar, tell
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Folded, Text
-from cpfls_cli.report.figure_tables import with_code
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.page import said
+from cpfls_cli.report.content import Folded, Outcome, Text
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
 
@@ -264,5 +263,5 @@ def test_what_turns_or_hides_text_in_a_name_reaches_no_terminal_and_no_page(orde
     block = Text(f"gyro_x{order} is no column")
     escaped = repr(order)[1:-1]
     assert "".join(terminal_lines([block])) == f"gyro_x{escaped} is no column"
-    assert order not in with_code(block.text)
+    assert order not in said(block.text)
     assert visible("a table\n\tß → µ ́") == "a table\n\tß → µ ́"

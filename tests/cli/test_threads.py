@@ -25,7 +25,7 @@ LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NU
 
 
 def test_one_thread_whatever_the_environment_says(pipeline, study, tmp_path):
-    words = ("cpfls", "predict", study, pipeline.model, pipeline.flight, "-o", tmp_path / "out.h5", "-q")
+    words = ("cpfls", "reduce", study, pipeline.flight, "-o", tmp_path / "out.h5", "-q")
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
     result = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(words=[*map(str, words)])],

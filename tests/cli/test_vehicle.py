@@ -123,8 +123,6 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert worth[1].startswith(f"On held-out flights it ends {rate:.3g} rad/s, ")
     assert worth[1].endswith(f" m off the measured motion after {last:.3g} s, on average.")
     assert worth[2] == "JSON holds all of it."
-    predicted = cpfls.told("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5")
-    assert predicted["held_against"] == "motion"
     compared = cpfls.told("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5")
     assert max(compared["gap"]["floors"]) < 1.5
     alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")

@@ -21,12 +21,11 @@ def words(pipeline, tmp_path):
         "import": ([log], ["--set", "import.time_column=t", "--set", f"import.signals={SIGNALS}"]),
         "reduce": ([pipeline.flight], []),
         "identify": ([pipeline.flight], []),
-        "predict": ([pipeline.model, pipeline.flight], []),
         "report": ([pipeline.trajectory, pipeline.selection], []),
     }
 
 
-COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "predict", "report")
+COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -158,15 +158,6 @@ def test_a_replay_shows_measured_model_and_difference_of_each_flight(cpfls, logg
     assert np.abs(difference).max() > 0.1
 
 
-def test_a_prediction_of_a_simulated_flight_has_no_log_behind_it(cpfls, pipeline, tmp_path):
-    said = json.loads(exported(cpfls, pipeline.prediction, tmp_path / "prediction.csv", "--json"))
-    assert said["on_log_clock"] is False
-    columns = columns_of(tmp_path / "prediction.csv")
-    gap = columns["torque/roll/measured"] - columns["torque/roll/model"]
-    np.testing.assert_allclose(gap, columns["torque/roll/difference"], atol=1e-7)
-    assert columns["__time"][0] == 0.0
-
-
 def test_what_has_nothing_over_time_is_refused(refuse, pipeline, tmp_path):
     (said,) = refuse("export", pipeline.model, "-o", tmp_path / "model.mcap")
     assert "holds nothing over time" in said

@@ -1,22 +1,24 @@
 """A whole vehicle flies, predicts and is compared: nothing of its model is left out on the way."""
 
 import json
+import warnings
 from dataclasses import asdict, replace
 
 import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli import store
+import cpfls_cli
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight import Flight, Simulated
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rotations import body_torque
 from cpfls_cli.store import read
-from cpfls_cli.validation.prediction import AlongFlight
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
@@ -188,7 +190,6 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
     words = {
         "simulate": (path, "--model", model),
         "compare": (flight, "--model", model),
-        "predict": (model, flight),
         "replay": (model, flight),
         "response": (flight, "--model", model),
     }
@@ -197,32 +198,11 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
         assert result.exit_code == 0, (command, result.stderr)
 
 
-def predicted(cpfls, config, model, flown, output):
-    return cpfls.told("predict", config, model, flown, "-o", output), store.read(output, AlongFlight)[0]
-
-
-def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):
-    told, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
-    cpfls.done("check", tmp_path / "p.h5")
-    assert told["held_against"] == "motion"
-    assert min(told["r2_body"]) > 0.999
-    size = record.measured_force.std(axis=0)
-    assert (np.array(told["force_rms"]) < 1e-3 * size).all()
-    assert np.diag(record.inertia[0]) == pytest.approx(WHOLE.vehicle.inertia_kg_m2, rel=0.01)
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
-    result = cpfls.done("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
-    _, first, *_, last = result.stdout.splitlines()
-    assert first.endswith(
-        "held against what the motion takes with its inertia, noise of the differentiated rates included"
-    )
-    assert last.startswith("a torque that is right at each sample may still predict nothing; `cpfls replay`")
-    cpfls.done("report", config, tmp_path / "p.h5", vehicle, "-o", tmp_path / "page.md")
-    text = (tmp_path / "page.md").read_text()
-    assert "Force on the body without weight" in text
-    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from" in text
+def test_torque_and_force_are_what_the_motion_takes(vehicle, flight):
+    found = cpfls_cli.load_model(vehicle).predict(flight)
+    assert found.score.r2_body.min() > 0.999
+    assert (found.force_rms < 1e-3 * found.measured_force.std(axis=0)).all()
+    assert np.diag(found.inertia[0]) == pytest.approx(WHOLE.vehicle.inertia_kg_m2, rel=0.01)
 
 
 def without(flown, target, *names):
@@ -242,14 +222,12 @@ def without(flown, target, *names):
         (("rotor_speed", "rotor_command"), "x.h5: lacks rotor speed, which the model of the whole vehicle needs"),
     ],
 )
-@pytest.mark.parametrize("command", ["predict", "compare"])
-def test_a_flight_that_lacks_what_the_model_needs_is_refused(
-    refuse, config, vehicle, flight, tmp_path, command, names, lacks
-):
+def test_a_flight_that_lacks_what_the_model_needs_is_refused(refuse, config, vehicle, flight, tmp_path, names, lacks):
     flown = without(flight, tmp_path / "x.h5", *names)
-    words = (vehicle, flown) if command == "predict" else (flown, "--model", vehicle)
-    (line,) = refuse(command, config, *words, "-o", tmp_path / "out.h5")
+    (line,) = refuse("compare", config, flown, "--model", vehicle, "-o", tmp_path / "out.h5")
     assert line == lacks
+    with pytest.raises(InputError, match=lacks):
+        cpfls_cli.load_model(vehicle).predict(flown)
 
 
 @pytest.fixture
@@ -279,13 +257,14 @@ def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
     cpfls, config, vehicle, flight, written_log, tmp_path
 ):
     """A log of the true torque, which no rotor of the config tells, beside the measured rotor speeds."""
-    _, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
-    log, settings = written_log(body_torque=("N m", record.body_torque))
+    torque = cpfls_cli.load_model(vehicle).predict(flight).body_torque
+    log, settings = written_log(body_torque=("N m", torque))
     settings["torque_source"] = "column"
     options = ("--set", f"import={json.dumps(settings)}")
     cpfls.done("import", config, log, "-o", tmp_path / "log.h5", *options)
-    told, held = predicted(cpfls, config, vehicle, tmp_path / "log.h5", tmp_path / "q.h5")
-    assert told["held_against"] == "recorded"
+    with warnings.catch_warnings(action="ignore"):
+        held = cpfls_cli.load_model(vehicle).predict(tmp_path / "log.h5")
+    np.testing.assert_allclose(body_torque(held.attitude, held.measured_torque), torque, atol=1e-6)
     assert np.abs(held.error[5:-5]).max() < 1e-3 * np.abs(held.torque).max()
 
 
@@ -321,17 +300,17 @@ def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_
     vehicle = tmp_path / "vehicle.h5"
     write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
     cpfls.done("import", left_open, log, "-o", tmp_path / "f.h5")
-    told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
-    assert min(told["r2_body"]) > 0.999
+    with warnings.catch_warnings(action="ignore"):
+        assert cpfls_cli.load_model(vehicle, left_open).predict(tmp_path / "f.h5").score.r2_body.min() > 0.999
     assert (gap(cpfls, left_open, tmp_path / "gap.h5", log, "--model", vehicle) < 1).all()
     # An autopilot needs numbers, and the model is of the vehicle that they were left open of.
     cpfls.done("simulate", config, path, "--model", vehicle, "-o", tmp_path / "flown.h5")
 
 
-@pytest.mark.parametrize("command", ["compare", "predict", "replay", "response"])
+@pytest.mark.parametrize("command", ["compare", "replay", "response"])
 def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_config, tmp_path, command):
     left_open, log = open_config
-    words = {"predict": (log, log), "replay": ("vehicle", log)}.get(command, (log,))
+    words = ("vehicle", log) if command == "replay" else (log,)
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
     assert f"not known in this config, but `cpfls {command}` needs what is null there" in line
 

@@ -47,7 +47,7 @@ BY_NEED = {"cli", "library", "workers/employ.py", "report/canvas.py"}
 
 
 def test_layers_hold_as_imported():
-    """What a module needs it imports where the import contracts see it; `artifacts/formats.py` loads by need."""
+    """What a module needs it imports where the import contracts see it; `artifacts/gate.py` loads by need."""
     names = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
     modules = [path for name, path in names.items() if {name, name.split("/")[0]}.isdisjoint(BY_NEED)]
     assert [entry for path in modules for entry in own_imports_in_functions(path)] == []

@@ -176,7 +176,6 @@ SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
-    "report/json_page.py": "a form",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

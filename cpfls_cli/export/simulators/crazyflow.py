@@ -32,7 +32,6 @@ _FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
 _DRAG = (*_FORCE_OF_VELOCITY, 0)
 """Places in a table of weights."""
 
-_ARRAYS = "SCIPY_ARRAY_API"
 _ROTORS, _RPM = 4, 30 / np.pi
 _USE = (
     "For crazyflow put the section into crazyflow/dynamics/first_principles/params.toml under the name of one of its "

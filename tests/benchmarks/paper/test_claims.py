@@ -32,8 +32,8 @@ from benchmarks.paper.search_claims import (
     paired_ratio,
 )
 from cpfls_cli.config.study import ReportSettings
-from cpfls_cli.pages.source import Source
 from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.report.source import Source
 from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.sweeps import setting_of, sweep_of

@@ -24,7 +24,7 @@ def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
     effects = {one.name: one.coefficients for one in vehicle.effects}
     # The height, which the thrust alone does not show, is left open.
     assert effects["com_offset"] == pytest.approx([0.008, -0.005, 0.0], rel=0.05)
-    assert vehicle.beside_table == ()
+    assert vehicle.unsimulated == ()
     np.testing.assert_allclose(six_parameters(vehicle.vehicle.inertia_kg_m2), record.inertia, rtol=1e-12)
 
 

@@ -5,6 +5,7 @@ import json
 import h5py
 import pytest
 
+import cpfls_cli
 from tests.builders.command_line import undrawn
 
 
@@ -46,7 +47,7 @@ def test_extended_model_predicts_and_is_compared(cpfls, brief_config, answer, wi
     assert summary["extension"]["written"]
     cpfls.done("import", brief_config, with_attitude[1], "-o", tmp_path / "f.h5")
     extended = folder / "extended.h5"
-    assert cpfls.told("predict", brief_config, extended, tmp_path / "f.h5", "-o", tmp_path / "p.h5")["samples"] == 2400
+    assert len(cpfls_cli.load_model(extended, brief_config).predict(tmp_path / "f.h5").time) == 2400
     words = ("compare", brief_config, with_attitude[1], "--model", extended, "-o", tmp_path / "d.h5", "--json")
     result = cpfls.done(*words)
     # What was held out for the diagnosis, seen again through the extended model.

@@ -34,21 +34,6 @@ def test_stages_hand_the_flights_on(cpfls, gap_config, two_models, tmp_path):
     assert learned(again) == learned(two_models)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_predict_says_that_it_has_seen_the_flight(cpfls, gap_config, two_models, with_attitude, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("import", gap_config, with_attitude[0], "-o", flight)
-    seen = "one of the flights that it learned from (its first 1600 of 2400 samples; the rest was held out)"
-    for path in (with_attitude[0], flight):
-        result = cpfls("predict", gap_config, two_models, path, "-o", tmp_path / "p.h5", "--force")
-        assert f"extended.h5 along {path.name}: {seen}" in result.stdout.splitlines()
-    page = tmp_path / "page.md"
-    cpfls.done("report", gap_config, two_models, flight, tmp_path / "p.h5", "-o", page)
-    assert f"extended.h5 along flight.h5: {seen}" in page.read_text()
-    result = cpfls("predict", gap_config, two_models, with_attitude[1], "-o", tmp_path / "new.h5")
-    assert "learned from" not in result.stdout
-
-
 def test_replay_and_compare_warn_of_flights_seen(
     cpfls, gap_config, two_models, extended, shifted, with_attitude, tmp_path
 ):

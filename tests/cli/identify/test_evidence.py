@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+import cpfls_cli
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.report.numbers import sentence
 from cpfls_cli.result import datasets
@@ -90,22 +91,18 @@ def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls,
     assert all(sentence in lines for sentence in box["sentences"])
 
 
-def test_bands_go_with_a_prediction_and_hold_the_model(validated, cpfls, study, pipeline, tmp_path):
-    output = tmp_path / "prediction.h5"
-    cpfls.done("predict", study, validated[0], pipeline.flight, "-o", output)
-    with h5py.File(output) as file:
-        for name in ("inertia", "torque"):
-            low, value, high = (file[f"{name}{end}"][()] for end in ("_low", "", "_high"))
-            assert np.all(low <= value)
-            assert np.all(value <= high)
-            assert np.any(low < high)
-    cpfls.done("check", output)
+def test_bands_go_with_a_prediction_and_hold_the_model(validated, pipeline):
+    found = cpfls_cli.load_model(validated[0]).predict(pipeline.flight)
+    for value, (low, high) in ((found.inertia, found.inertia_band), (found.torque, found.torque_band)):
+        assert np.all(low <= value)
+        assert np.all(value <= high)
+        assert np.any(low < high)
 
 
 def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
     validated, cpfls, study, pipeline, tmp_path
 ):
-    model, prediction = tmp_path / "model.h5", tmp_path / "prediction.h5"
+    model = tmp_path / "model.h5"
     words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6")
     result = cpfls(*words, "--set", "identification.validation.enabled=false", "-o", model, "--json")
     assert json.loads(result.stdout)["verdict"] is None
@@ -113,9 +110,8 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
         assert not any(path in plain for path in VALIDATION)
         for name in ("model/fuzzy/coefficients", "weights", "judged/mse", "history/best"):
             np.testing.assert_array_equal(plain[name][()], whole[name][()])
-    cpfls.done("predict", study, model, pipeline.flight, "-o", prediction)
-    with h5py.File(prediction) as file:
-        assert "inertia_low" not in file
+    with pytest.warns(UserWarning, match="has no verdict and no bands"):
+        assert cpfls_cli.load_model(model).predict(pipeline.flight).inertia_band is None
 
 
 def test_equal_seeds_draw_equal_evidence_and_others_do_not(validated, cpfls, study, pipeline, tmp_path):
@@ -152,12 +148,9 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
 
 
-def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
-    for number, (label, told) in enumerate(
-        ((None, "has no verdict and no bands"), ("do-not-use", "do not use"), ("good-for-control", None))
-    ):
-        model, output = tmp_path / f"{number}.h5", tmp_path / f"prediction-{number}.h5"
-        given = {"verdict": None} if label is None else {"verdict__label": label}
-        write_changed(validated[0], model, **given)
-        stderr = cpfls("predict", study, model, pipeline.flight, "-o", output).stderr
+def test_use_of_a_model_that_was_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
+    for number, (label, told) in enumerate((("do-not-use", "do not use"), ("good-for-control", None))):
+        model, output = tmp_path / f"{number}.h5", tmp_path / f"replay-{number}.h5"
+        write_changed(validated[0], model, verdict__label=label)
+        stderr = cpfls("replay", study, model, pipeline.flight, "--every", "50", "-o", output).stderr
         assert (told in stderr) if told else ("verdict" not in stderr)

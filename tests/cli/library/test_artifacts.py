@@ -56,8 +56,6 @@ def test_columns_are_named_by_axis_and_have_units(pipeline):
     np.testing.assert_array_equal(frame["rotor_speed.3"], flight["rotor_speed"][:, 3])
     assert frame.attrs["units"]["body_torque.z"] == "N m"
     assert {"position.x", "torque.yaw"} <= set(frame.columns)
-    matrices = cpfls_cli.read(pipeline.prediction).to_pandas("time")
-    np.testing.assert_array_equal(matrices["inertia.roll.yaw"], cpfls_cli.read(pipeline.prediction)["inertia"][:, 0, 2])
 
 
 def test_another_dimension_counts_where_it_has_no_numbers_of_its_own(pipeline):
@@ -116,16 +114,14 @@ def test_a_package_that_is_missing_is_named_with_the_command(pipeline, monkeypat
 
 
 def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
-    flight, model, prediction = (
-        cpfls_cli.read(path) for path in (pipeline.flight, pipeline.model, pipeline.prediction)
-    )
-    given = (pipeline.prediction, pipeline.flight, pipeline.model)
+    flight, model = (cpfls_cli.read(path) for path in (pipeline.flight, pipeline.model))
+    given = (pipeline.flight, pipeline.model)
     report = cpfls("report", study, *given, "-o", tmp_path / "r.md", "--json")
-    figures = prediction.figures(flight, model)
+    figures = flight.figures(model)
     assert list(figures) == json.loads(report.stdout)["figures"]
     with matplotlib.rc_context({"font.size": 30}):
-        drawn = figures["predict-1-torques"]
+        drawn = figures["simulate-1-torque"]
     assert isinstance(drawn, Figure)
     assert [axes.get_title(loc) for axes in drawn.axes for loc in ("left", "right") if axes.get_title(loc)]
     assert drawn.axes[0].yaxis.label.get_size() == 9.5
-    assert len(drawn.axes[0].lines[0].get_xdata()) == len(prediction["time"])
+    assert len(drawn.axes[0].lines[0].get_xdata()) == len(flight["time"])

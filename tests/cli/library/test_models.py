@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import cpfls_cli
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.store import read
 from tests.builders import vehicle_models
 from tests.builders.exported_vehicles import flat, on_numpy
 from tests.builders.identified_models import write_changed
@@ -31,10 +33,19 @@ def speeds():
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_prediction_and_a_replay_are_what_the_commands_write(cpfls, pipeline, study, tmp_path):
+def test_a_prediction_is_that_of_the_model_and_is_held_against_the_flight(pipeline):
     model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
-    model.predict(flight).write(tmp_path / "prediction.h5")
-    assert (tmp_path / "prediction.h5").read_bytes() == pipeline.prediction.read_bytes()
+    found = model.predict(flight)
+    judged = read(pipeline.model, IdentifiedModel)[0].judged
+    np.testing.assert_allclose(found.score.mse, judged.of_axes("mse", "model", "training"))
+    assert found.score.worst_relative_error == pytest.approx(judged.worst("model", "training")[0])
+    np.testing.assert_allclose(found.error, flight["torque"] - found.torque)
+    np.testing.assert_allclose(found.inertia, found.inertia.swapaxes(1, 2))
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_replay_is_what_the_command_writes(cpfls, pipeline, study, tmp_path):
+    model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
     options = ("--horizon", "0.3", "--every", "40", "--hold", "previous")
     cpfls("replay", study, pipeline.model, pipeline.flight, "-o", tmp_path / "command.h5", *options)
     replay = model.replay(flight, horizon_s=0.3, every=40, hold="previous")
@@ -42,14 +53,12 @@ def test_a_prediction_and_a_replay_are_what_the_commands_write(cpfls, pipeline, 
     assert (tmp_path / "replay.h5").read_bytes() == (tmp_path / "command.h5").read_bytes()
 
 
-def test_what_a_command_notes_is_a_warning_of_the_caller(cpfls, pipeline, study, tmp_path):
+def test_what_a_command_notes_is_a_warning_of_the_caller(pipeline, tmp_path):
     unjudged = tmp_path / "unjudged.h5"
     write_changed(pipeline.model, unjudged, verdict=None)
-    noted = cpfls("predict", study, unjudged, pipeline.flight, "-o", tmp_path / "p.h5").stderr
     model = cpfls_cli.load_model(unjudged)
     with pytest.warns(UserWarning, match="has no verdict") as warned:
         model.predict(pipeline.flight)
-    assert {f"cpfls: note: {each.message}" for each in warned} == set(noted.splitlines())
     with pytest.warns(UserWarning, match="holds no verdict") as exported:
         model.to_c(tmp_path / "m.c")
     assert {each.filename for each in (*warned, *exported)} == {__file__}
@@ -147,9 +156,9 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_what_is_in_memory_has_no_file_before_it_is_written(pipeline):
-    prediction = cpfls_cli.load_model(pipeline.model).predict(pipeline.flight)
+    replay = cpfls_cli.load_model(pipeline.model).replay(pipeline.flight, every=100)
     with pytest.raises(InputError, match="write it first"):
-        prediction.path  # noqa: B018
+        replay.path  # noqa: B018
 
 
 def test_commands_run_in_this_process_and_say_what_is_wrong(capsys, pipeline, tmp_path):

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import cpfls_cli
 from cpfls_cli import store
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.pages.comparison import differences
-from cpfls_cli.pages.source import unique_labels
+from cpfls_cli.report.source import unique_labels
 from cpfls_cli.store import read
 from tests.builders.evidence_artifacts import curves, steps, verdict
 from tests.builders.identified_models import EVIDENCE_PARTS, with_parts
@@ -162,18 +163,22 @@ def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
     assert all("◂" in cell for row in table(blocks, "Model", 1)["rows"] for cell in row[1:])
 
 
-@pytest.mark.usefixtures("data_of_figures")
-def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale(compared, write, bare):
+def figure_of(name, *paths):
+    first, *others = map(cpfls_cli.read, paths)
+    return first.figures(*others)[name]
+
+
+def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale(write, bare):
     mse = bare[0].judged.mse.copy()
     mse[bare[0].judged.models.index("rigid-body")] = 1e-32
     two = mse.copy()
     two[bare[0].judged.models.index("model")] *= 1.21
     paths = write("one.h5", **{"judged/mse": mse}), write("two.h5", **{"judged/mse": two})
-    series = named(compared(*paths)[1], "comparison-errors")["panels"][0]["series"]
-    assert [own["label"] for own in series] == ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
-    one, other, *rigid = (own["x"] for own in series)
+    curves = figure_of("comparison-errors", *paths).axes[0].lines
+    assert [own.get_label() for own in curves] == ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
+    one, other, *rigid = (own.get_xdata() for own in curves)
     assert other[0] == pytest.approx(1.1 * one[0], rel=1e-3)
-    assert rigid == [[0.0], [0.0]]
+    assert list(map(list, rigid)) == [[0.0], [0.0]]
 
 
 def test_each_model_is_summarised_after_the_comparison(compared, write):
@@ -195,7 +200,6 @@ def test_equal_configs_are_called_equal(compared, write):
     assert any("Nothing: the same config" in block.get("text", "") for block in blocks)
 
 
-@pytest.mark.usefixtures("data_of_figures")
 def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
     own = {path: values for path, values in curves().items() if path.startswith("curves/")}
     models = [write(name, **own, **verdict(label)) for name, label in (("one.h5", "do-not-use"), ("two.h5", "new"))]
@@ -205,8 +209,7 @@ def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
         "comparison-curves-1",
         "comparison-curves-2",
     ]
-    panel = named(blocks, "comparison-curves-1")["panels"][0]
-    labels = [series["label"] for series in panel["series"]]
+    labels = figure_of("comparison-curves-1", *models).axes[0].get_legend_handles_labels()[1]
     assert {"one.h5", "two.h5", "rigid body", "95 % band of one.h5", "95 % band of two.h5"} == set(labels)
     rows = table(blocks, "Model")["rows"]
     assert [row[1] for row in rows] == ["do not use", "new", "not judged", ""]

@@ -2,15 +2,16 @@
 
 import json
 import re
+import warnings
 from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import cpfls_cli
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
-from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import undrawn
 from tests.builders.evidence_artifacts import REASONS, with_evidence
 from tests.builders.identified_models import EVIDENCE_PARTS, write_changed
@@ -199,35 +200,10 @@ def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 
 
-@pytest.mark.usefixtures("undrawn", "data_of_figures")
-def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
-    prediction, output = read_result(pipeline.prediction), tmp_path / "banded.h5"
-    bands = {
-        f"{key}_{end}": getattr(prediction, key) + sign * 0.25
-        for key in ("inertia", "torque")
-        for end, sign in (("low", -1), ("high", 1))
-    }
-    with_fields(pipeline.prediction, output, **bands)
-    page = json.loads(report(output, form="json").text)
-    figures = {
-        block["name"]: block for part in page["sections"] for block in part["blocks"] if block["kind"] == "figure"
-    }
-    drawn = [
-        series
-        for panel in figures["predict-1-torques"]["panels"]
-        for series in panel["series"]
-        if series["form"] == "band"
-    ]
-    assert len(drawn) == 3
-    assert np.array(drawn[0]["high"]) - np.array(drawn[0]["low"]) == pytest.approx(0.5, rel=1e-3)
-    forms = [series["form"] for panel in figures["predict-1-inertia-matrix"]["panels"] for series in panel["series"]]
-    assert forms.count("band") == 4
-
-
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("condition", "told"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
-def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipeline, study, tmp_path, condition, told):
-    single, known, prediction = (tmp_path / f"{name}.h5" for name in ("single", "known", "prediction"))
+def test_one_rule_that_training_determined_holds_everywhere(cpfls, pipeline, study, tmp_path, condition, told):
+    single, known = (tmp_path / f"{name}.h5" for name in ("single", "known"))
     options = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
     cpfls("identify", study, pipeline.flight, "-o", single, *options)
     model = read(single, IdentifiedModel)[0]
@@ -238,5 +214,7 @@ def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipel
         rank=model.parameters,
         condition_number=condition,
     )
-    cpfls("predict", study, known, pipeline.flight, "-o", prediction)
-    assert told in section(report(known, prediction), "predict")
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("always")
+        cpfls_cli.load_model(known).predict(pipeline.flight)
+    assert any(told in str(each.message) for each in noted)

@@ -38,7 +38,7 @@ report: {title: "<script>alert(1)</script> & a study"}
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
     "summary", "comparison", "identify", "identify-2", "stated-vehicle", "trajectory", "simulate", "simulate-2",
-    "reduce", "sweep", "predict", "provenance",
+    "reduce", "sweep", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -81,7 +81,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     config = folder / "study.yaml"
     config.write_text(CONFIG + VEHICLE)
-    names = ("trajectory", "flight", "selection", "model", "ridge", "prediction", "noisy", "sweep")
+    names = ("trajectory", "flight", "selection", "model", "ridge", "noisy", "sweep")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)
     cpfls("simulate", config, files.trajectory, "-o", files.flight)
@@ -90,7 +90,6 @@ def study(tmp_path_factory):
     cpfls("identify", config, files.flight, "--selection", files.selection, "-o", files.model)
     based = ("--set", "identification.base=rigid-body", "--set", "identification.ridge.count=3")
     cpfls("identify", config, files.noisy, "-o", files.ridge, *based)
-    cpfls("predict", config, files.model, files.flight, "-o", files.prediction)
     settings = "sweep.settings=[{name: <b>small</b>}, {name: all, set: {reduction.size: null}}]"
     cpfls("sweep", config, files.flight, "-o", files.sweep, "--set", settings, "--set", "sweep.seeds=2")
     return files
@@ -105,7 +104,6 @@ def full(study):
         study.selection,
         study.model,
         study.ridge,
-        study.prediction,
         study.sweep,
     )
     output = study.folder / "report.html"
@@ -129,8 +127,8 @@ def test_everything_given_everything_shown(full):
     kinds = {re.sub(r"-\d+$", "", name) for name in full.summary["figures"]}
     assert kinds == {
         "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
-        "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure", "predict-1-figure-7-error", "predict-1-torques",
-        "predict-1-inertia-matrix", "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
+        "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure",
+        "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
         "identify-1-figure", "identify-2-convergence", "identify-2-pareto-front", "identify-2-ridge-curve",
     }  # fmt: skip
 
@@ -145,8 +143,8 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
     assert summary["sections"] == ["summary", "stated-vehicle", "simulate", "provenance"]
-    assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
-    for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
+    assert summary["missing"] == ["trajectory", "selection", "model"]
+    for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG"):
         assert f"cpfls {command}" in html
     assert "cpfls simulate CONFIG" not in html
 
@@ -235,16 +233,6 @@ def test_selections_from_one_flight_have_a_section_each(study, tmp_path):
     assert Page(html).text.count("flight.h5, full set") == 2
     assert [name for name in summary["sections"] if name.startswith("reduce")] == ["reduce", "reduce-2"]
     assert [name for name in summary["figures"] if "figure-5" in name] == ["reduce-1-figure-5", "reduce-2-figure-5"]
-
-
-def test_samples_outside_the_excited_region_are_shaded_and_counted(study, tmp_path):
-    beyond = np.zeros(len(read_result(study.prediction).time), dtype=bool)
-    beyond[10:17] = True
-    marked = tmp_path / "marked.h5"
-    with_fields(study.prediction, marked, extrapolates=beyond, outside=7)
-    shaded = [report(study, tmp_path, path, options=("--force",))[1] for path in (study.prediction, marked)]
-    assert [html.count("#f3d9b8") > 0 for html in shaded] == [False, True]
-    assert "7 of 275 samples outside" in Page(shaded[1]).text
 
 
 def test_the_provenance_names_hashes_and_no_folder(study, full):

@@ -7,10 +7,7 @@ import pytest
 
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.pages.page import written
-from cpfls_cli.report.content import Listing, Section
-from cpfls_cli.report.forms import Form
-from cpfls_cli.report.source import Document
-from tests.builders.artifacts import read_result
+from cpfls_cli.report.content import Form, Listing, Section
 from tests.builders.command_line import undrawn
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
@@ -80,20 +77,6 @@ def test_all_forms_hold_the_same_sections_figures_and_tables(report, as_json):
     assert html.count("<summary>Numbers</summary>") == len(summary["figures"])
 
 
-def test_the_json_form_holds_what_the_figures_draw(as_json, pipeline):
-    page, _ = as_json
-    figures = {figure["name"]: figure for figure in blocks(page, "figure")}
-    assert all(panel["series"] for figure in figures.values() for panel in figure["panels"])
-    flight = read_result(pipeline.flight)
-    panels = figures["simulate-1-torque"]["panels"]
-    assert [panel["title"] for panel in panels] == ["torque on roll", "torque on pitch", "torque on yaw"]
-    for axis, panel in enumerate(panels):
-        (curve,) = panel["series"]
-        assert (panel["x_label"], panel["y_label"]) == ("time, s", "N m")
-        assert curve["x"] == pytest.approx(flight.time, rel=1e-5)
-        assert curve["y"] == pytest.approx(flight.torque[:, axis], rel=1e-5, abs=1e-12)
-
-
 def test_the_json_form_says_where_everything_comes_from(as_json, pipeline):
     page, _ = as_json
     given = {artifact["file"]: artifact for artifact in page["artifacts"]}
@@ -124,5 +107,5 @@ def test_hostile_words_stay_words_in_markdown(report):
 
 
 def test_a_listing_cannot_end_its_own_fence():
-    page = written(Document("T", "1", [Section("a", "A", [Listing("B", "``` ````\n# c")])], []), Form.MARKDOWN)
+    page = written("T", "1", [Section("a", "A", [Listing("``` ````\n# c")])], [], Form.MARKDOWN)
     assert page.count("`````text\n``` ````\n# c\n`````\n") == 1

@@ -83,6 +83,6 @@ def test_a_setting_that_does_not_fit_stops_only_what_sweeps(cpfls, refuse, words
         ("trajectory", sweep, "-o", tmp_path / "trajectory.h5"),
         ("reduce", sweep, sweep_flight, "-o", selection),
         ("identify", sweep, sweep_flight, "--selection", selection, "-o", model),
-        ("predict", sweep, model, sweep_flight, "-o", tmp_path / "prediction.h5"),
+        ("replay", sweep, model, sweep_flight, "--every", "50", "-o", tmp_path / "replay.h5"),
     ):
         cpfls.done(*command, *MISFIT)

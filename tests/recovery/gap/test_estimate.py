@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.effect import Columns, stack, thrust_wrench
+from cpfls_cli.effects.effect import Columns, hub_wrench, stack
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
@@ -267,7 +267,8 @@ def glauert(signals, _shape):
     hover = 3.0
     squared = (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)
     induced = np.sqrt((np.sqrt(squared**2 + 4 * hover**4) - squared) / 2)
-    return Columns(stack(thrust_wrench(signals.hubs, 4 * hover * (hover - induced))))
+    thrust = 4 * hover * (hover - induced)
+    return Columns(stack(hub_wrench(signals.hubs, thrust[..., None] * np.array([0.0, 0.0, 1.0]))))
 
 
 def test_an_interval_holds_the_number_of_slow_flight_where_a_formula_bends():

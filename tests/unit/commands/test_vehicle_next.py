@@ -9,7 +9,7 @@ import pytest
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC
-from cpfls_cli.report.outcome import command_line
+from cpfls_cli.report.content import command_line
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.vehicle import next_commands
 from cpfls_cli.validation.trust import Trust

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from linearmodels.iv import IV2SLS
 
 from cpfls_cli.blocks import contiguous
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, estimate, of_rows, positive_ratio
@@ -102,6 +101,8 @@ def test_the_interval_of_a_ratio_is_what_a_test_does_not_refuse(size):
 
 def test_values_and_errors_are_those_of_another_package():
     """Two-stage least squares with five instruments for two inputs, errors by clusters; those are 2 % narrower."""
+    from linearmodels.iv import IV2SLS  # Loads pandas: longer than all tests of this file run.
+
     rng, block = np.random.default_rng(8), contiguous(3000, 60)
     more, disturbance = rng.standard_normal((3000, 5)), rng.standard_normal(3000) + rng.standard_normal(60)[block]
     x = more @ rng.standard_normal((5, 2)) - 0.8 * disturbance[:, None]

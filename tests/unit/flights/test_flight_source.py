@@ -91,28 +91,6 @@ def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
     return path
 
 
-@pytest.mark.parametrize("in_memory", [10, 1000])
-def test_stretches_overlap_and_hold_all_of_a_flight_once(tmp_path, monkeypatch, in_memory):
-    monkeypatch.setattr(sources, "IN_MEMORY", in_memory)
-    monkeypatch.setattr(sources, "STRETCH", 40)
-    path = driven(tmp_path / "flight.h5")
-    stretches = sources.flight_stretches(path, Study())
-    whole = recordings.read_flights([path], Study())
-    (expected,) = whole.recordings
-    assert len(stretches) == 90
-    assert [len(each.signals) for each in stretches] == [60, 70, 30]
-    for name in ("time", "attitude", "body_rate", "stated_torque", "voltage"):
-        joined = np.concatenate([getattr(each.signals, name)[each.own] for each in stretches])
-        np.testing.assert_array_equal(joined, getattr(expected.signals, name))
-    assert stretches.warnings == whole.warnings
-    assert "12.5 V" in stretches.warnings[0]
-
-
-def test_a_voltage_that_is_a_share_stays_one(tmp_path):
-    (only,) = sources.flight_stretches(driven(tmp_path / "flight.h5", unit="1", voltage=(1.04, 0.8)), Study())
-    assert only.signals.voltage[0] == 1.04
-
-
 @pytest.mark.parametrize(
     ("unit", "voltage", "said"),
     [
@@ -125,18 +103,15 @@ def test_a_voltage_that_is_a_share_stays_one(tmp_path):
         ),
     ],
 )
-@pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play, sources.flight_stretches])
+@pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play])
 def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, voltage, said, read):
     path = driven(tmp_path / "flight.h5", unit=unit, voltage=voltage)
     if read is recordings.read_flights:
         found = read([path], Study())
         parts, warnings = [each.signals for each in found.recordings], found.warnings
-    elif read is playback.flights_to_play:
+    else:
         (found,) = read([path], Study())
         parts, warnings = found.parts, found.warnings
-    else:
-        found = read(path, Study())
-        parts, warnings = [each.signals for each in found], found.warnings
     assert [part.voltage for part in parts] == [None] * len(parts)
     assert len(re.findall(said, " ".join(warnings))) == 1
     assert "taken as that of a full battery" not in " ".join(warnings)
@@ -152,18 +127,3 @@ def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(t
 def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):
     flight = recordings.read_flight(driven(tmp_path / "flight.h5", voltage=(12.5, 0.0)), Study())
     assert "voltage is 0 or less at 1 of 90" in " ".join(recordings.doubts_on_voltage(flight.signals, flight.units))
-
-
-def test_stretches_are_of_the_longest_part_in_which_all_is_known(tmp_path, monkeypatch):
-    path = driven(tmp_path / "flight.h5")
-    read = recordings.read_flight(path, Study())
-    read.signals["attitude"][30] = np.nan
-    monkeypatch.setattr(sources, "read_flight", lambda *_: read)
-    stretches = sources.flight_stretches(path, Study())
-    (only,) = stretches
-    assert only.signals.time[only.own][0] == 31 * PERIOD_S
-    assert len(stretches) == 59
-    assert "only 15.50 s to 44.50 s are used" in stretches.warnings[0]
-    read.signals["attitude"][:] = np.nan
-    with pytest.raises(InputError, match=r"flight\.h5: no sample at which all"):
-        sources.flight_stretches(path, Study())

@@ -55,7 +55,7 @@ def test_torque_force_and_inertia_are_those_of_the_effects():
     effects += (fitted("drag_factor_error", error=0.3),)
     extended, flown = ExtendedModel(None, numbers, effects), signals()
     whole = whole_vehicle(extended, QUAD)
-    assert whole.beside_table == ()
+    assert whole.unsimulated == ()
     steady = np.zeros((len(flown), 17))
     steady[:, 0], steady[:, 1:5], steady[:, 5:9] = 1.0, flown.rotor_speed, flown.rotor_speed**2
     found = whole.wrench(flown.air_velocity, flown.body_rate, steady)
@@ -85,7 +85,7 @@ def test_lag_and_delay_are_those_of_the_rotors():
 def test_what_is_not_simulated_with_the_state_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
-    assert whole.beside_table == ("battery_sag", "wind")
+    assert whole.unsimulated == ("battery_sag", "wind")
     assert [each.name for each in whole.parts] == ["rotors", "torque_bias"]
 
 
@@ -98,7 +98,7 @@ def test_height_of_the_mass_and_wind_are_those_of_the_effects():
     )
     extended = ExtendedModel(None, parameters(thrust_scale=0.05), effects)
     whole = whole_vehicle(extended, QUAD)
-    assert (whole.beside_table, whole.wind) == ((), (4.0, -1.5, 0.0))
+    assert (whole.unsimulated, whole.wind) == ((), (4.0, -1.5, 0.0))
     (offset,) = (each for each in whole.effects if each.is_lever)
     flown = replace(whole.acting(signals()), rotor_speed=np.full((60, 4), 1000.0))
     blown = [each for each in extended.effects if each.candidate.effect.name != "com_offset"]

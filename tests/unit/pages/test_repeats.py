@@ -145,9 +145,9 @@ def test_bars_hold_all_and_the_table_every_band():
     groups = {"repeatability_before": made.repeatability(PITCH), "repeatability_after": made.repeatability(NOTHING)}
     found = replace(made.diagnosis(), **groups)
     picture = picture_of(repeatability_drawn(lambda r: (r.repeatability_before, r.repeatability_after)), "again", found)
-    panels = picture.panels
+    panels = picture.figure().axes
     assert len(panels) == 6
-    assert len([series.y for series in panels[1].series if len(series.y) == 5]) == 8
+    assert len([bars for bars in panels[1].containers if len(bars) == 5]) == 8
     assert "<svg" in picture.svg
     blocks = made.blocks_of(found, "diagnose")
     text, _, table = next(each.blocks for each in blocks if getattr(each, "summary", "").endswith("band by band"))

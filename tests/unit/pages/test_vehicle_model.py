@@ -97,7 +97,7 @@ def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
     (drawn,) = [
         block for block in unfolded(section.blocks) if isinstance(block, Plot) and block.name.endswith("remainder")
     ]
-    assert len(drawn.picture.panels) == panels
+    assert len(drawn.picture.figure().axes) == panels
 
 
 @pytest.mark.parametrize(("moment", "heavy"), [(0.03, True), (0.02, False)])

@@ -11,7 +11,7 @@ from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
-from cpfls_cli.playback.table import Airflow
+from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.windows import Rotors, Runs, Steps, errors_of_runs
 from cpfls_cli.vehicle.values import value_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth

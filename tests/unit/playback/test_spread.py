@@ -10,8 +10,8 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
+from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.spread import POSITIVE, Estimates, drawn, model_at
-from cpfls_cli.playback.table import Airflow
 from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass

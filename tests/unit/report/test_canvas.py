@@ -2,13 +2,14 @@ import re
 from xml.etree import ElementTree
 
 import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.arrays import runs
-from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, stacked
+from cpfls_cli.report.canvas import band, figure_html, kept_samples, legend_above, legend_over, line, plot, stacked
 
 
 def draw(figure):
@@ -70,8 +71,7 @@ def test_names_in_a_figure_are_shown_as_they_are_written(over):
     picture = plot("one", "", "what", 2.0, draw).picture
     shown = [text for text in ElementTree.fromstring(picture.svg).itertext() if text.strip()]
     assert [text for text in shown if text in {*names, "_bars", "_$x_"}] == ["_$x_", *names, "_bars"]
-    (panel,) = picture.panels
-    assert {series.label for series in panel.series} == {*names, "_bars", ""}
+    assert {curve for _, curve, _, _ in picture.rows} == {*names, "_bars", ""}
 
 
 @given(samples=st.integers(2, 6000), largest=st.integers(4, 1500), seed=st.integers(0, 1000))
@@ -129,3 +129,39 @@ def test_ticks_are_written_in_words_that_need_no_typesetting_and_keep_their_fact
     words = {text.strip() for text in ElementTree.fromstring(figure.svg).itertext()}
     assert {"10⁻³", "10⁰", "10⁴", "2 × 10⁰", "1e−9", "0.5"} <= words
     assert not any("$" in word or "\\" in word for word in words)
+
+
+def test_who_does_not_see_a_figure_reads_its_panels_curves_and_their_extremes():
+    time = np.linspace(0.0, 10.0, 20001)
+    torque = np.sin(time)
+
+    def draw(figure):
+        upper, lower = figure.subplots(2, 1)
+        line(upper, time, torque, label="torque")
+        band(upper, time, torque - 1.0, torque + 1.0, label="95 %")
+        upper.axhline(0.3)
+        upper.set_title("roll <b>", loc="right")
+        upper.set_ylabel("N m")
+        upper.set_xlabel("time, s")
+        lower.barh([0.0, 1.0], [3.0, -2.0], label="effects")
+        lower.set_yticks([0.0, 1.0], ["drag", "lag"])
+        lower.set_ylabel("effect")
+
+    picture = plot("one", "", "what", 2.0, draw).picture
+    panel = "roll <b>, N m over time, s"
+    assert picture.rows[:4] == [
+        (panel, "torque", "0", "0"),
+        (panel, "torque", "4.713", "−1.000"),
+        (panel, "torque", "7.854", "1.000"),
+        (panel, "torque", "10.00", "−0.5440"),
+    ]
+    assert {"−2.000", "2.000"} <= {y for _, curve, _, y in picture.rows if curve == "95 %"}
+    assert picture.rows[-2:] == [("effect", "effects", "3.000", "drag"), ("effect", "effects", "−2.000", "lag")]
+    page = figure_html(picture)
+    assert "<td>roll &lt;b&gt;, N m over time, s</td><td>torque</td><td>7.854</td><td>1.000</td>" in page
+    assert "<b>" not in page
+
+
+def test_no_figure_is_left_open():
+    plot("name", "", "what", 2.0, draw).picture.figure()
+    assert not plt.get_fignums()

@@ -55,7 +55,7 @@ def test_a_table_without_titles_has_no_header():
 def test_sentences_stand_as_they_are_and_pictures_stay_on_the_page():
     plot, folded = Plot("p", "A picture.", "<svg/>"), Folded("More", [TABLE])
     box = Box("Verdict", "good", ["one reason", "another"])
-    shown = lines(Text("a sentence"), Heading("a heading"), box, Listing("All", "one\ntwo\n"), plot, folded)
+    shown = lines(Text("a sentence"), Heading("a heading"), box, Listing("one\ntwo\n"), plot, folded)
     assert shown == ["a sentence", "a heading", "Verdict: good", "  one reason", "  another", "one", "two"]
 
 
@@ -108,7 +108,7 @@ def test_no_block_gives_a_terminal_orders():
         Text(name),
         Box(name, "", ()),
         Facts([(name, "value")]),
-        Listing("", name),
+        Listing(name),
         Table("names", "", (name, name), [[name, name]]),
     ]
     said = lines(*blocks)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.vehicle.values import ARRAYS, Tangent, cross, dot
+from cpfls_cli.vehicle.values import ARRAYS, NoPolynomialError, Polynomial, Tangent, cross, dot
 
 F = ARRAYS
 CASES = {
@@ -39,3 +39,21 @@ def test_what_is_linear_has_no_value_and_a_factor_for_each_number():
     assert given.value == 0
     assert given.by[0].tolist() == [2.0, 3.0]
     assert given.by[1] == -3.0
+
+
+def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():
+    a, b, array = Polynomial.number("a"), Polynomial.number("b"), np.array([[1.0, 2.0], [3.0, 4.0]])
+    given = F.total((a * array - 2.0 * b) * (a + 1.0) - array / 2.0) + Tangent(np.ones(2), {0: 3.0})
+    found = {factors: value for factors, value in given.terms.items() if factors}
+    assert set(found) == {("a",), ("a", "a"), ("a", "b"), ("b",)}
+    assert found["a", "a"].tolist() == found["a",].tolist() == [4.0, 6.0]
+    assert given.terms[()].value.tolist() == [-1.0, -2.0]
+    branch = F.where(array > 2.0, a * array, b)
+    assert branch.terms["a",].tolist() == [[0.0, 0.0], [3.0, 4.0]]
+    assert branch.terms["b",].tolist() == [[1.0, 1.0], [0.0, 0.0]]
+
+
+@pytest.mark.parametrize("case", [lambda a: 1.0 / a, lambda a: a**0.5, lambda a: F.largest(a, 1.0)])
+def test_what_is_no_polynomial_is_refused(case):
+    with pytest.raises(NoPolynomialError):
+        case(Polynomial.number("a"))

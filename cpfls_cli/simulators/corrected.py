@@ -1,0 +1,490 @@
+"""A simulator's own file corrected: the bytes of what flights contradict are replaced, all others stay as they are.
+
+Of the effects that `gap` names, those whose formula is the simulator's become numbers of the file:
+
+- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
+  as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
+  where the yaw torque follows the thrust, as it does where the file states their ratio.
+- ``rotor_mismatch``: thrust of single rotors, by the pattern that was found; what clockwise rotors drag more than they
+  lift is their ratio of torque to thrust. ``drag_factor_error``: that ratio of all.
+- ``com_offset``: the centre of the first link moves so that that of the vehicle does.
+- ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
+  turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
+
+A number is replaced only where the 95 % interval leaves the stated one out.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import hypot
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.effects.catalogue.rotor_mismatch import gain_modes
+from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.errors import visible
+from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
+from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
+from cpfls_cli.simulators.model import ENTRIES, Rotor
+from cpfls_cli.simulators.results import Change, Corrected
+from cpfls_cli.simulators.study import VehicleOf
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
+
+_WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
+_OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
+"""Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
+_TOGETHER = ("parameter_error", "rotor_mismatch", "drag_factor_error")
+_WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+_BY_HAND = {
+    "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
+    "urdf": "applyExternalForce and applyExternalTorque at each step",
+    "mjcf": "data.xfrc_applied of the body at each step",
+}
+_TAGS = {
+    "sdf": {
+        "thrust": "motorConstant",
+        "ratio": "momentConstant",
+        "lag_up": "timeConstantUp",
+        "lag_down": "timeConstantDown",
+        "drag": "rotorDragCoefficient",
+        "rolling": "rollingMomentCoefficient",
+    },
+    "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
+    "mjcf": {},
+}
+"""Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
+
+
+class _Found(NamedTuple):
+    """A quantity in SI units as flights have it, with the ends of its interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def times(self, factor: float) -> _Found:
+        ends = factor * self.low, factor * self.high
+        return _Found(factor * self.value, min(ends), max(ends))
+
+    def with_factor(self, other: _Found) -> _Found:
+        """Multiply two factors whose errors are independent."""
+        wide = [
+            hypot(own / self.value, its / other.value)
+            for own, its in zip(
+                (self.low - self.value, self.high - self.value),
+                (other.low - other.value, other.high - other.value),
+                strict=True,
+            )
+        ]
+        value = self.value * other.value
+        return _Found(value, value * (1 - wide[0]), value * (1 + wide[1]))
+
+    def contradicts(self, stated: float) -> bool:
+        return stated < self.low or stated > self.high
+
+
+_ONE = _Found(1.0, 1.0, 1.0)
+
+
+def _significant(factor: _Found) -> _Found:
+    """Give a factor, or 1 with as wide an interval where it may be that."""
+    return factor if factor.contradicts(1.0) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+
+
+def _part(number: Estimate | None, times: float) -> _Found:
+    return (
+        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
+    )
+
+
+def _sum(*parts: _Found) -> _Found:
+    """Add what is independent to 1."""
+    value = 1.0 + sum(part.value for part in parts)
+    below, above = (hypot(*(part[end] - part.value for part in parts)) for end in (1, 2))
+    return _Found(value, value - below, value + above)
+
+
+def _factor(number: Estimate | None) -> _Found:
+    return _ONE if number is None else _Found(1 + number.value, 1 + number.low, 1 + number.high)
+
+
+@dataclass
+class _Corrections:
+    """What is replaced and put in, and what is said of it."""
+
+    of: VehicleOf
+    vehicle: VehicleSettings
+    edits: dict[Span, bytes] = field(default_factory=dict)
+    put_in: dict[Span, bytes] = field(default_factory=dict)
+    changes: dict[tuple[str, float, float], tuple[Change, list[str]]] = field(default_factory=dict)
+    unchanged: list[str] = field(default_factory=list)
+    elsewhere: list[str] = field(default_factory=list)
+
+    @property
+    def names(self) -> dict[Path, str]:
+        """Of the corrected files, by those that were given."""
+        return _names(self.of.model.files)
+
+    @property
+    def rotors(self) -> list[Rotor]:
+        """In the order of the study."""
+        return [self.of.model.rotors[index] for index in self.of.order]
+
+    def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
+        """Put a number in the place of the stated one, where that is outside the interval."""
+        new, low, high = (stated.scale * each for each in found)
+        before, text = stated.scale * stated.value, f"{new:.4g}"
+        if not found.contradicts(stated.value):
+            self._keep(f"{name} {before:.4g} agrees with the flights, {text} [{low:.4g}, {high:.4g}]")
+        elif stated.span is not None and self.edits.get(stated.span, text.encode()) != text.encode():
+            self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
+        elif stated.span is not None:
+            self.edits[stated.span] = text.encode()
+            self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
+        elif room is not None and self.of.model.format == "sdf":
+            self.put(room, f"<{name}>{text}</{name}>")
+            self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
+        else:
+            self.elsewhere.append(f"{name} = {text} [{low:.4g}, {high:.4g}]: {stated.where}; write it there")
+
+    def note(
+        self, file: Path, name: str, where: str, numbers: tuple[float, float, float, float], words: str, whom: str
+    ) -> None:
+        """Take note of a change: before, after, and the ends of the interval."""
+        before, after, low, high = numbers
+        change = Change(
+            file=self.names[file],
+            element=name,
+            where=where,
+            before=float(f"{before:.6g}"),
+            after=after,
+            low=low,
+            high=high,
+            sentence=words,
+        )
+        self.changes.setdefault((name, change.before, after), (change, []))[1].append(whom)
+
+    def put(self, room: Node, line: str) -> None:
+        """Put an element behind the last child of another one, indented as the first is."""
+        raw, first, last = raw_bytes(room.file), room.children[0].start, room.children[-1].close
+        indent = raw[raw.rfind(b"\n", 0, first) + 1 : first]
+        end = raw.index(b">", last) + 1
+        place = Span(room.file, end, end)
+        text = b"\n" + (indent if not indent.strip() else b"") + line.encode()
+        self.put_in[place] = self.put_in.get(place, b"") + text
+
+    def _keep(self, sentence: str) -> None:
+        if sentence not in self.unchanged:
+            self.unchanged.append(sentence)
+
+    def of_rotors(self, kind: str, found: Callable[[int, float], _Found], words: str) -> bool:
+        """Correct a number of each rotor; False where the format does not know it."""
+        name = _TAGS[self.of.model.format].get(kind)
+        if name is None or not self.rotors or any(getattr(rotor, kind) is None for rotor in self.rotors):
+            return False
+        for index, rotor in enumerate(self.rotors):
+            stated: Stated = getattr(rotor, kind)
+            self.replace(name, stated, found(index, stated.value), words, f"M{index + 1}", rotor.node)
+        return True
+
+
+def corrected(
+    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[str]
+) -> tuple[Corrected, dict[str, bytes]]:
+    """Put what a diagnosis names into a simulator's file: what there is to say, and the files by name.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        Of the study that was made of the file.
+    flights : sequence of str
+        Names of the flights that it was found in.
+    """
+    made = _Corrections(of, vehicle)
+    if found.verdict in _WRITES and not found.contradictions:
+        sure = [each for each in found.effects if each.name not in found.rivals]
+        for each in found.effects:
+            if each not in sure:
+                rivals = joined([find(rival.name).title for rival in found.rivals[each.name]], "or")
+                made.unchanged.append(f"{find(each.name).title}: these flights cannot separate it from {rivals}")
+        _put_in(made, sure)
+        _not_found(made, found)
+    elif found.verdict == GapVerdict.NO_GAP:
+        _not_found(made, found)
+    elif found.contradictions:
+        made.unchanged.append("the log or its vehicle contradicts itself, so nothing is put in")
+    changes = tuple(_said(change, whom) for change, whom in made.changes.values())
+    files = _written(made, changes, flights)
+    names = made.names
+    texts = {names[file]: text for file, text in files.items()}
+    diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
+    said = Corrected(
+        files=tuple(texts),
+        changes=changes,
+        unchanged=tuple(made.unchanged),
+        elsewhere=tuple(made.elsewhere),
+        diff=visible(diff),
+    )
+    return said, texts
+
+
+def _said(change: Change, whom: Sequence[str]) -> Change:
+    from_to = f"{whom[0]} to {whom[-1]}" if len(whom) > 2 else joined(list(dict.fromkeys(whom)))
+    return Change(**{**vars(change), "sentence": change.sentence.format(whom=from_to, **_sizes(change))})
+
+
+def _sizes(change: Change) -> dict[str, str]:
+    share = change.after / change.before - 1 if change.before else 0.0
+    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
+    return {"share": more if change.before else "not 0"}
+
+
+def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
+    named = {each.name: {number.name: number for number in each.numbers} for each in effects}
+    together = {key: number for name in _TOGETHER for key, number in named.get(name, {}).items()}
+    if together:
+        _of_rotors(made, together)
+    for each in effects:
+        if each.name in _RULES:
+            _RULES[each.name](made, named[each.name])
+        elif each.name not in _TOGETHER and not each.of_log:
+            _not_held(made, each)
+    if not made.changes and not made.elsewhere:
+        made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _not_found(made: _Corrections, found: Conclusion) -> None:
+    """Say of what the file states and the flights did not show why."""
+    named, hidden = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    tags = _TAGS[made.of.model.format]
+    for kind, name in _OF_EFFECTS.items():
+        stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
+        if kind not in tags or name in named or stated is None or stated.value == 0:
+            continue
+        why = f"these flights cannot show it: {hidden[name]}" if name in hidden else "these flights show none of it"
+        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
+
+
+def _not_held(made: _Corrections, each: NamedEffect | str) -> None:
+    name = each if isinstance(each, str) else each.name
+    entry, values = find(name), ""
+    if not isinstance(each, str):
+        values = ", ".join(
+            f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
+            for number in each.numbers
+        )
+    made.elsewhere.append(
+        f"{entry.title}: {entry.formula}{', with ' if values else ''}{values}; the format has no number for it: "
+        f"{_BY_HAND[made.of.model.format]}; `cpfls export extended.h5 --format c` writes the lines"
+    )
+
+
+def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
+    scale = _significant(_factor(numbers.get("thrust_scale")))
+    lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
+    modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
+
+    def thrust(index: int, stated: float) -> _Found:
+        own = [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
+        return scale.with_factor(_sum(*own, _part(lifts, spins[index]))).times(stated)
+
+    def turning(index: int, stated: float) -> _Found:
+        own = _sum(_part(drags, -spins[index]), _part(lifts, -spins[index]))
+        return _factor(numbers.get("error")).with_factor(own).times(stated)
+
+    differ = "difference_1" in numbers
+    words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
+    if ("thrust_scale" in numbers or differ) and not made.of_rotors("thrust", thrust, words):
+        made.elsewhere.append(
+            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the "
+            "file, whose controls are thrusts: scale gear or gainprm by it"
+        )
+    if "error" in numbers or drags is not None:
+        for kind in ("ratio", "torque"):
+            made.of_rotors(kind, turning, "yaw torque over thrust of {whom} is {share}")
+    _moments(made, numbers, scale)
+
+
+def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> None:
+    # About z the torque follows the thrust where the file states the ratio of the two.
+    follows = all(rotor.torque is None for rotor in made.rotors)
+    if scale.value != 1.0 and follows and made.rotors and "inertia_z" not in numbers:
+        name = _TAGS[made.of.model.format].get("ratio", "their ratio")
+        made.unchanged.append(
+            f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
+        )
+    factors = {
+        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+        for index, axis in enumerate("xyz")
+        if f"inertia_{axis}" in numbers
+    }
+    _inertia(made, factors)
+
+
+def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
+    """Change entries of the inertia of the first link by what that of the vehicle is off."""
+    whole, first = made.of.model.inertia, made.of.model.bodies[0]
+    wanted = {entry: factor.times(float(whole[INERTIA_ENTRIES[entry]])) for entry, factor in factors.items()}
+    wanted |= {
+        entry: _Found(*(float(whole[INERTIA_ENTRIES[entry]]) + each for each in added))
+        for entry, added in (products or {}).items()
+    }
+    straight = bool(np.allclose(first.turned, np.eye(3), atol=1e-6))
+    for entry, found in wanted.items():
+        total = float(whole[INERTIA_ENTRIES[entry]])
+        if not first.entries or not straight:
+            if found.contradicts(total):
+                made.elsewhere.append(
+                    f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
+                    f"kg m^2, and not {total:.4g}: {first.inertia_at} states it in other axes, or not; change it there"
+                )
+            continue
+        rest = total - float(first.inertia[INERTIA_ENTRIES[entry]])
+        own = _Found(*(each - rest for each in found))
+        words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
+        words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
+        made.replace(ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
+
+
+def _room(made: _Corrections, body: object) -> Node | None:
+    node = getattr(body, "node", None)
+    return node.first("inertia") if isinstance(node, Node) and made.of.model.format == "sdf" else None
+
+
+def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    found = list(numbers.values())
+    _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
+
+
+def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    model = made.of.model
+    first, share = model.bodies[0], model.mass_kg / model.bodies[0].mass.value
+    place, moved = [float(each) for each in first.centre], False
+    for axis, name in enumerate("xyz"):
+        own = numbers.get(f"c_{name}")
+        if own is None:
+            continue
+        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
+        if first.place or first.node is None or model.format != "sdf":
+            stated = first.place[axis] if first.place else Stated(place[axis], first.inertia_at)
+            made.replace(f"pose {name}", stated, found, words, first.name, None)
+        elif found.contradicts(place[axis]):
+            values = (place[axis], float(f"{found.value:.4g}"), found.low, found.high)
+            made.note(first.node.file, f"pose {name}", f"{first.node.where}: no <pose>", values, words, first.name)
+            place[axis], moved = found.value, True
+    if moved and first.node is not None:
+        made.put(first.node, f"<pose>{' '.join(f'{each:.4g}' for each in place)} 0 0 0</pose>")
+
+
+def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    tau = numbers["time_constant_s"]
+    up, down = ([getattr(rotor, kind) for rotor in made.rotors] for kind in ("lag_up", "lag_down"))
+    if None in up or None in down or "lag_up" not in _TAGS[made.of.model.format]:
+        _not_held(made, "motor_lag")
+        return
+    stated = [each.value for each in (*up, *down)]
+    if tau.low <= max(stated) and tau.high >= min(stated):
+        made.unchanged.append(
+            f"time constants {min(stated):.4g} and {max(stated):.4g} s agree with the flights, {tau.value:.4g} "
+            f"[{tau.low:.4g}, {tau.high:.4g}] s up and down together"
+        )
+        return
+    for kind in ("lag_up", "lag_down"):
+        made.of_rotors(kind, lambda _i, _s: _Found(tau.value, tau.low, tau.high), "time constant of {whom} is {share}")
+
+
+def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    own = numbers["k_d"]
+    if not made.of_rotors("drag", lambda _i, _s: _Found(own.value, own.low, own.high), "drag of {whom} is {share}"):
+        _not_held(made, "rotor_drag")
+
+
+def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+    own = numbers["mu"]
+    signed = _Found(own.value, own.low, own.high)
+
+    def of(index: int, _stated: float) -> _Found:
+        return signed.times(made.vehicle.rotors[index].spin)
+
+    if not made.of_rotors("rolling", of, "rolling moment of {whom} is {share}"):
+        _not_held(made, "rolling_moment")
+
+
+_RULES: dict[str, Callable[[_Corrections, Mapping[str, Estimate]], None]] = {
+    "products_of_inertia": _products,
+    "com_offset": _centre,
+    "motor_lag": _lag,
+    "rotor_drag": _drag,
+    "rolling_moment": _rolling,
+}
+
+
+def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[str]) -> dict[Path, bytes]:
+    """Give the files as corrected; the one that was given is always among them."""
+    found = {}
+    for file in made.of.model.files:
+        raw, edits = raw_bytes(file), {**made.edits, **made.put_in}
+        own = sorted((span for span in edits if span.file == file), key=lambda span: span.start, reverse=True)
+        if not own and file != made.of.model.file:
+            continue
+        for span in own:
+            raw = raw[: span.start] + edits[span] + raw[span.end :]
+        if own:
+            at = _root_at(file)
+            raw = raw[:at] + _comment(changes, flights, raw) + raw[at:]
+        found[file] = raw
+    return found
+
+
+def _root_at(file: Path) -> int:
+    """Find where the first element begins: behind declaration and comments."""
+    raw, at = raw_bytes(file), 0
+    while True:
+        at = raw.index(b"<", at)
+        if raw.startswith(b"<!--", at):
+            at = raw.index(b"-->", at) + 3
+        elif raw.startswith(b"<?", at):
+            at = raw.index(b"?>", at) + 2
+        else:
+            return at
+
+
+def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
+    """Write what was changed as a comment, with intervals and flights."""
+    lines = [f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:"]
+    lines += [
+        f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
+        for each in changes
+    ]
+    end = "\r\n" if b"\r\n" in raw else "\n"
+    text = end.join(lines).replace("--", "- -")
+    return f"<!-- {text} -->{end}".encode()
+
+
+def _names(files: Sequence[Path]) -> dict[Path, str]:
+    """Name the files in the output folder; those of includes by their folders too."""
+    first, *others = files
+    taken = {first: first.name}
+    for file in others:
+        taken[file] = file.name if file.name not in taken.values() else f"{file.parent.name}-{file.name}"
+    return taken
+
+
+def _diff(name: str, before: bytes, after: bytes) -> str:
+    given, found = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (before, after))
+    return "".join(
+        _ended(line) for line in difflib.unified_diff(given, found, f"given/{name}", f"corrected/{name}", n=1)
+    )
+
+
+def _ended(line: str) -> str:
+    return line if line.endswith("\n") else f"{line}\n"

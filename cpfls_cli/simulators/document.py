@@ -1,0 +1,215 @@
+"""XML in which every element and every number knows where it stands, so that one number alone can be replaced."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ParseError
+
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import DefusedXMLParser
+
+from cpfls_cli.errors import InputError
+
+_LARGEST = 20_000_000
+_TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
+_WORD = re.compile(rb"\S+")
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Bytes of a file, from the first to behind the last."""
+
+    file: Path
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A number of a model: its value in SI units, and where it stands.
+
+    Attributes
+    ----------
+    where : str
+        File, line and element; or what is taken where the file does not state it.
+    span : Span or None
+        Of the number itself; None where it is not stated.
+    scale : float
+        The number in the file over its value in SI units.
+    """
+
+    value: float
+    where: str
+    span: Span | None = None
+    scale: float = 1.0
+
+
+@dataclass
+class Node:
+    """An element of XML with its place."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: Path
+    line: int
+    start: int
+    parent: Node | None
+    children: list[Node] = field(default_factory=list)
+    text: str = ""
+    close: int = 0
+    """Of its end tag; of one that is closed at once, of the element itself."""
+
+    def all(self, *tags: str) -> list[Node]:
+        """List the children of these names."""
+        return [child for child in self.children if child.tag in tags]
+
+    def first(self, *path: str) -> Node | None:
+        """Find an element below, by the names on the way to it."""
+        found: Node | None = self
+        for tag in path:
+            found = next((child for child in found.children if child.tag == tag), None) if found else None
+        return found
+
+    def walk(self) -> Iterator[Node]:
+        """List the element and all below it."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    @property
+    def name(self) -> str:
+        """Its attribute `name`."""
+        return self.attributes.get("name", "")
+
+    @property
+    def where(self) -> str:
+        """File, line and element, for messages and reasons."""
+        own = f"<{self.tag}>" if not self.name else f"<{self.tag} name='{self.name}'>"
+        owner = self.parent
+        while owner is not None and not owner.name:
+            owner = owner.parent
+        below = f" of {owner.tag} {owner.name}" if owner is not None and not self.name else ""
+        return f"{self.file.name} line {self.line}: {own}{below}"
+
+    def error(self, message: str) -> InputError:
+        """Make the error of this element."""
+        return InputError(f"{self.file}, line {self.line}, <{self.tag}>: {message}")
+
+    def numbers(self, attribute: str | None = None, count: int | None = None, scale: float = 1.0) -> list[Stated]:
+        """Read the numbers of its text, or of an attribute, each with its place."""
+        text = self.text if attribute is None else self.attributes.get(attribute, "")
+        words, spans = text.split(), self._spans(attribute)
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            raise self._no_number(text, attribute) from None
+        if (count is not None and len(values) != count) or not all(abs(each) < 1e300 for each in values):
+            raise self._no_number(text, attribute, count or 1)
+        where = self.where if attribute is None else f"{self.where}, {attribute}"
+        known = spans if len(spans) == len(values) else [None] * len(values)
+        return [Stated(value / scale, where, span, scale) for value, span in zip(values, known, strict=True)]
+
+    def number(self, attribute: str | None = None, scale: float = 1.0) -> Stated:
+        """Read one number of its text, or of an attribute."""
+        return self.numbers(attribute, 1, scale)[0]
+
+    def _no_number(self, text: str, attribute: str | None, count: int = 1) -> InputError:
+        of = "" if attribute is None else f"{attribute} = "
+        wanted = "a number" if count == 1 else f"{count} numbers"
+        template = (
+            "; it is a template: render it first (xacro FILE, or jinja), and give what comes out"
+            if any(mark in text for mark in ("{{", "${"))
+            else f"; write {wanted} there"
+        )
+        return self.error(f"{of}{text!r} is not {wanted}{template}")
+
+    def _spans(self, attribute: str | None) -> list[Span | None]:
+        raw = raw_bytes(self.file)
+        tag = _TAG.match(raw, self.start)
+        if tag is None:
+            return []
+        if attribute is not None:
+            own = re.search(rb"\s" + re.escape(attribute.encode()) + rb"\s*=\s*[\"']([^\"']*)[\"']", tag[0])
+            first, last = (self.start + own.start(1), self.start + own.end(1)) if own else (0, 0)
+        else:
+            first, last = tag.end(), self.close
+        # Comments inside count as blanks, so that what follows keeps its place.
+        inside = _COMMENT.sub(lambda found: b" " * len(found[0]), raw[first:last])
+        return [Span(self.file, first + word.start(), first + word.end()) for word in _WORD.finditer(inside)]
+
+
+_READ: dict[Path, bytes] = {}
+
+
+def raw_bytes(file: Path) -> bytes:
+    """Give the bytes of a file as they were read."""
+    return _READ[file]
+
+
+class _Builder:
+    """Target of the parser: makes nodes."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self._open = file, list[Node]()
+        self.expat: Any = None
+        self.root: Node | None = None
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        above = self._open[-1] if self._open else None
+        at = self.expat
+        node = Node(tag, dict(attributes), self.file, at.CurrentLineNumber, at.CurrentByteIndex, above)
+        if above is None:
+            self.root = node
+        else:
+            above.children.append(node)
+        self._open.append(node)
+
+    def end(self, _tag: str) -> None:
+        self._open.pop().close = self.expat.CurrentByteIndex
+
+    def data(self, text: str) -> None:
+        if self._open:
+            self._open[-1].text += text
+
+    def close(self) -> Node | None:
+        return self.root
+
+
+def read_xml(file: Path) -> Node:
+    """Read a file of XML; entities and document types, which no model needs, are refused.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no XML.
+    """
+    try:
+        with file.open("rb") as stream:
+            raw = stream.read(_LARGEST + 1)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
+    if len(raw) > _LARGEST:
+        raise InputError(f"{file}: is larger than {_LARGEST / 1e6:g} MB, which no model is")
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
+    _READ[file] = raw
+    builder = _Builder(file)
+    parser = DefusedXMLParser(target=builder, forbid_dtd=True)
+    builder.expat = parser.parser
+    try:
+        parser.feed(raw)
+        root = parser.close()
+    except DefusedXmlException:
+        raise InputError(
+            f"{file}: has a DOCTYPE or entities of its own, which no model needs and which can fill a memory; remove "
+            "them"
+        ) from None
+    except ParseError as error:
+        raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
+    assert isinstance(root, Node), "a file without an element is no XML"
+    return root

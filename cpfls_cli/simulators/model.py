@@ -1,0 +1,279 @@
+"""What the file of a simulator states of a vehicle: mass, inertia, centre of mass and rotors, each with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
+from cpfls_cli.simulators.document import Node, Stated
+
+GRAVITY = 9.81
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+"""Names of the entries of an inertia in files."""
+_STRAIGHT = 0.9998
+"""Cosine of one degree: up to there an axis of thrust is that of the body."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A part of the vehicle with mass of its own.
+
+    Attributes
+    ----------
+    centre : array, shape (3,), m
+        Its centre of mass, in the frame of the vehicle's first link: x forward, y left, z up.
+    inertia : array, shape (3, 3), kg m^2
+        About its centre of mass, in the same axes.
+    turned : array, shape (3, 3)
+        From the axes that its inertia is stated in to those of the vehicle.
+    entries : tuple of Stated
+        Ixx Iyy Izz Ixy Ixz Iyz as stated; empty where they are not stated so.
+    place : tuple of Stated
+        x, y, z of its centre as stated; empty where they are not stated.
+    node : Node or None
+        The element that holds mass and inertia, to put something into.
+    """
+
+    name: str
+    mass: Stated
+    centre: Array
+    inertia: Array
+    turned: Array
+    entries: tuple[Stated, ...] = ()
+    place: tuple[Stated, ...] = ()
+    node: Node | None = None
+
+    @property
+    def inertia_at(self) -> str:
+        """Where its inertia stands."""
+        return self.entries[0].where if self.entries else self.mass.where
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """A rotor with what the file states of it; None for what the file cannot state.
+
+    Attributes
+    ----------
+    hub : array, shape (3,), m
+        Where its thrust acts, in the frame of the vehicle's first link.
+    axis : array, shape (3,)
+        Direction of its thrust, of length 1.
+    spin : int
+        1 counter-clockwise seen from above, -1 clockwise, 0 where that is not known.
+    thrust : Stated or None, N s^2
+        Thrust over squared speed.
+    ratio : Stated or None, m
+        Yaw torque over thrust.
+    torque : Stated or None, N m s^2
+        Yaw torque over squared speed, where that is what the file states.
+    most : Stated or None, N
+        Largest thrust, where controls are thrusts.
+    node : Node or None
+        The element that holds its numbers, to put something into.
+    """
+
+    name: str
+    where: str
+    hub: Array
+    axis: Array
+    spin: int
+    thrust: Stated | None = None
+    ratio: Stated | None = None
+    torque: Stated | None = None
+    speed_max: Stated | None = None
+    most: Stated | None = None
+    lag_up: Stated | None = None
+    lag_down: Stated | None = None
+    drag: Stated | None = None
+    rolling: Stated | None = None
+    node: Node | None = None
+
+    @property
+    def lift(self) -> float | None:
+        """Largest thrust, N; None where the file does not state it."""
+        if self.most is not None:
+            return self.most.value
+        both = self.thrust is not None and self.speed_max is not None
+        return self.thrust.value * self.speed_max.value**2 if both and self.thrust and self.speed_max else None
+
+    @property
+    def drag_factor(self) -> float | None:
+        """Yaw torque over squared speed, N m s^2."""
+        if self.torque is not None:
+            return self.torque.value
+        return None if self.thrust is None or self.ratio is None else self.thrust.value * self.ratio.value
+
+
+@dataclass(frozen=True)
+class SimulatorModel:
+    """A vehicle as the file of a simulator has it.
+
+    Attributes
+    ----------
+    bodies : tuple of Body
+        Parts with mass; the first one is that which the rotors hang on.
+    cannot : tuple of str
+        What files of this format cannot state.
+    notes : tuple of str
+        What is odd about the file.
+    files : tuple of Path
+        All files that it was read from, itself first.
+    """
+
+    name: str
+    format: str
+    bodies: tuple[Body, ...]
+    rotors: tuple[Rotor, ...]
+    cannot: tuple[str, ...]
+    notes: tuple[str, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def file(self) -> Path:
+        """The file that was given."""
+        return self.files[0]
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of all parts."""
+        return float(sum(body.mass.value for body in self.bodies))
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass in the frame of the first link, shape (3,), m."""
+        return np.asarray(sum(body.mass.value * body.centre for body in self.bodies) / self.mass_kg)
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia about the centre of mass, shape (3, 3), kg m^2: x forward, y left, z up."""
+        total = np.zeros((3, 3))
+        for body in self.bodies:
+            apart = body.centre - self.centre
+            total += body.inertia + body.mass.value * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+        return total
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """Inertia as a study has it: three moments, or six entries where an axis is coupled."""
+        six = [float(self.inertia[at]) for at in INERTIA_ENTRIES]
+        coupled = max(map(abs, six[3:])) > 1e-6 * max(six[:3])
+        return tuple(six if coupled else six[:3])
+
+    @property
+    def hubs(self) -> Array:
+        """Hubs from the centre of mass, shape (rotor, 3), m."""
+        return np.array([rotor.hub - self.centre for rotor in self.rotors])
+
+    @property
+    def speed_max(self) -> Stated | None:
+        """Largest speed that all rotors reach, rad/s."""
+        speeds = [rotor.speed_max for rotor in self.rotors]
+        known = [each for each in speeds if each is not None]
+        return min(known, key=lambda each: each.value) if known and len(known) == len(speeds) else None
+
+    @property
+    def lift(self) -> float | None:
+        """Largest thrust of all rotors, N; None where the file does not state it."""
+        lifts = [rotor.lift for rotor in self.rotors]
+        known = [lift for lift in lifts if lift is not None]
+        return sum(known) if known and len(known) == len(lifts) else None
+
+    @property
+    def where_of_mass(self) -> str:
+        """Where the mass stands."""
+        with_mass = [body for body in self.bodies if body.mass.value > 0]
+        rest = len(with_mass) - 1
+        return self.bodies[0].mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")
+
+
+def _require_body(body: Body) -> None:
+    if body.mass.value < 0:
+        raise InputError(f"{body.mass.where}: a mass of {body.mass.value:g} kg; write one above 0")
+    if body.mass.value > 0 and np.linalg.eigvalsh(body.inertia).min() < 0:
+        raise InputError(
+            f"{body.inertia_at}: inertia that no body has: a principal moment is below 0; correct ixx to iyz there"
+        )
+
+
+def checked(model: SimulatorModel) -> SimulatorModel:
+    """Refuse a model without mass, one that cannot hover on its rotors, and rotors that do not lift along z.
+
+    Raises
+    ------
+    InputError
+    """
+    for body in model.bodies:
+        _require_body(body)
+    if not model.mass_kg > 0:
+        raise InputError(f"{model.file}: no link has a mass; write one, such as <mass>1.5</mass>")
+    for rotor in model.rotors:
+        if rotor.axis[2] < _STRAIGHT:
+            raise InputError(
+                f"{rotor.where}: pushes along {np.round(rotor.axis, 3).tolist()}, not along z of the body; a study has "
+                "rotors that lift along z alone"
+            )
+    lift, weight = model.lift, model.mass_kg * GRAVITY
+    if lift is not None and lift < weight:
+        raise InputError(
+            f"{model.file}: {model.mass_kg:.4g} kg weigh {weight:.3g} N, and its {len(model.rotors)} rotors lift at "
+            f"most {lift:.3g} N: it cannot hover; check the mass ({model.bodies[0].mass.where}), and "
+            f"thrust and limit of the rotors ({model.rotors[0].where})"
+        )
+    return model
+
+
+def part_of(
+    name: str,
+    mass: Stated,
+    entries: Sequence[Stated],
+    at: Array,
+    place: Sequence[Stated] = (),
+    node: Node | None = None,
+) -> Body:
+    """Make a part of its inertia as stated, in the axes of the pose `at`, shape (4, 4)."""
+    turned = at[:3, :3]
+    inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
+    return Body(name, mass, at[:3, 3], inertia, turned, tuple(entries), tuple(place), node)
+
+
+def turning(node: Node, what: str) -> InputError:
+    """Make the error of a joint that turns."""
+    return node.error(f"{what} turns, and a study has one rigid body; fix it in the file that you give")
+
+
+def rotated(rpy: Sequence[float]) -> Array:
+    """Rotation by roll, pitch and yaw about fixed axes, rad, shape (3, 3)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def of_quaternion(quaternion: Sequence[float]) -> Array:
+    """Rotation by a quaternion w, x, y, z of any length, shape (3, 3)."""
+    w, x, y, z = np.array(quaternion) / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def pose(rotation: Array, place: Sequence[float] | Array) -> Array:
+    """Put a rotation and a place together, shape (4, 4)."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation, place
+    return made

@@ -1,0 +1,135 @@
+"""`cpfls init --from` and `cpfls gap` with a simulator's own file: what they write, and what they never touch."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cpfls_cli.config.load import load_study
+from tests.builders.gusty_flights import CALM, SMALL, Flight, gusty_flights
+from tests.builders.simulator_files import sdf_of, write_log
+
+TRUE = SMALL._replace(drag=0.0, damping=0.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A file whose thrust is a fifth too large, and two short flights."""
+    folder = tmp_path_factory.mktemp("simulator")
+    (folder / "mine.sdf").write_text(sdf_of(TRUE, thrust=1.2))
+    asked = [Flight(TRUE, CALM, path=run, draw=run, reach=3.0, swing=0.3) for run in range(2)]
+    for run, flight in enumerate(gusty_flights(asked, 16.0)):
+        write_log(folder / f"log{run}.csv", flight)
+    return folder
+
+
+def test_init_writes_the_vehicle_with_its_lines(cpfls, folder, tmp_path):
+    output = tmp_path / "study.yaml"
+    result = cpfls("init", "--from", folder / "mine.sdf", "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert "mine.sdf, Gazebo: 0.04500 kg" in result.stdout
+    text, vehicle = output.read_text(), load_study(output).vehicle
+    assert "# mine.sdf line 8: <mass> of link base_link, and 4 more links" in text
+    assert "<motorConstant>" in text
+    assert vehicle.mass_kg == pytest.approx(TRUE.mass)
+    np.testing.assert_allclose(vehicle.inertia_kg_m2[:3], TRUE.inertia, rtol=1e-4)
+    assert [rotor.thrust_factor_n_s2 for rotor in vehicle.rotors] == [2.4e-8] * 4
+    assert vehicle.rotor_speed_max_rad_s == 6000
+
+
+def test_init_takes_the_log_too(cpfls, folder, tmp_path):
+    output = tmp_path / "study.yaml"
+    result = cpfls("init", "--from", folder / "mine.sdf", folder / "log0.csv", "-o", output, "--mass", "0.05")
+    assert result.exit_code == 0, result.stderr
+    study = load_study(output)
+    assert study.vehicle.mass_kg == 0.05
+    assert "in place of the file's 0.045 kg" in output.read_text()
+    assert study.import_.signals["rotor_speed"].columns == ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
+
+
+def test_rotors_that_turn_the_other_way_in_the_log_are_named(cpfls, folder, tmp_path):
+    mine = tmp_path / "turned.sdf"
+    mine.write_text(sdf_of(TRUE, spins=(-1, 1, -1, -1)))
+    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
+    assert result.exit_code == 0, result.stderr
+    assert "rotor_3 turns clockwise in the file and counter-clockwise by the log" in result.stderr
+
+
+def test_a_file_of_another_vehicle_is_refused(refuse, folder, tmp_path):
+    mine = tmp_path / "three.sdf"
+    text = sdf_of(TRUE).replace('name="rotor_3_joint" type="revolute"', 'name="rotor_3_joint" type="fixed"')
+    mine.write_text(text[: text.rindex("    <plugin")] + text[text.rindex("    </plugin>") + len("    </plugin>") :])
+    (message,) = refuse("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
+    assert "has 3 rotors, and the log 4; give the file of the vehicle that flew" in message
+
+
+def test_init_needs_a_log_or_a_file(refuse, folder, tmp_path):
+    (message,) = refuse("init", "-o", tmp_path / "study.yaml")
+    assert "give logs, or a simulator's file by --from" in message
+    (message,) = refuse("init", "--from", folder / "mine.sdf", "-o", tmp_path / "study.yaml", "--arm", "0.1")
+    assert "states inertia, rotors and their factors, so leave out --inertia, --arm and the factors" in message
+
+
+def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
+    mine = folder / "mine.sdf"
+    before, output = mine.read_bytes(), tmp_path / "gap"
+    words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", output)
+    assert cpfls(*words, "--dry-run").exit_code == 0
+    assert not output.exists()
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    assert mine.read_bytes() == before
+    said = json.loads((output / "gap.json").read_text())["corrected"]
+    (change,) = said["changes"]
+    assert (change["file"], change["element"]) == ("mine.sdf", "motorConstant")
+    assert change["low"] < TRUE.thrust_factor < change["high"]
+    assert "mine.sdf  motorConstant 2.4e-08 → " in result.stdout
+    assert "-      &lt;motorConstant&gt;2.4e-08" in (output / "report.html").read_text()
+    assert {path.name for path in output.iterdir()} >= {"study.yaml", "mine.sdf", "report.html", "extended.h5"}
+    # What was made of the file is a study like any other.
+    again = cpfls("gap", output / "study.yaml", folder / "log0.csv", folder / "log1.csv", "-o", tmp_path / "again")
+    assert again.exit_code == 0, again.stderr
+    assert "corrected" in json.loads((tmp_path / "again" / "gap.json").read_text())
+
+
+def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):
+    """Its own folder as the output would put the corrected file in its place."""
+    mine = tmp_path / "mine.sdf"
+    mine.write_bytes((folder / "mine.sdf").read_bytes())
+    before = mine.read_bytes()
+    words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path, "--force")
+    result = cpfls(*words)
+    assert result.exit_code == 2
+    assert "is an input of this command" in result.stderr
+    assert mine.read_bytes() == before
+
+
+def test_other_commands_say_how_to_make_a_config(refuse, folder, tmp_path):
+    (message,) = refuse("compare", folder / "mine.sdf", folder / "log0.csv", "-o", tmp_path / "gap.h5")
+    assert "mine.sdf: is a simulator's file, not a config (YAML); `cpfls init --from " in message
+
+
+def test_a_file_that_states_too_little_says_what_to_write(refuse, folder, tmp_path):
+    mine = tmp_path / "mine.xml"
+    mine.write_text(
+        '<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="0.045" '
+        'diaginertia="3.7e-5 4.2e-5 6.6e-5"/></body></worldbody></mujoco>'
+    )
+    flight = tmp_path / "flight.csv"
+    flight.write_bytes((folder / "log0.csv").read_bytes())
+    (message,) = refuse("gap", mine, flight, "-o", tmp_path / "gap")
+    assert "does not state all that a gap needs" in message
+    assert "write position_m of M1, M2, M3 and M4 in place of ASK" in message
+
+
+def test_a_file_without_rotors_takes_those_of_the_log(cpfls, folder, tmp_path):
+    mine, output = tmp_path / "mine.xml", tmp_path / "study.yaml"
+    mine.write_text(
+        '<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="0.045" '
+        'diaginertia="3.7e-5 4.2e-5 6.6e-5"/></body></worldbody></mujoco>'
+    )
+    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", output, "--arm", "0.046")
+    assert result.exit_code == 0, result.stderr
+    vehicle = load_study(output).vehicle
+    assert vehicle.unknown == ("drag_factor", "thrust_factor")
+    np.testing.assert_allclose([r.position_m[:2] for r in vehicle.rotors], TRUE.places, atol=1e-4)

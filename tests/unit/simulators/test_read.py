@@ -1,0 +1,249 @@
+"""Simulators' files read: what they state, in whose units, and what is refused with its line and a remedy."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.numbers import places, spins
+from cpfls_cli.export.registry import FORMS
+from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.simulators.formats import FORMATS, read_model
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.gusty_flights import LARGE, SMALL
+from tests.builders.playback_flights import truth
+from tests.builders.simulator_files import sdf_of
+from tests.builders.vehicle_models import HEXA, vehicle_of, whole
+
+CLOSE = {"rtol": 1e-9, "atol": 1e-15}
+
+
+def exported(folder, form, vehicle):
+    held, _ = FORMS[form].held(vehicle)
+    path = folder / f"uav{FORMS[form].ending}"
+    path.write_text(FORMS[form].write(sheet_of_vehicle(vehicle), held, (), path.name))
+    return held, read_model(path)
+
+
+@pytest.mark.parametrize("form", ["sdf", "px4", "urdf", "mjcf"])
+def test_an_exported_vehicle_is_read_again(tmp_path, form):
+    vehicle = vehicle_of(truth()).model
+    held, read = exported(tmp_path, form, vehicle)
+    np.testing.assert_allclose(read.mass_kg, held.body.mass, **CLOSE)
+    np.testing.assert_allclose(
+        [read.inertia[at] for at in INERTIA_ENTRIES], [held.body.inertia[at] for at in INERTIA_ENTRIES], rtol=1e-9,
+        atol=1e-9 * held.body.inertia.max(),
+    )  # fmt: skip
+    np.testing.assert_allclose(read.centre, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("vehicle", [vehicle_of(truth()).model, whole(HEXA)])
+def test_rotors_of_sdf_are_those_that_were_written(tmp_path, vehicle):
+    held, read = exported(tmp_path, "sdf", vehicle)
+    count = len(read.rotors)
+    assert count == vehicle.rotors
+    np.testing.assert_allclose(read.hubs, places(vehicle, alike=False), rtol=1e-9, atol=1e-12)
+    # The body turns against its rotors.
+    assert [rotor.spin for rotor in read.rotors] == (-spins(vehicle.vehicle)).tolist()
+    for name, of in {
+        "thrust": lambda rotor: rotor.thrust.value,
+        "yaw": lambda rotor: rotor.drag_factor,
+        "drag": lambda rotor: rotor.drag.value,
+        "rolling": lambda rotor: rotor.rolling.value,
+    }.items():
+        wanted = [held.numbers[f"{name}_{rotor + 1}"] for rotor in range(count)]
+        np.testing.assert_allclose([of(rotor) for rotor in read.rotors], wanted, **CLOSE)
+    assert read.rotors[0].lag_up.value == pytest.approx(max(held.response.lag_s, 1e-6), rel=1e-9)
+    assert read.speed_max.value == pytest.approx(vehicle.vehicle.rotor_speed_max_rad_s, rel=1e-9)
+
+
+def test_rotors_of_urdf_are_those_that_were_written(tmp_path):
+    held, read = exported(tmp_path, "urdf", vehicle_of(truth()).model)
+    for rotor in read.rotors:
+        np.testing.assert_allclose(rotor.thrust.value, held.numbers["thrust"], **CLOSE)
+        np.testing.assert_allclose(rotor.drag_factor, held.numbers["yaw"], **CLOSE)
+        np.testing.assert_allclose(rotor.drag.value, held.numbers["drag_xy"], **CLOSE)
+    assert [rotor.spin for rotor in read.rotors] == [1, -1, 1, -1]
+
+
+def test_rotors_of_mjcf_are_those_that_were_written(tmp_path):
+    vehicle = vehicle_of(truth()).model
+    held, read = exported(tmp_path, "mjcf", vehicle)
+    squares = held.weights[:, 0, 1 + vehicle.rotors : 1 + 2 * vehicle.rotors]
+    np.testing.assert_allclose([rotor.thrust.value for rotor in read.rotors], squares[5], **CLOSE)
+    np.testing.assert_allclose([rotor.hub for rotor in read.rotors], [r.position_m for r in vehicle.vehicle.rotors])
+    assert read.rotors[0].lag_up.value == pytest.approx(held.response.lag_s, rel=1e-9)
+
+
+def test_every_number_has_its_line(tmp_path):
+    path = tmp_path / "mine.sdf"
+    path.write_text(sdf_of(SMALL))
+    read, lines = read_model(path), path.read_text().splitlines()
+    thrust = read.rotors[1].thrust
+    line = int(thrust.where.partition("line ")[2].partition(":")[0])
+    assert "<motorConstant>" in lines[line - 1]
+    assert path.read_bytes()[thrust.span.start : thrust.span.end] == f"{thrust.value:.6g}".encode()
+    assert "base_link" in read.where_of_mass
+
+
+def test_links_with_poses_add_up(tmp_path):
+    """A weight on a mount that leans and turns: mass, centre and inertia as by hand."""
+    extra = """    <link name="battery"><pose relative_to="mount">0.02 0 0 0 0 0</pose>
+      <inertial><pose>0 0 0.01 0 0 0</pose><mass>0.02</mass>
+      <inertia><ixx>2e-6</ixx><ixy>0</ixy><ixz>0</ixz><iyy>4e-6</iyy><iyz>0</iyz><izz>5e-6</izz></inertia></inertial>
+    </link>
+    <frame name="mount" attached_to="base_link"><pose degrees="true">0.01 0 -0.03 0 0 90</pose></frame>
+    <joint name="strap" type="fixed"><parent>base_link</parent><child>battery</child></joint>
+"""
+    path = tmp_path / "mine.sdf"
+    path.write_text(sdf_of(SMALL).replace('    <link name="rotor_0">', extra + '    <link name="rotor_0">'))
+    read = read_model(path)
+    battery = next(body for body in read.bodies if body.name == "battery")
+    np.testing.assert_allclose(battery.centre, [0.01, 0.02, -0.02], atol=1e-12)
+    np.testing.assert_allclose(np.diag(battery.inertia), [4e-6, 2e-6, 5e-6], atol=1e-15)
+    assert read.mass_kg == pytest.approx(SMALL.mass + 0.02)
+    np.testing.assert_allclose(read.centre, 0.02 * battery.centre / read.mass_kg, atol=1e-9)
+    apart = SMALL.mass * 0.02 / (SMALL.mass + 0.02)
+    lever = battery.centre
+    wanted = np.diag(SMALL.inertia) + battery.inertia + apart * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+    np.testing.assert_allclose(read.inertia, wanted, rtol=1e-5, atol=1e-10)
+
+
+def test_a_plugin_without_a_number_has_its_own(tmp_path):
+    path = tmp_path / "mine.sdf"
+    text = sdf_of(SMALL).replace("<momentConstant>0.006</momentConstant>", "")
+    path.write_text(text)
+    ratio = read_model(path).rotors[0].ratio
+    assert ratio.value == 0.016
+    assert ratio.span is None
+    assert "its own default" in ratio.where
+
+
+def test_an_include_beside_the_file_is_read(tmp_path):
+    text = sdf_of(LARGE)
+    body, motors = text[: text.index("    <plugin")], text[text.index("    <plugin") : text.index("  </model>")]
+    parts = text.split("    <plugin")[1:]
+    plugins = "".join("    <plugin" + part.partition("</plugin>")[0] + "</plugin>\n" for part in parts)
+    for plugin in plugins.split("    <plugin")[1:]:
+        text = text.replace("    <plugin" + plugin, "")
+    assert body
+    assert motors
+    for name, content in {
+        "base": text,
+        "whole": f"<sdf version='1.9'><model name='whole'><include merge='true'><uri>model://base</uri></include>\n"
+        f"{plugins}</model></sdf>",
+    }.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "model.sdf").write_text(content)
+    read = read_model(tmp_path / "whole" / "model.sdf")
+    assert read.mass_kg == pytest.approx(LARGE.mass)
+    assert [path.parent.name for path in read.files] == ["whole", "base"]
+
+
+def test_mujoco_takes_mass_from_geoms_and_classes(tmp_path):
+    """A cylinder of 0.4 kg on its side, and a box by its density."""
+    path = tmp_path / "mine.xml"
+    path.write_text(
+        """<mujoco><compiler angle="radian"/>
+  <default><default class="tube"><geom type="cylinder" size="0.02 0.1" mass="0.4"/></default>
+  <motor ctrlrange="0 5"/></default>
+  <worldbody><body name="quad" childclass="tube"><freejoint/>
+    <geom euler="0 1.5707963267948966 0"/>
+    <geom class="main" type="box" size="0.05 0.05 0.01" density="500" pos="0 0 0.05"/>
+    <site name="a" pos="0.1 0.1 0"/><site name="b" pos="-0.1 -0.1 0"/></body></worldbody>
+  <actuator><motor name="m0" site="a" gear="0 0 1 0 0 -0.02"/><motor name="m1" site="b" gear="0 0 1 0 0 0.02"/>
+  </actuator></mujoco>"""
+    )
+    read = read_model(path)
+    assert read.mass_kg == pytest.approx(0.5)
+    np.testing.assert_allclose(read.centre, [0, 0, 0.01], atol=1e-12)
+    across, along = 0.4 * (0.02**2 / 4 + 0.1**2 / 3), 0.4 * 0.02**2 / 2
+    box = [0.1 * (0.05**2 + 0.01**2) / 3] * 2 + [0.1 * 2 * 0.05**2 / 3]
+    lever = 0.4 * 0.1 / 0.5 * 0.05**2
+    wanted = [along + box[0] + lever, across + box[1] + lever, across + box[2]]
+    np.testing.assert_allclose(np.diag(read.inertia), wanted, rtol=1e-9)
+    assert [(rotor.spin, rotor.ratio.value, rotor.most.value, rotor.thrust) for rotor in read.rotors] == [
+        (1, 0.02, 5.0, None),
+        (-1, 0.02, 5.0, None),
+    ]
+
+
+GOOD = sdf_of(SMALL)
+BOMB = """<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]><sdf version="1.9"><model name="&b;"/></sdf>"""
+BAD = {
+    "bomb": (BOMB, "has a DOCTYPE or entities of its own"),
+    "broken": (GOOD.replace("</model>", ""), "is no valid XML"),
+    "empty": ("", "is no valid XML"),
+    "other": ("<html/>", "begins with <html>, which is no model known here"),
+    "negative": (GOOD.replace("<mass>1e-05</mass>", "<mass>-1</mass>", 1), "a mass of -1 kg; write one above 0"),
+    "no number": (GOOD.replace("<izz>5", "<izz>five", 1).replace("<izz>6", "<izz>six", 1), "is not a number"),
+    "template": (GOOD.replace("<pose>0 0 0 0 0 0</pose>", "<pose>${x} 0 0 0 0 0</pose>", 1), "render it first"),
+    "include": (
+        GOOD.replace('<link name="base_link">', '<include><uri>model://away</uri></include><link name="base_link">'),
+        "includes 'model://away', which is not beside this file",
+    ),
+    "two": (
+        GOOD.replace("</sdf>", GOOD[GOOD.index("<model") : GOOD.index("</sdf>")].replace("mine", "yours") + "</sdf>"),
+        "holds several models: mine, yours",
+    ),
+    "plugin": (GOOD.replace("multicopter-motor-model", "lift-drag"), "none of its plugins is a motor model"),
+    "turns": (
+        GOOD.replace('<joint name="rotor_0_joint"', '<joint name="gimbal"'),
+        "its joint 'rotor_0_joint' is not in the file",
+    ),
+    "gimbal": (
+        GOOD.replace(
+            '    <link name="rotor_0">',
+            '<link name="cam"/><joint name="gimbal" type="revolute"><parent>base_link</parent><child>cam</child>'
+            '<axis><xyz>0 0 1</xyz></axis></joint>    <link name="rotor_0">',
+        ),
+        "the joint gimbal turns, and a study has one rigid body; fix it",
+    ),
+    "heavy": (GOOD.replace("<maxRotVelocity>6000", "<maxRotVelocity>1000"), "it cannot hover; check the mass"),
+    "direction": (GOOD.replace(">cw<", ">left<", 1), "turningDirection is 'left'; write ccw or cw"),
+    "sideways": (
+        GOOD.replace(" 0 0 0 0</pose>\n      <inertial><mass>1e-05", " 0 1.57 0 0</pose>\n      <inertial><mass>1e-05"),
+        "not along z of the body",
+    ),
+    "impossible": (GOOD.replace("<ixx>1e-10</ixx>", "<ixx>-1e-4</ixx>", 1), "a principal moment is below 0"),
+    "loop": (
+        GOOD.replace("<pose>0 0 0 0 0 0</pose>", "").replace(
+            '<link name="base_link">', '<link name="base_link"><pose relative_to="base_link">0 0 0 0 0 0</pose>'
+        ),
+        "its pose is relative to itself",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_refused_in_one_sentence(tmp_path, name):
+    text, words = BAD[name]
+    assert text != GOOD
+    path = tmp_path / "bad.sdf"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        read_model(path)
+    message = str(refused.value)
+    assert words in message
+    assert "bad.sdf" in message
+    assert "\n" not in message
+
+
+def test_what_is_there_not_or_a_template_is_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_model(tmp_path / "none.sdf")
+    with pytest.raises(InputError, match=r"render it first \(xacro uav\.xacro > uav\)"):
+        read_model(Path("uav.xacro"))
+    mesh = tmp_path / "mesh.xml"
+    mesh.write_text(
+        '<mujoco><worldbody><body name="b"><freejoint/><geom type="mesh" mesh="x"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(InputError, match="its mass follows from a mesh, which is not read here; give the body"):
+        read_model(mesh)
+
+
+def test_units_and_frames_of_the_page_are_those_of_the_table():
+    page = (Path(__file__).parents[3] / "docs" / "simulators-files.md").read_text()
+    for each in FORMATS:
+        assert f"| {each.units} | {each.frames} | {each.source} |" in page
