@@ -17,6 +17,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Tangent, Vector, zero
 
 Kind = Literal["wrench", "actuator", "sensor", "parameter"]
+Quantity = Literal["scales", "centre", "products", "drag", "rolling", "lag"]
+"""Of a model of a simulator: factors of thrust, torque and inertia, centre of mass, products of inertia, rotors'."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,7 @@ class Effect:
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
     # ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
+    quantity: Quantity | None = None  # Of a simulator's model, which its coefficients are.
     holds: frozenset[str] = frozenset()  # Effects that are special cases of this one, which is then not their rival.
     # Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     rate_derivative: bool = False

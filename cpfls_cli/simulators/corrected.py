@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.effects.catalogue.rotor_mismatch import gain_modes
+from cpfls_cli.effects.effect import Quantity
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
@@ -34,13 +34,13 @@ from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
 from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
+from cpfls_cli.vehicle.rotors import gain_modes
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
-_OF_EFFECTS = {"drag": "rotor_drag", "rolling": "rolling_moment", "lag_up": "motor_lag"}
-"""Numbers of a rotor that are effects of their own, which a study's vehicle has none of."""
-_TOGETHER = ("parameter_error", "rotor_mismatch", "drag_factor_error")
+_OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
+"""Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
@@ -247,14 +247,18 @@ def _sizes(change: Change) -> dict[str, str]:
 
 
 def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
-    named = {each.name: {number.name: number for number in each.numbers} for each in effects}
-    together = {key: number for name in _TOGETHER for key, number in named.get(name, {}).items()}
+    together = {
+        number.name: number for each in effects if find(each.name).quantity == "scales" for number in each.numbers
+    }
     if together:
         _of_rotors(made, together)
     for each in effects:
-        if each.name in _RULES:
-            _RULES[each.name](made, named[each.name])
-        elif each.name not in _TOGETHER and not each.of_log:
+        quantity = find(each.name).quantity
+        rule = None if quantity is None else _RULES.get(quantity)
+        held = quantity == "scales" or (
+            rule is not None and rule(made, {number.name: number for number in each.numbers})
+        )
+        if not held and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
@@ -262,24 +266,24 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
 
 def _not_found(made: _Corrections, found: Conclusion) -> None:
     """Say of what the file states and the flights did not show why."""
-    named, hidden = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    named = {find(each.name).quantity for each in found.effects}
+    hidden = {find(each.name).quantity: each.reason for each in found.not_excited}
     tags = _TAGS[made.of.model.format]
-    for kind, name in _OF_EFFECTS.items():
+    for kind, quantity in _OF_EFFECTS.items():
         stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
-        if kind not in tags or name in named or stated is None or stated.value == 0:
+        if kind not in tags or quantity in named or stated is None or stated.value == 0:
             continue
-        why = f"these flights cannot show it: {hidden[name]}" if name in hidden else "these flights show none of it"
+        reason = hidden.get(quantity)
+        why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
         made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
 
 
-def _not_held(made: _Corrections, each: NamedEffect | str) -> None:
-    name = each if isinstance(each, str) else each.name
-    entry, values = find(name), ""
-    if not isinstance(each, str):
-        values = ", ".join(
-            f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
-            for number in each.numbers
-        )
+def _not_held(made: _Corrections, each: NamedEffect) -> None:
+    entry = find(each.name)
+    values = ", ".join(
+        f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
+        for number in each.numbers
+    )
     made.elsewhere.append(
         f"{entry.title}: {entry.formula}{', with ' if values else ''}{values}; the format has no number for it: "
         f"{_BY_HAND[made.of.model.format]}; `cpfls export extended.h5 --format c` writes the lines"
@@ -359,12 +363,13 @@ def _room(made: _Corrections, body: object) -> Node | None:
     return node.first("inertia") if isinstance(node, Node) and made.of.model.format == "sdf" else None
 
 
-def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     found = list(numbers.values())
     _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
+    return True
 
 
-def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     model = made.of.model
     first, share = model.bodies[0], model.mass_kg / model.bodies[0].mass.value
     place, moved = [float(each) for each in first.centre], False
@@ -383,49 +388,49 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
             place[axis], moved = found.value, True
     if moved and first.node is not None:
         made.put(first.node, f"<pose>{' '.join(f'{each:.4g}' for each in place)} 0 0 0</pose>")
+    return True
 
 
-def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     tau = numbers["time_constant_s"]
     up, down = ([getattr(rotor, kind) for rotor in made.rotors] for kind in ("lag_up", "lag_down"))
     if None in up or None in down or "lag_up" not in _TAGS[made.of.model.format]:
-        _not_held(made, "motor_lag")
-        return
+        return False
     stated = [each.value for each in (*up, *down)]
     if tau.low <= max(stated) and tau.high >= min(stated):
         made.unchanged.append(
             f"time constants {min(stated):.4g} and {max(stated):.4g} s agree with the flights, {tau.value:.4g} "
             f"[{tau.low:.4g}, {tau.high:.4g}] s up and down together"
         )
-        return
+        return True
     for kind in ("lag_up", "lag_down"):
         made.of_rotors(kind, lambda _i, _s: _Found(tau.value, tau.low, tau.high), "time constant of {whom} is {share}")
+    return True
 
 
-def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     own = numbers["k_d"]
-    if not made.of_rotors("drag", lambda _i, _s: _Found(own.value, own.low, own.high), "drag of {whom} is {share}"):
-        _not_held(made, "rotor_drag")
+    return made.of_rotors("drag", lambda _i, _s: _Found(own.value, own.low, own.high), "drag of {whom} is {share}")
 
 
-def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
+def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     own = numbers["mu"]
     signed = _Found(own.value, own.low, own.high)
 
     def of(index: int, _stated: float) -> _Found:
         return signed.times(made.vehicle.rotors[index].spin)
 
-    if not made.of_rotors("rolling", of, "rolling moment of {whom} is {share}"):
-        _not_held(made, "rolling_moment")
+    return made.of_rotors("rolling", of, "rolling moment of {whom} is {share}")
 
 
-_RULES: dict[str, Callable[[_Corrections, Mapping[str, Estimate]], None]] = {
-    "products_of_inertia": _products,
-    "com_offset": _centre,
-    "motor_lag": _lag,
-    "rotor_drag": _drag,
-    "rolling_moment": _rolling,
+_RULES: dict[Quantity, Callable[[_Corrections, Mapping[str, Estimate]], bool]] = {
+    "products": _products,
+    "centre": _centre,
+    "lag": _lag,
+    "drag": _drag,
+    "rolling": _rolling,
 }
+"""What corrects a quantity; False where the format has no number for it."""
 
 
 def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[str]) -> dict[Path, bytes]:

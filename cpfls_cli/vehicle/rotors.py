@@ -17,6 +17,8 @@ AXES = ("thrust", "roll", "pitch", "yaw")
 ViolationKind = Literal["negative squared speed", "above the limit"]
 # Fraction of the largest squared speed that is rounding error of the allocation.
 _ROUNDING = 1e-12
+# Share of the arm by which hubs may miss each other and be opposite: digits of a config.
+_SAME_PLACE = 1e-6
 
 
 class BodyWrench(NamedTuple):
@@ -224,3 +226,43 @@ def _summary(rotor: int, kind: ViolationKind, where: BoolArray, worst: float) ->
     samples = np.flatnonzero(where)
     first, last = int(samples[0]), int(samples[-1])
     return RotorViolation(rotor=rotor, kind=kind, first=first, last=last, count=len(samples), worst=worst)
+
+
+def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
+    """Find the pairs of rotors that face each other across the middle of all and spin the same way.
+
+    The centre of mass may lie off the middle, as that of a vehicle out of trim does.
+
+    Result: indices from 0, in the order of the first rotor of each pair.
+    """
+    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    hubs = hubs - hubs.mean(axis=0)
+    spins = np.array([rotor.spin for rotor in vehicle.rotors])
+    apart = np.linalg.norm(hubs[:, None] + hubs[None], axis=2)
+    facing = (apart <= _SAME_PLACE * np.abs(hubs).max()) & (spins[:, None] == spins)
+    return tuple((int(first), int(second)) for first, second in np.argwhere(facing) if first < second)
+
+
+def gain_modes(vehicle: VehicleSettings) -> Array:
+    """Construct two patterns of thrust gain that no wrong inertia can mimic.
+
+    For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
+    What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
+
+    Result: shape (rotor, 2); gain of each rotor for a difference of 1 from end to end.
+    """
+    spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
+    common = np.column_stack([np.ones_like(spins), spins])
+    seeds = _seeds(vehicle)
+    return np.asarray(seeds - common @ np.linalg.lstsq(common, seeds, rcond=None)[0])
+
+
+def _seeds(vehicle: VehicleSettings) -> Array:
+    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    pairs = opposite_pairs(vehicle)
+    if len(pairs) != 2 or len(hubs) != 4:
+        return np.asarray(hubs / np.ptp(hubs, axis=0))
+    seeds = np.zeros((4, 2))
+    for mode, (first, second) in enumerate(pairs):
+        seeds[[first, second], mode] = 0.5, -0.5
+    return seeds

@@ -135,7 +135,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     cpfls.done("report", config, folder / "v.h5", "-o", folder / "v.md")
     page = (folder / "v.md").read_text()
     assert "which the thrust lifts, gives all forces their size" in page
-    assert "Guesses stand here for what the config leaves open: drag factor, inertia and thrust factor." in page
+    assert "The values of what the config leaves open are guesses: drag factor, inertia and thrust factor." in page
 
 
 @pytest.mark.usefixtures("undrawn")

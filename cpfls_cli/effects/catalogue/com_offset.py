@@ -16,6 +16,7 @@ _EFFECT = Effect(
     name="com_offset",
     order=180,
     title="offset of the centre of mass",
+    quantity="centre",
     kind="wrench",
     formula="M = -c x F,  F the force without weight, as measured, or else the thrust",
     sentence="The centre of mass is not where the model has it, so thrust tilts the vehicle.",

@@ -27,6 +27,7 @@ EFFECT = Effect(
     name="drag_factor_error",
     order=290,
     title="wrong drag (yaw) factor",
+    quantity="scales",
     kind="actuator",
     formula="M_z = -e b sum(s_i w_i^2)",
     sentence="The rotors turn the vehicle in yaw with a torque other than the config says. It shows with an effect "

@@ -10,6 +10,7 @@ EFFECT = Effect(
     name="motor_lag",
     order=150,
     title="motor lag",
+    quantity="lag",
     kind="actuator",
     formula="tau w_i' + w_i = w_i,commanded;  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The motors need time to reach the commanded speed.",

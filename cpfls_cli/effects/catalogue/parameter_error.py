@@ -145,6 +145,7 @@ EFFECT = Effect(
     name="parameter_error",
     order=280,
     title="wrong inertia or thrust scale",
+    quantity="scales",
     kind="parameter",
     formula="M = -(d/dt (dI omega) + omega x dI omega) - g_i I omega_j omega_k,  dI = diag(e_i I_ii);  F_z = e_T T",
     sentence="The vehicle is as modelled, but one of its numbers is wrong. Rates and rotor speeds show only the ratio "

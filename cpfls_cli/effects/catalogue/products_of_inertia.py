@@ -19,6 +19,7 @@ EFFECT = Effect(
     name="products_of_inertia",
     order=190,
     title="products of inertia",
+    quantity="products",
     kind="wrench",
     formula="M = -(d/dt (dI omega) + omega x dI omega),  dI off the diagonal",
     sentence="The mass is distributed unevenly, so rotation about one axis turns the vehicle about another.",

@@ -16,6 +16,7 @@ EFFECT = Effect(
     name="rolling_moment",
     order=60,
     title="rolling moment of the rotors",
+    quantity="rolling",
     kind="wrench",
     formula="M = -mu sum s_i w_i (u_ix, u_iy, 0)",
     sentence="Each rotor rolls about its direction of flight; the rotors cancel unless one spin sense turns faster.",

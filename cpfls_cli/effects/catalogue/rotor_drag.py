@@ -18,6 +18,7 @@ EFFECT = Effect(
     name="rotor_drag",
     order=40,
     title="rotor drag (H-force)",
+    quantity="drag",
     kind="wrench",
     formula="F_i = -k_d w_i (u_ix, u_iy, 0) at hub i,  M = sum r_i x F_i",
     sentence="The spinning rotors hold the vehicle back in proportion to its speed through the air.",

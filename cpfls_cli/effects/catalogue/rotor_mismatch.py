@@ -7,38 +7,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Effect
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.rotors import gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-_SAME_PLACE = 1e-6  # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
-
-
-def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
-    """Find the pairs of rotors that face each other across the middle of all and spin the same way.
-
-    The centre of mass may lie off the middle, as that of a vehicle out of trim does.
-
-    Result: indices from 0, in the order of the first rotor of each pair.
-    """
-    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
-    hubs = hubs - hubs.mean(axis=0)
-    spins = np.array([rotor.spin for rotor in vehicle.rotors])
-    apart = np.linalg.norm(hubs[:, None] + hubs[None], axis=2)
-    facing = (apart <= _SAME_PLACE * np.abs(hubs).max()) & (spins[:, None] == spins)
-    return tuple((int(first), int(second)) for first, second in np.argwhere(facing) if first < second)
-
-
-def gain_modes(vehicle: VehicleSettings) -> Array:
-    """Construct two patterns of thrust gain that no wrong inertia can mimic.
-
-    For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
-    What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
-
-    Result: shape (rotor, 2); gain of each rotor for a difference of 1 from end to end.
-    """
-    spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
-    common = np.column_stack([np.ones_like(spins), spins])
-    seeds = _seeds(vehicle)
-    return np.asarray(seeds - common @ np.linalg.lstsq(common, seeds, rcond=None)[0])
 
 
 def gains(vehicle: VehicleSettings, differences: Array) -> Array:
@@ -73,17 +43,6 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     )
 
 
-def _seeds(vehicle: VehicleSettings) -> Array:
-    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
-    pairs = opposite_pairs(vehicle)
-    if len(pairs) != 2 or len(hubs) != 4:
-        return np.asarray(hubs / np.ptp(hubs, axis=0))
-    seeds = np.zeros((4, 2))
-    for mode, (first, second) in enumerate(pairs):
-        seeds[[first, second], mode] = 0.5, -0.5
-    return seeds
-
-
 def _accounts(_number: str, values: Mapping[str, float]) -> float:
     return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
 
@@ -103,6 +62,7 @@ EFFECT = Effect(
     name="rotor_mismatch",
     order=200,
     title="rotors that differ",
+    quantity="scales",
     kind="wrench",
     formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z,  M_z += sum (delta - s_i kappa_i) b_i w_i^2",
     sentence="One rotor pulls less than its opposite: a worn propeller, a weak motor.",

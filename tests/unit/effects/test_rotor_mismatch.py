@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.catalogue.rotor_mismatch import gain_modes, gains, opposite_pairs
-from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.effects.catalogue.rotor_mismatch import gains
+from cpfls_cli.vehicle.rotors import body_wrench, gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 
