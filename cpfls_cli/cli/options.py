@@ -204,6 +204,7 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "My simulator differs from flight",
         (
+            "cpfls gap uav.sdf logs/* -o gap",
             "cpfls gap study.yaml logs/* -o gap",
             "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
             "cpfls report study.yaml twin.h5 -o twin.html",
