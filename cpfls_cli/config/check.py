@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import difflib
 import json
+import logging
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -24,15 +25,15 @@ from cpfls_cli.vehicle_limits import beyond_any_vehicle
 
 _PAPER = "remove it; `make reproduce` writes the page that compares a study with the paper"
 _CONTROL = "a model is flown by `simulate --model` in closed loop; examples/computed_torque.py controls with one"
-_STRUCTURES = "remove it; the search for the structure of a vehicle breeds none"
 _GONE = {
-    ("playback", "generations"): _STRUCTURES,
-    ("playback", "population"): _STRUCTURES,
     ("report", "evaluation_times"): _PAPER,
     ("report", "paper"): _PAPER,
     ("simulation", "computed_torque"): f"remove it; {_CONTROL}",
 }
 """What to do about keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
+
+_WITHOUT_EFFECT = {("playback", "generations"), ("playback", "population")}
+"""Keys of before that no result of today depends on: they are left out, with a warning."""
 
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
@@ -84,12 +85,15 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
 def _known(section: str, values: Any) -> Any:
     if not isinstance(values, dict):
         return values
-    return {key: value for key, value in values.items() if (section, key) not in _GONE}
+    return {key: value for key, value in values.items() if (section, key) not in _WITHOUT_EFFECT.union(_GONE)}
 
 
 def gone_lines(data: dict[str, Any], source: str) -> list[str]:
-    """Say of the keys of a file that are gone what to do."""
+    """Say of the keys of a file that are gone what to do; warn of those that have no effect any more."""
     sections = {section: values for section, values in data.items() if isinstance(values, dict)}
+    for section, key in sorted(_WITHOUT_EFFECT):
+        if key in sections.get(section, ()):
+            logging.getLogger("cpfls_cli").warning("%s: %s.%s has no effect any more; remove it", source, section, key)
     return [
         f"{source}: {section}.{key}: is no longer a key: {remedy}"
         for (section, key), remedy in _GONE.items()

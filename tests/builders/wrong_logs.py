@@ -10,7 +10,7 @@ from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown
 from tests.builders.vehicle_search import left_out
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "rotor_speed": 1.0}
-SEARCH = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "horizon_s": 0.2}
+SEARCH = {"search_windows": 20, "folds": 2, "horizon_s": 0.2}
 LEARNED = {
     "consequents": "seesaw",
     "products": "additive",

@@ -101,3 +101,11 @@ def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_pa
 def test_keys_that_are_gone_are_left_out_of_the_configs_of_artifacts():
     study = validate({"report": {"title": "A study", "paper": True, "evaluation_times": []}}, "study.yaml")
     assert resolved(study)["report"] == {"title": "A study", "notes": []}
+
+
+def test_a_key_that_has_no_effect_any_more_is_read_with_a_warning(tmp_path, caplog):
+    config = tmp_path / "study.yaml"
+    config.write_text(f"{VEHICLE}playback: {{generations: 0, folds: 4}}\n")
+    with caplog.at_level("WARNING"):
+        assert load_study(config).playback.folds == 4
+    assert f"{config}: playback.generations has no effect any more; remove it" in caplog.text
