@@ -169,7 +169,7 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
 
 def _with_file(run: Run, found: Diagnosis, of: VehicleOf) -> Diagnosis:
     """Put what was found into the simulator's file."""
-    flights = [flight.name for flight in found.recorded.values()]
+    flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
     said, files = corrected(of, run.study.vehicle, found, flights)
     run.texts.update({run.output / name: text for name, text in files.items()})
     return replace(found, corrected=said)
