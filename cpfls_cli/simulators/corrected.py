@@ -11,7 +11,8 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
 
-A number is replaced only where the 95 % interval leaves the stated one out.
+A number is replaced only where the interval leaves the stated one out, at 95 % for all numbers together (Bonferroni):
+of four that are right one would else be moved in every sixth file.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import hypot
 from pathlib import Path
 from typing import NamedTuple
@@ -86,16 +88,18 @@ class _Found(NamedTuple):
         value = self.value * other.value
         return _Found(value, value * (1 - wide[0]), value * (1 + wide[1]))
 
-    def contradicts(self, stated: float) -> bool:
-        return stated < self.low or stated > self.high
+    def contradicts(self, stated: float, wider: float = 1.0) -> bool:
+        """Tell whether a number lies outside the interval, made wider by a factor."""
+        below, above = (self.value + wider * (end - self.value) for end in (self.low, self.high))
+        return stated < below or stated > above
 
 
 _ONE = _Found(1.0, 1.0, 1.0)
 
 
-def _significant(factor: _Found) -> _Found:
+def _significant(factor: _Found, wider: float) -> _Found:
     """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+    return factor if factor.contradicts(1.0, wider) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
 
 
 def _part(number: Estimate | None, times: float) -> _Found:
@@ -121,6 +125,7 @@ class _Corrections:
 
     of: VehicleOf
     vehicle: VehicleSettings
+    numbers: int
     edits: dict[Span, bytes] = field(default_factory=dict)
     put_in: dict[Span, bytes] = field(default_factory=dict)
     changes: dict[tuple[str, float, float], tuple[Change, list[str]]] = field(default_factory=dict)
@@ -132,6 +137,13 @@ class _Corrections:
         """Of the corrected files, by those that were given."""
         return _names(self.of.model.files)
 
+    @cached_property
+    def wider(self) -> float:
+        """By how much an interval at 95 % for all numbers together is wider than that of one."""
+        from scipy.stats import norm
+
+        return float(norm.isf(0.025 / max(self.numbers, 1)) / norm.isf(0.025))
+
     @property
     def rotors(self) -> list[Rotor]:
         """In the order of the study."""
@@ -141,8 +153,10 @@ class _Corrections:
         """Put a number in the place of the stated one, where that is outside the interval."""
         new, low, high = (stated.scale * each for each in found)
         before, text = stated.scale * stated.value, f"{new:.4g}"
-        if not found.contradicts(stated.value):
-            self._keep(f"{name} {before:.4g} agrees with the flights, {text} [{low:.4g}, {high:.4g}]")
+        if not found.contradicts(stated.value, self.wider):
+            word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
+            word = word if found.contradicts(stated.value) else "agrees with the flights,"
+            self._keep(f"{name} {before:.4g} {word} {text} [{low:.4g}, {high:.4g}]")
         elif stated.span is not None and self.edits.get(stated.span, text.encode()) != text.encode():
             self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
         elif stated.span is not None:
@@ -207,7 +221,7 @@ def corrected(
     flights : sequence of str
         Names of the flights that it was found in.
     """
-    made = _Corrections(of, vehicle)
+    made = _Corrections(of, vehicle, sum(len(each.numbers) for each in found.effects))
     if found.verdict in _WRITES and not found.contradictions:
         sure = [each for each in found.effects if each.name not in found.rivals]
         for each in found.effects:
@@ -292,7 +306,7 @@ def _not_held(made: _Corrections, each: NamedEffect) -> None:
 
 def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
-    scale = _significant(_factor(numbers.get("thrust_scale")))
+    scale = _significant(_factor(numbers.get("thrust_scale")), made.wider)
     lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
     modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
 
@@ -345,7 +359,7 @@ def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mappin
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
         if not first.entries or not straight:
-            if found.contradicts(total):
+            if found.contradicts(total, made.wider):
                 made.elsewhere.append(
                     f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
                     f"kg m^2, and not {total:.4g}: {first.inertia_at} states it in other axes, or not; change it there"
@@ -382,7 +396,7 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         if first.place or first.node is None or model.format != "sdf":
             stated = first.place[axis] if first.place else Stated(place[axis], first.inertia_at)
             made.replace(f"pose {name}", stated, found, words, first.name, None)
-        elif found.contradicts(place[axis]):
+        elif found.contradicts(place[axis], made.wider):
             values = (place[axis], float(f"{found.value:.4g}"), found.low, found.high)
             made.note(first.node.file, f"pose {name}", f"{first.node.where}: no <pose>", values, words, first.name)
             place[axis], moved = found.value, True
