@@ -95,14 +95,17 @@ WORDS: Mapping[str, Any] = {
 """What templates of playback know (`by_horizon.md.j2`, `trust.md.j2`)."""
 
 
-def draw_errors(r: ByHorizon, figure: Figure, left_out: Sequence[str] = ()) -> None:
-    """Draw the mean error over the horizon, of a model and of what it has to beat."""
+def draw_errors(
+    r: ByHorizon, figure: Figure, left_out: Sequence[str] = (), names: Mapping[str, str] | None = None
+) -> None:
+    """Draw the mean error over the horizon, of a model and of what it has to beat; `names`: others than in `WHO`."""
+    called = {**WHO, **(names or {})}
     panels = stacked(figure, len(r.signals))
     for axes, signal in zip(panels, r.signals, strict=True):
         words, unit, scale = SIGNALS[signal]
         shown = [name for name in WHO if name in r.models and name not in left_out]
         for name in reversed(shown):
-            line(axes, r.horizon_s, scale * r.of(name, signal).mae, label=WHO[name], **_STYLES[name])
+            line(axes, r.horizon_s, scale * r.of(name, signal).mae, label=called[name], **_STYLES[name])
         tops = {name: scale * float(r.of(name, signal).mae.max()) for name in r.models}
         top = 1.6 * max(tops[name] for name in (r.judged, *r.rivals))
         axes.set_ylim(0.0, min(top, 1.06 * max(tops.values())) or 1.0)

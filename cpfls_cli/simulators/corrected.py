@@ -132,11 +132,6 @@ class _Corrections:
     unchanged: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
 
-    @property
-    def names(self) -> dict[Path, str]:
-        """Of the corrected files, by those that were given."""
-        return _names(self.of.model.files)
-
     @cached_property
     def wider(self) -> float:
         """By how much an interval at 95 % for all numbers together is wider than that of one."""
@@ -174,7 +169,7 @@ class _Corrections:
         """Take note of a change: before, after, and the ends of the interval."""
         before, after, low, high = numbers
         change = Change(
-            file=self.names[file],
+            file=self.of.model.output_names[file],
             element=name,
             where=where,
             before=float(f"{before:.6g}"),
@@ -236,7 +231,7 @@ def corrected(
         made.unchanged.append("the log or its vehicle contradicts itself, so nothing is put in")
     changes = tuple(_said(change, whom) for change, whom in made.changes.values())
     files = _written(made, changes, flights)
-    names = made.names
+    names = of.model.output_names
     texts = {names[file]: text for file, text in files.items()}
     diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
     said = Corrected(
@@ -487,15 +482,6 @@ def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> b
     end = "\r\n" if b"\r\n" in raw else "\n"
     text = end.join(lines).replace("--", "- -")
     return f"<!-- {text} -->{end}".encode()
-
-
-def _names(files: Sequence[Path]) -> dict[Path, str]:
-    """Name the files in the output folder; those of includes by their folders too."""
-    first, *others = files
-    taken = {first: first.name}
-    for file in others:
-        taken[file] = file.name if file.name not in taken.values() else f"{file.parent.name}-{file.name}"
-    return taken
 
 
 def _diff(name: str, before: bytes, after: bytes) -> str:

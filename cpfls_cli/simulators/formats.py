@@ -82,6 +82,11 @@ def read_model(path: Path) -> SimulatorModel:
     InputError
         If the file is of no known format, or states no such vehicle.
     """
+    return checked(format_of(path).read(path))
+
+
+def format_of(path: Path) -> Format:
+    """Tell the format of a simulator's file by its first element; raises InputError where it is none of those."""
     if path.suffix.lower() in (".xacro", ".jinja"):
         raise InputError(f"{path}: is a template; render it first (xacro {path.name} > {path.stem}), and give that")
     root = read_xml(path)
@@ -89,4 +94,4 @@ def read_model(path: Path) -> SimulatorModel:
     if found is None:
         known = ", ".join(f"<{each.root}> of {each.program}" for each in FORMATS)
         raise InputError(f"{path}: begins with <{root.tag}>, which is no model known here; known are {known}")
-    return checked(found.read(path))
+    return found

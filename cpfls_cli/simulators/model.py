@@ -141,6 +141,14 @@ class SimulatorModel:
         return self.files[0]
 
     @property
+    def output_names(self) -> dict[Path, str]:
+        """Names of its files where they are written anew; those of includes with their folders too."""
+        taken = {self.file: self.file.name}
+        for file in self.files[1:]:
+            taken[file] = file.name if file.name not in taken.values() else f"{file.parent.name}-{file.name}"
+        return taken
+
+    @property
     def mass_kg(self) -> float:
         """Mass of all parts."""
         return float(sum(body.mass.value for body in self.bodies))

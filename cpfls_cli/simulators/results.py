@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cpfls_cli.gap.before_after import PlaybackChange
 from cpfls_cli.result import about, part, result
 
 
@@ -28,3 +29,5 @@ class Corrected:
     unchanged: tuple[str, ...] = about("what was found and is not put in, with the reason", "kept")
     elsewhere: tuple[str, ...] = about("what the format cannot hold, with what would do it", "missing")
     diff: str = about("unified diff of the files as given and as corrected")
+    flown: PlaybackChange | None = part(default=None)
+    """Held-out flights played back in the vehicle of the file, as given and as corrected."""

@@ -1,18 +1,29 @@
-"""The vehicle of a study made of a simulator's file, with its rotors in the order of the log."""
+"""The vehicle of a study made of a simulator's file, with its rotors in the order of the log; and how it flies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from os.path import commonpath
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
+from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, played_pairs, rates_fade
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.document import Stated
+from cpfls_cli.simulators.formats import format_of
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 _PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
 _BESIDES = {
@@ -22,6 +33,13 @@ _BESIDES = {
 }
 _KNOWN = ("stated", "data")
 """How sure a log has to be of its rotors to say in which order the columns are."""
+
+_FLOWN: dict[str, Callable[[Rotor], float]] = {
+    "drag": lambda rotor: rotor.drag.value if rotor.drag else 0.0,
+    # The plugin's formula has no sign of the turn; what all rotors have alike is no effect of the catalogue.
+    "rolling": lambda rotor: rotor.spin * rotor.rolling.value if rotor.rolling else 0.0,
+}
+"""What a rotor of the file has of each quantity that is an effect of its own."""
 
 
 class RotorLine(NamedTuple):
@@ -184,3 +202,68 @@ def _speed(model: SimulatorModel, proposal: Proposal | None) -> tuple[float | No
     if proposal is not None and not proposal.share_of_speed and proposal.speed_max > 1.2 * stated.value:
         return proposal.speed_max, f"Above the largest in the log; the file states {stated.value:g} ({stated.where})"
     return _short([stated.value])[0], stated.where
+
+
+def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> SimulatorModel:
+    """Read a model again with corrected files, by their names in the output; that it hovers is not asked."""
+    names = model.output_names
+    folder = Path(commonpath([file.resolve().parent for file in model.files]))
+    with TemporaryDirectory() as copied:
+        for file in model.files:
+            copy = copied / file.resolve().relative_to(folder)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(texts.get(names[file]) or file.read_bytes())
+        return format_of(model.file).read(copied / model.file.resolve().relative_to(folder))
+
+
+def _settings(of: VehicleOf, stated: VehicleSettings) -> VehicleSettings:
+    rotors = []
+    for own, line in zip(stated.rotors, of.rotors, strict=True):
+        known = {"spin": line.spin, "thrust_factor_n_s2": line.thrust, "drag_factor_n_m_s2": line.drag}
+        numbers = {key: value for key, value in known.items() if value}
+        rotors.append(RotorSettings(**{**vars(own), **numbers, "position_m": tuple(line.position_m)}))
+    whole: dict[str, Any] = {"inertia_kg_m2": tuple(of.inertia), "rotors": tuple(rotors)}
+    return replace(stated, mass_kg=of.mass_kg, **whole)
+
+
+def vehicle_of(of: VehicleOf, stated: VehicleSettings) -> VehicleModel:
+    """Make the vehicle that the simulator flies: that of the study, with drag, rolling moment and lag of its rotors.
+
+    A lag acts where a log has commands; measured speeds have it already.
+    """
+    rotors = [of.model.rotors[index] for index in of.order]
+    shares = {name: float(np.mean([own(rotor) for rotor in rotors])) for name, own in _FLOWN.items()}
+    found = [(each.name, shares.get(str(each.quantity), 0.0)) for each in CATALOGUE.values()]
+    effects = [ModelEffect(name, {}, np.array([share])) for name, share in found if share]
+    lag = np.mean([rotor.lag_up.value for rotor in rotors if rotor.lag_up] or [0.0])
+    return VehicleModel(
+        vehicle=_settings(of, stated),
+        effects=tuple(effects),
+        response=RotorResponse(lag_s=float(lag)),
+        commanded=True,
+    )
+
+
+def flown(
+    of: VehicleOf,
+    texts: Mapping[str, bytes],
+    stated: VehicleSettings,
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    settings: GapSettings,
+) -> PlaybackChange:
+    """Play held-out flights back in the vehicle of the file as given and as corrected.
+
+    Parameters
+    ----------
+    texts : dict of str to bytes
+        Corrected files by their names in the output.
+    stated : VehicleSettings
+        Of the study that was made of the file as given.
+    training, held : sequence of Recording
+        Flights that the corrections were found in, and those that are played back.
+    """
+    given = vehicle_of(of, stated)
+    new = vehicle_of(replace(of, model=as_corrected(of.model, texts)), stated)
+    pairs = played_pairs(held, new, given, rates_fade(training, settings.horizon_s))
+    return PlaybackChange.of_pairs(pairs, errors_by_horizon(pairs, settings.horizon_s))

@@ -30,7 +30,7 @@ from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
 from cpfls_cli.pages.disturbance import axis_words
-from cpfls_cli.pages.effects import intervals_drawn, wrong_numbers
+from cpfls_cli.pages.effects import intervals_drawn, of_thrust, wrong_numbers
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
@@ -44,9 +44,10 @@ from cpfls_cli.pages.gap import (
     sizes_drawn,
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
-from cpfls_cli.pages.playback import SIGNALS, WHO
+from cpfls_cli.pages.playback import SIGNALS, WHO, draw_errors, errors_height
 from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
 from cpfls_cli.report.content import Command
@@ -155,10 +156,15 @@ def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
     guessed = any(map(is_of_guesses, source.header.cautions))
     taken = "the guess" if guessed else "the vehicle that was found"
     found, by_place = wrong_numbers(r.effects), dict[str, list[str]]()
-    for name, words in found.items():
+    follow = [name for name in of_thrust(r.effects) if name in found]
+    said = {name: words for name, words in found.items() if name not in follow}
+    if follow:
+        shows = joined([found[name].partition(" ")[0] for name in follow])
+        said["thrust_scale"] += f" (as the ratio of {shows} to the rotor torque shows too)"
+    for name, words in said.items():
         quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
         by_place.setdefault(taken if quantity in source.vehicle.unknown else "the config", []).append(words)
-    return len(found), [f"{joined(words)} against {place}" for place, words in by_place.items()]
+    return len(said), [f"{joined(words)} against {place}" for place, words in by_place.items()]
 
 
 def _farther_off(playback: PlaybackChange) -> list[str]:
@@ -202,6 +208,12 @@ FIGURES = {
         lambda r: r.whiteness is not None and len(r.whiteness.lag) > 1 and r.gap.known,
     ),
     "intervals": intervals_drawn(lambda r: [*r.effects, *r.closest]),
+    "flown": Drawn(
+        "Mean error by horizon of a simulator's file, as given and as corrected",
+        lambda r: errors_height(r.corrected.flown),
+        lambda r, figure: draw_errors(r.corrected.flown, figure, names={AFTER: "as corrected"}),
+        lambda r: r.corrected and r.corrected.flown and len(r.corrected.flown.horizon_s) > 1 and r.corrected.changes,
+    ),
 }
 WORDS = {
     **GAP_WORDS,

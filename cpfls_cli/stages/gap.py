@@ -29,7 +29,7 @@ from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.simulators.corrected import corrected
 from cpfls_cli.simulators.formats import is_simulator_file, read_model
-from cpfls_cli.simulators.study import VehicleOf
+from cpfls_cli.simulators.study import VehicleOf, flown
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
@@ -131,7 +131,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file)
+        found = _with_file(run, found, of_file, split)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -167,12 +167,14 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf) -> Diagnosis:
-    """Put what was found into the simulator's file."""
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) -> Diagnosis:
+    """Put what was found into the simulator's file, and play held-out flights back in it."""
     flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
-    said, files = corrected(of, run.study.vehicle, found, flights)
+    stated = run.study.vehicle
+    said, files = corrected(of, stated, found, flights)
     run.texts.update({run.output / name: text for name, text in files.items()})
-    return replace(found, corrected=said)
+    before_after = flown(of, files, stated, split.training, split.held_out, run.study.gap)
+    return replace(found, corrected=replace(said, flown=before_after))
 
 
 def _flights(

@@ -43,6 +43,10 @@ def test_a_thrust_17_percent_too_large(tmp_path, logs):
     assert (change["element"], said["effects"][0]["name"]) == ("motorConstant", "parameter_error")
     assert change["low"] < TRUE.thrust_factor < change["high"]
     assert change["sentence"].startswith("thrust of M1 to M4 is 1")
+    # What flew is predicted better by the file as corrected, and far better than if nothing moved.
+    ends = said["corrected"]["flown"]["at_end"]
+    assert ends["velocity"]["after"] < 0.8 * ends["velocity"]["before"]
+    assert ends["position"]["after"] < min(0.8 * ends["position"]["before"], ends["position"]["without_model"])
     assert [rotor.thrust.value for rotor in new.rotors] == [change["after"]] * 4
     np.testing.assert_allclose(np.diag(new.inertia), TRUE.inertia, rtol=1e-4)
 

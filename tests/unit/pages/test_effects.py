@@ -71,6 +71,23 @@ def test_a_power_of_ten_that_all_three_have_stands_once():
     assert "M_x = 2 × 10⁻⁶ [—, —] N m (p" in effect_sentence(replace(OFFSET, numbers=(alone,)))
 
 
+def test_a_wrong_thrust_is_not_said_to_be_a_wrong_inertia_too():
+    """Rates show inertia over rotor torque, so that of a thrust 17 % less every moment of inertia seems 20 % more."""
+
+    def headline(inertia, half):
+        numbers = [Estimate("inertia_x", "1", inertia, inertia - half, inertia + half, (-1, 3))]
+        numbers.append(Estimate("thrust_scale", "1", -0.17, -0.175, -0.165, (-1, 3)))
+        effect = made.named_effect("parameter_error", numbers=tuple(numbers))
+        box, *_ = made.blocks_of(replace(made.diagnosis(), effects=(effect,)), "diagnose")
+        return box.title
+
+    assert headline(0.2, 0.01) == (
+        "A parameter of the vehicle is wrong: thrust −17.00 % (as the ratio of Ixx to the rotor torque shows too) "
+        "against the config."
+    )
+    assert headline(0.3, 0.01).startswith("Parameters of the vehicle are wrong: Ixx +30.0 % and thrust −17.0")
+
+
 def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     def said(name, *number, effect="parameter_error"):
         numbers = (Estimate(name, "1", *number, (-0.9, 3.0)),)

@@ -1,0 +1,58 @@
+"""The vehicle of a simulator's file flown as the simulator flies it, and a file read again as corrected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.holding import probe_flight
+from cpfls_cli.export.registry import exported
+from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.study import as_corrected, of_log, vehicle_of
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.flown_exports import fly_sdf
+from tests.builders.playback_flights import STATED, truth
+
+PARENT = """<sdf version="1.9"><model name="x"><include merge="true"><uri>model://base</uri></include></model></sdf>"""
+
+
+def model(**effects):
+    kept = [replace_of(each, effects) for each in truth().effects if each.name in effects]
+    return replace(truth(), vehicle=STATED, effects=tuple(kept), response=RotorResponse(), remainder=None)
+
+
+def replace_of(each, effects):
+    return each._replace(coefficients=np.array([effects[each.name]]))
+
+
+@pytest.mark.parametrize("drag", [0.0, 2e-4])
+def test_a_file_of_gazebo_is_flown_by_the_equations_of_its_plugin(tmp_path, drag):
+    flies = model(rotor_drag=drag) if drag else model()
+    text = exported(sheet_of_vehicle(flies), "sdf", "v.sdf").text
+    (tmp_path / "v.sdf").write_text(text)
+    of = of_log(read_model(tmp_path / "v.sdf"), None, None)
+    flight = probe_flight(flies)
+    course = Course(flight, np.arange(0, len(flight) - 9, 7), 8, finer=40)
+    published = course.errors(fly_sdf(text, course))
+    own = free_runs(player_of(vehicle_of(of, STATED), flight), flight, course.starts, 8).errors
+    moved = np.abs(published).max(axis=(0, 1, 3))
+    assert (np.abs(own - published).max(axis=(0, 1, 3)) < 0.02 * moved).all()
+
+
+def test_included_files_are_read_as_corrected(tmp_path):
+    """Files stand beside each other as they did, and the user's own are left alone."""
+    (tmp_path / "base").mkdir()
+    base, parent = tmp_path / "base" / "model.sdf", tmp_path / "x" / "model.sdf"
+    base.write_text(exported(sheet_of_vehicle(model()), "sdf", "v.sdf").text)
+    parent.parent.mkdir()
+    parent.write_text(PARENT.replace("model://base", "../base"))
+    before = read_model(parent)
+    stated = before.bodies[0].mass
+    raw = base.read_bytes()
+    span = stated.span
+    new = as_corrected(before, {before.output_names[span.file]: raw[: span.start] + b"2.5" + raw[span.end :]})
+    assert new.bodies[0].mass.value == 2.5
+    assert base.read_bytes() == raw
