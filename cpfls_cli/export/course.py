@@ -1,4 +1,4 @@
-"""Courses that an exported vehicle is flown along: where runs start, and what its rotors are told between samples."""
+"""Courses that an exported vehicle is flown along: where runs start, and the commands of its rotors between samples."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import ARRAYS, Vector
 
 HORIZON_S = 0.5
-"""How far ahead the size of what is missing is told."""
+"""How far ahead the size of what is missing is stated."""
 
 # The flight about hover: runs with steps of 10 ms, speeds with waves of 5 % below and above what motors follow, and
 # velocities in m/s, rates in rad/s and tilts in rad of a vehicle that is flown gently.

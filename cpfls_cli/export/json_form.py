@@ -90,7 +90,7 @@ HOW_TO_EVALUATE = (
 )
 
 
-def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
+def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
     """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
     found, vehicle = sheet.identified, sheet.model.vehicle
     points, runs, attitudes = sheet.references
@@ -103,7 +103,7 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "verdict": None if sheet.verdict is None else {"label": sheet.verdict},
         "cautions": list(sheet.cautions),
         "findings": [],
-        "worth": [*sheet.worth, *told],
+        "worth": [*sheet.worth, *remarks],
         "conventions": _CONVENTIONS if found is None else _CONVENTIONS | _ON_ATTITUDE,
         "how_to_evaluate": HOW_TO_EVALUATE if found is None else (*HOW_TO_EVALUATE_INERTIA, *HOW_TO_EVALUATE),
         "mass_kg": vehicle.mass_kg,

@@ -20,8 +20,8 @@ _DIGITS = 9
 
 
 def _object(title: str, properties: Mapping[str, Any], description: str = "") -> dict[str, Any]:
-    told = {"description": description} if description else {}
-    return {"type": "object", "title": title, **told, "properties": dict(properties)}
+    described = {"description": description} if description else {}
+    return {"type": "object", "title": title, **described, "properties": dict(properties)}
 
 
 def _whole(title: str, properties: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,13 +109,13 @@ class _Channel:
     def of_track(cls, writer: Any, track: Track) -> _Channel:
         """Give a message for each sample, by axis and what it is."""
         about = {"unit": track.unit, "frame": track.frame, "description": track.description}
-        told = ", ".join(part for part in (track.description, track.unit, track.frame) if part)
+        described = ", ".join(part for part in (track.description, track.unit, track.frame) if part)
         columns = list(track.columns)
         by_axis: dict[str, dict[str, Any]] = {}
         for what, axis, _ in columns:
             by_axis.setdefault(axis, {})[what] = _NUMBER
         properties = by_axis[""] if set(by_axis) == {""} else {a: _object(a, own) for a, own in by_axis.items()}
-        schema = _object(f"cpfls.{track.name.replace('/', '.')}", properties, told)
+        schema = _object(f"cpfls.{track.name.replace('/', '.')}", properties, described)
         channel = cls(writer, f"/{track.path}", schema, about)
         channel.messages = channel._of_samples(track, columns)
         return channel

@@ -77,14 +77,14 @@ def _whole(model: VehicleModel) -> tuple[Held, Holds]:
     return Held.whole(model), everything
 
 
-def _c(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
+def _c(sheet: Sheet, _held: Held, remarks: Sequence[str], file: str) -> str:
     path = Path(file)
-    source = c_source(sheet, path.stem, told)
+    source = c_source(sheet, path.stem, remarks)
     return source.header if path.suffix == ".h" else source.source
 
 
 FORMS: dict[str, Form] = {
-    "json": Form("JSON", ".json", _whole, lambda sheet, _held, told, _file: json_text(sheet, told)),
+    "json": Form("JSON", ".json", _whole, lambda sheet, _held, remarks, _file: json_text(sheet, remarks)),
     "c": Form("C", ".c", _whole, _c, also=".h"),
     "mjcf": Form("MuJoCo", ".xml", mjcf_held, mjcf_text),
     "sdf": Form("Gazebo's motor model", ".sdf", sdf_held, sdf_text),
@@ -125,14 +125,14 @@ class Exported:
     ----------
     texts : dict of str to str
         Of each file by its name, the one that needs the others last.
-    told : tuple of str
+    remarks : tuple of str
         What the form does not hold, in words.
     """
 
     texts: dict[str, str]
     held: Held
     missing: tuple[Missing, ...]
-    told: tuple[str, ...]
+    remarks: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -145,9 +145,9 @@ def exported(sheet: Sheet, form: str, file: str) -> Exported:
     chosen = FORMS[form]
     with about(sheet.file, InputError):
         held, holds = chosen.held(sheet.model)
-    left, told = _left(sheet, held, holds, chosen)
+    left, remarks = _left(sheet, held, holds, chosen)
     files = [Path(file).with_suffix(ending).name for ending in (chosen.also, chosen.ending) if ending]
-    return Exported({name: chosen.write(sheet, held, told, name) for name in files}, held, left, told)
+    return Exported({name: chosen.write(sheet, held, remarks, name) for name in files}, held, left, remarks)
 
 
 def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
@@ -155,11 +155,11 @@ def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Mis
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
     otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) else []
     left = (*about_hover, *otherwise, *sheet.outside)
-    told = tuple(each.sentence for each in left)
+    remarks = tuple(each.sentence for each in left)
     if len(about_hover) - any(sheet.wind) > 1:
         off = together(sheet.model, held).sentence
-        told = (*told, f"In all, {form.title} ends {off} off after half a second about hover.")
-    return left, told or (f"{form.title} holds all of it.",)
+        remarks = (*remarks, f"In all, {form.title} ends {off} off after half a second about hover.")
+    return left, remarks or (f"{form.title} holds all of it.",)
 
 
 def _otherwise(sheet: Sheet, held: Held, target: Target) -> Iterator[Missing]:

@@ -168,10 +168,10 @@ class Sheet:
     @property
     def facts(self) -> list[str]:
         """Paragraphs that say what the model is, what it is worth and where it comes from."""
-        return [*self.told, "", *self._origin()]
+        return [*self.remarks, "", *self._origin()]
 
     @property
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """What must not be overlooked, what the model is and what it is worth."""
         return [*self._marks(), *self.cautions, *self._structure(), *self.worth]
 

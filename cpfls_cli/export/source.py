@@ -37,13 +37,13 @@ class CSource:
     header: str
 
 
-def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
+def c_source(sheet: Sheet, stem: str, remarks: Sequence[str] = ()) -> CSource:
     """Write a model as C99, with further paragraphs in its head."""
     points, runs, attitudes = sheet.references
     traced, units, learned = traced_wrench(sheet.model), units_of(sheet.model), _learned(sheet.model)
     lines, wrench = traced.written(C)
     words = {
-        **_common_words(sheet, told),
+        **_common_words(sheet, remarks),
         "source": comment_text(f"{stem}.c"),
         "header": comment_text(f"{stem}.h"),
         "verdict_text": literal_text(sheet.verdict or "none"),
@@ -130,7 +130,7 @@ def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
     return _c_braces(part, indent)
 
 
-def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], told: Sequence[str] = ()) -> str:
+def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], remarks: Sequence[str] = ()) -> str:
     """Write a model as a module of Python that computes with one library, with further paragraphs in its head."""
     rules, traced = sheet.rules, traced_wrench(sheet.model, shares=True)
     lines, wrench = traced.written(LIBRARY)
@@ -142,7 +142,7 @@ def python_source(sheet: Sheet, file: str, library: Literal["casadi", "jax"], to
     used = traced.used
     needed = [(name, place) for place, name in enumerate(names) if name in used and "[" not in name]
     words = {
-        **_common_words(sheet, told),
+        **_common_words(sheet, remarks),
         "library": library,
         "source": comment_text(file),
         "verdict": None if sheet.verdict is None else ascii(sheet.verdict),
@@ -241,13 +241,13 @@ def _templates() -> Environment:
     )
 
 
-def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
+def _common_words(sheet: Sheet, remarks: Sequence[str]) -> dict[str, Any]:
     """Gather what all languages ask for: names, numbers, and which parts of the code the model needs."""
     vehicle, rules = sheet.model.vehicle, sheet.rules
     return {
         "name": sheet.name,
         "macro": sheet.name.upper(),
-        "facts": comment_lines([*sheet.facts, *(["", *told] if told else [])]),
+        "facts": comment_lines([*sheet.facts, *(["", *remarks] if remarks else [])]),
         "complete": sheet.complete,
         "model_sha256": sheet.sha256,
         "attitude": sheet.identified is not None,

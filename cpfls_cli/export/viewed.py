@@ -320,7 +320,7 @@ def _of_twin(title: str, given: Twin, study: Study) -> View:
 
 
 def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
-    """Name simulated vehicles; a model whose file is called as something else here is told from it."""
+    """Name simulated vehicles; a model whose file has the same name as something else here is named apart."""
     names, taken = [], {MEASURED, SETPOINT, DIFFERENCE, BODY_FRAME, WORLD_FRAME}
     for vehicle in vehicles:
         name = _short(vehicle)

@@ -156,7 +156,7 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
         fuzzy=sheet.rules is not None,
         rigid_body=bool(sheet.rigid_body.any()),
         region_share=None if identified is None else float(np.mean(identified.visited)),
-        said=(*sheet.told, *made.told),
+        said=(*sheet.remarks, *made.remarks),
         warnings=sheet.warnings,
     )
     run.also = plain(found) | {"missing": [asdict(each) for each in made.missing]}

@@ -16,7 +16,7 @@ SIGNALS = {
     "rotor_command": "rotor_command: {columns: [u1, u2, u3, u4], unit: '1'}",
     "rotor_speed": "rotor_speed: {columns: [w1, w2, w3, w4], unit: rad/s}",
 }
-NO_ATTITUDE = "the flight has no attitude, so reduce, identify and predict will refuse it: map one with import.signals."
+NO_ATTITUDE = "the flight has no attitude, so reduce and identify will refuse it: map one with import.signals."
 NO_ROTATION = "the flight has neither attitude nor body rates: only the balance of its rotors"
 NO_TORQUE = "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque"
 

@@ -43,7 +43,7 @@ OTHERWISE = (
     "thrust in a climb, no gyroscopic torque of the body"
 )
 _GRAVITY, _HOME_M = 9.80665, 584.0
-"""Of ArduPilot; and the altitude of the place where its simulator begins, if it is told no other."""
+"""Of ArduPilot; and the altitude of the place where its simulator begins, if it is given no other."""
 _SEA_LEVEL, _LAPSE, _POWER = 1.225, 0.0065 / 288.15, 4.2559
 """The standard atmosphere: density in kg/m^3 falls with the altitude."""
 _YAW_SHARE, _DAMPING = 0.05, np.radians(400.0)
@@ -124,7 +124,7 @@ def _density(altitude: float) -> float:
     return float(_SEA_LEVEL * (1 - _LAPSE * altitude) ** _POWER)
 
 
-def ardupilot_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
+def ardupilot_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle as JSON of a frame, in comments what it does not hold; ArduPilot takes comments out."""
     vehicle, (order, crossed) = sheet.model.vehicle, _order(sheet.model.vehicle)
     known = all(rotor.radius_m for rotor in vehicle.rotors)
@@ -133,7 +133,7 @@ def ardupilot_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> 
         "order": "ArduPilot's X" if crossed else "the config, which the frame has to have too",
         "radius": "" if known else ", whose rotors are taken for half as long as the arm, for no config says",
     }
-    said = [*sheet.facts, "", *told, "", *(each.format(**words) for each in _USE)]
+    said = [*sheet.facts, "", *remarks, "", *(each.format(**words) for each in _USE)]
     lines = [f"# {line}".rstrip() for line in comment_lines(said)]
     given = [f'  "{name}": {json.dumps(value)}' for name, value in _keys(sheet.model, held, order).items()]
     return "\n".join([*lines, "{", ",\n".join(given), "}", ""])

@@ -71,7 +71,7 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     return {"thrust_linear": Wrench(at_hubs=(0, 0, see.rotor_speed)), "yaw_linear": Wrench((0, 0, yaw))}
 
 
-def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
+def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write a vehicle as a section of TOML, with what it does not hold."""
     found, vehicle = held.numbers, sheet.model.vehicle
     hubs, length = places(sheet.model, alike=True), arm(vehicle)
@@ -92,7 +92,7 @@ def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) ->
         "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,
     }
     lag = () if rate else ("The rotors have no lag: give no rotor_vel, or commands and rotor_vel alike.",)
-    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *told, "", _USE, *lag])]
+    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", _USE, *lag])]
     return "\n".join(
         [*lines, "", f"[{sheet.name}]", *(f"{name} = {json.dumps(each)}" for name, each in given.items()), ""]
     )

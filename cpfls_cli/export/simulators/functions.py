@@ -9,11 +9,11 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import python_source
 
 
-def casadi_text(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
+def casadi_text(sheet: Sheet, _held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle as a module of functions for CasADi; parameters as those of the other targets."""
-    return python_source(sheet, file, "casadi", told)
+    return python_source(sheet, file, "casadi", remarks)
 
 
-def jax_text(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
+def jax_text(sheet: Sheet, _held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle as a module of functions for JAX; parameters as those of the other targets."""
-    return python_source(sheet, file, "jax", told)
+    return python_source(sheet, file, "jax", remarks)

@@ -30,17 +30,17 @@ _HOVER = (0.1, 0.8)
 """Documented range of MPC_THR_HOVER."""
 
 
-def px4_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
+def px4_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle for PX4, the model or by its ending the airframe, with what it does not hold."""
     if Path(file).suffix == AIRFRAME:
-        return _airframe(sheet, held, told)
+        return _airframe(sheet, held, remarks)
     use = (
         f"For PX4: put this file as Tools/simulation/gz/models/{sheet.name}/model.sdf beside a model.config, and the "
         f"airframe file into ROMFS/px4fmu_common/init.d-posix/airframes as a number that is free and _gz_{sheet.name}; "
         "name it in CMakeLists.txt there. Motors are in the order of the config. The world has to have the systems of "
         "PX4's own worlds, and a wind, which may be zero.",
     )
-    root = sdf_root(sheet, held, told, use, None)
+    root = sdf_root(sheet, held, remarks, use, None)
     link = next(each for each in root.iter("link") if each.get("name") == "base_link")
     for name, kind, rate in _SENSORS:
         sensor = ElementTree.SubElement(link, "sensor", name=name, type=kind)
@@ -49,7 +49,7 @@ def px4_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
     return written(root)
 
 
-def _airframe(sheet: Sheet, held: Held, told: Sequence[str]) -> str:
+def _airframe(sheet: Sheet, held: Held, remarks: Sequence[str]) -> str:
     """Write the parameters by which PX4 flies the model: places and torques of rotors, speeds, thrust in hover."""
     vehicle, hubs, turns = sheet.model.vehicle, places(sheet.model, alike=False), spins(sheet.model.vehicle)
     most = vehicle.rotor_speed_max_rad_s
@@ -71,7 +71,7 @@ def _airframe(sheet: Sheet, held: Held, told: Sequence[str]) -> str:
     said = [
         *sheet.facts,
         "",
-        *told,
+        *remarks,
         "",
         *((cut, "") if hover != hovers else ()),
         "Commands of 0 to 1 are rotor speeds of 0 to the largest, so thrust goes with their square: THR_MDL_FAC 1. No "

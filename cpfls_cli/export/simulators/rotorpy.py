@@ -50,7 +50,7 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     }
 
 
-def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
+def rotorpy_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle as a module with RotorPy's dictionary, with what it does not hold."""
     model = sheet.model
     found = held.numbers
@@ -66,7 +66,7 @@ def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> st
     }
     words = {
         "source": comment_text(file),
-        "facts": comment_lines([*sheet.facts, "", *told]),
+        "facts": comment_lines([*sheet.facts, "", *remarks]),
         "lags": held.response.lag_s > 0.0,
         "numbers": {name: number(value) for name, value in given.items()},
         "positions": [python_rows(place, 0) for place in places(model, alike=True)],

@@ -63,9 +63,9 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
     return found
 
 
-def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
+def sdf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write a vehicle as SDF, with what it does not hold."""
-    return written(sdf_root(sheet, held, told, _USE, sheet.name))
+    return written(sdf_root(sheet, held, remarks, _USE, sheet.name))
 
 
 def written(root: ElementTree.Element) -> str:
@@ -75,11 +75,11 @@ def written(root: ElementTree.Element) -> str:
 
 
 def sdf_root(
-    sheet: Sheet, held: Held, told: Sequence[str], use: Sequence[str], namespace: str | None
+    sheet: Sheet, held: Held, remarks: Sequence[str], use: Sequence[str], namespace: str | None
 ) -> ElementTree.Element:
     """Build the document of a vehicle; without a namespace the topics are those of whatever spawns it."""
     root = ElementTree.Element("sdf", version="1.9")
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", _spin_in_words(sheet, held), *use])))
+    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", _spin_in_words(sheet, held), *use])))
     model = ElementTree.SubElement(root, "model", name=sheet.name)
     hubs = places(sheet.model, alike=False)
     rotor = _rotor_inertia(sheet, held)

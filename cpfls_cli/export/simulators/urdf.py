@@ -64,11 +64,11 @@ def order_of(vehicle: VehicleSettings) -> IntArray:
     return order
 
 
-def urdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
+def urdf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write a vehicle as URDF, with what it does not hold."""
     order, hubs = order_of(sheet.model.vehicle), places(sheet.model, alike=True)
     root = ElementTree.Element("robot", name=sheet.name)
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", *_use(order)])))
+    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", *_use(order)])))
     rotors = " ".join(str(rotor + 1) for rotor in order.tolist())
     ElementTree.SubElement(root, "properties", _properties(sheet, held) | {"rotors": rotors})
     body = _link(root, "base_link", np.zeros(3), held.body.mass, held.body.inertia)

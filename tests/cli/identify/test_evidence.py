@@ -1,4 +1,4 @@
-"""The evidence on a model in its artifact: what `identify` writes and says, and what `predict` makes of it."""
+"""The evidence on a model in its artifact: what `identify` writes and says, and what the library makes of it."""
 
 import json
 import os

@@ -108,7 +108,7 @@ def test_an_effect_outside_the_weights_is_named():
     )
     made = exported(sheet_of_vehicle(truth(), outside=outside), "casadi", "v.py")
     assert made.missing == outside
-    assert made.told == (
+    assert made.remarks == (
         "Not held: payload; its size depends on the flight and was not measured along one.",
         "Not held, or only in part: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
         "172 degrees, 2 m/s and 1 m off.",
