@@ -15,6 +15,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
+from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
@@ -198,6 +199,7 @@ def compare(run: Run, flights: FlightsArgument, model: ModelOption = None) -> Di
     roles = numbered_roles("flight", flights)
     inputs = run.take(roles | ({} if model is None else {"model": model}))
     check_ignored(run.study)
+    warn_of_no_body(run)
     with_numbers(run, "compare", model, whole=model is not None and is_found(model))
     read, learned = read_flights(flights, run.study), learned_by(model)
     base = VehicleModel(vehicle=run.study.vehicle) if model is None else read_model(model, run.study)
@@ -266,6 +268,13 @@ def check_ignored(study: Study) -> None:
         if name not in CATALOGUE:
             hint = did_you_mean(name, CATALOGUE, "`cpfls effects` lists all")
             raise ConfigError(f"gap.ignore = {name}: no such effect ({hint})")
+
+
+def warn_of_no_body(run: Run) -> None:
+    """Note an inertia of the config that no body has and that a gap may correct."""
+    why = "" if "inertia" in run.study.vehicle.unknown else why_no_body(run.study.vehicle)
+    if why:
+        run.note(f"vehicle.inertia_kg_m2: {why}")
 
 
 def progress_of(progress: Progress, start: float = 0.0, end: float = 1.0) -> Callable[[float, str], None]:

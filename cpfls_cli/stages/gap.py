@@ -33,7 +33,7 @@ from cpfls_cli.simulators.study import VehicleOf, flown
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
-from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
+from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed
 
@@ -116,6 +116,7 @@ def gap(
     for caution in run.cautions_of("disagreement", "diagnosis"):
         run.caution(caution)
     check_ignored(run.study)
+    warn_of_no_body(run)
     base = read_base(model, run.study)
     given, split = _flights(run, flights, held_out, base, [*(inputs[role] for role in trained), *unseen.values()])
     learned = learned_by(model)

@@ -214,8 +214,15 @@ def test_what_a_vehicle_lacks_is_named_and_no_other_vehicle_stands_in_for_it(wro
     assert len(wrong("seed: 1\n")) == 4
 
 
-@pytest.mark.parametrize("inertia", ["[0.6, 0.6, 10]", "[1, 1, 1, 0.6, 0, 0]"])
+@pytest.mark.parametrize("inertia", ["[0.6, 0.6, 10]", "[1, 1, 1, 0.9, 0, 0]"])
 def test_an_inertia_that_no_body_has_is_refused(wrong, inertia):
     (line,) = wrong(f"vehicle: {{inertia_kg_m2: {inertia}}}", whole=True)
     assert "no body has this inertia" in line
     assert line.startswith("FILE: vehicle.inertia_kg_m2 = [")
+
+
+def test_an_inertia_that_flights_can_correct_is_taken(cpfls, tmp_path):
+    """Of a flat vehicle Izz is the sum of the others, so that one of them stated too small is that of no body."""
+    config = tmp_path / "study.yaml"
+    config.write_text(with_vehicle("vehicle: {inertia_kg_m2: [0.42, 0.42, 1.2]}"))
+    assert cpfls("config", config).exit_code == 0

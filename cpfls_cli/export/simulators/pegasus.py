@@ -1,0 +1,75 @@
+"""A vehicle for Pegasus in Isaac Sim: numbers of its thrust curve and drag, and the mass for the USD file.
+
+With rotor speeds w in rad/s and the velocity v in the axes of the body, rotor i pushes rotor_constant[i] w_i^2 at its
+link, the body turns by sum rot_dir[i] rolling_moment_coefficient[i] w_i^2 about z and is held back by diag(drag) v;
+speeds follow commands at once. What is called rolling moment there is the yaw torque of a rotor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.source import fill_template
+from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.motion import Instant, Wrench
+
+_ROTORS = 4
+
+
+def pegasus_held(model: VehicleModel) -> tuple[Held, Holds]:
+    """Take what Pegasus flies of a vehicle."""
+    if model.rotors != _ROTORS:
+        raise InputError(
+            f"Pegasus pushes at four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax and casadi "
+            "take any number"
+        )
+    numbers = numbers_of(model, _wrenches, alike=False)
+    return held_by(model, numbers.holds, RotorResponse(), of_a_body(constant_body(model)), numbers), numbers.holds
+
+
+def _wrenches(see: Instant) -> Mapping[str, Wrench]:
+    """Write the drag of Pegasus for a unit of each coefficient."""
+    x, y, z = see.air_velocity
+    return {
+        "drag_x": Wrench(force=(-x, 0, 0)),
+        "drag_y": Wrench(force=(0, -y, 0)),
+        "drag_z": Wrench(force=(0, 0, -z)),
+    }
+
+
+def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
+    """Write a vehicle as a module with the numbers of Pegasus, with what it does not hold."""
+    found, vehicle = held.numbers, sheet.model.vehicle
+
+    def of_rotors(name: str) -> str:
+        return python_rows(np.array([found[f"{name}_{rotor + 1}"] for rotor in range(_ROTORS)]), 0)
+
+    moments, axes = np.linalg.eigh(held.body.inertia)
+    axes = axes * np.sign(np.linalg.det(axes))
+    curve = {
+        "num_rotors": str(_ROTORS),
+        "rotor_constant": of_rotors("thrust"),
+        "rolling_moment_coefficient": of_rotors("yaw"),
+        "rot_dir": str([int(each) for each in spins(vehicle)]),
+        "min_rotor_velocity": python_rows(np.zeros(_ROTORS), 0),
+        "max_rotor_velocity": python_rows(np.full(_ROTORS, vehicle.rotor_speed_max_rad_s), 0),
+    }
+    words = {
+        "source": comment_text(file),
+        "facts": comment_lines([*sheet.facts, "", *remarks]),
+        "curve": curve,
+        "drag": python_rows(np.array([found[f"drag_{axis}"] for axis in "xyz"]), 0),
+        "mass": number(held.body.mass),
+        "moments": python_rows(moments, 0),
+        "axes": python_rows(axes, 0),
+        "positions": python_rows(places(sheet.model, alike=False), 0),
+    }
+    return fill_template("pegasus.py.j2", words)
