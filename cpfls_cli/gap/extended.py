@@ -76,7 +76,7 @@ class ExtendedModel:
                 lacking = ", ".join(each.replace("_", " ") for each in missing)
                 name = candidate.effect.name
                 raise InputError(f"{flight.name}: lacks {lacking}, which the model's effect {name} needs")
-        return system(flights, self.chosen)
+        return system([replace(flight, turns=np.ones_like(flight.turns)) for flight in flights], self.chosen)
 
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
         """Compute the gap that the model leaves, shape (window, 6), N m and N."""

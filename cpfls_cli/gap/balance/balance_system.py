@@ -39,8 +39,14 @@ class System:
             rows = [None if candidate.effect.missing(signals) else f.rows(candidate, signals) for f, signals in pairs]
             width = max((there.shape[2] for there in rows if there is not None), default=0)
             known = (np.zeros((len(f), 6, width)) if r is None else r for f, r in zip(self.flights, rows, strict=True))
-            self.cache[candidate.key] = np.concatenate(list(known))
+            found = np.concatenate(list(known))
+            self.cache[candidate.key] = found * self.turns if candidate.effect.kind == "parameter" else found
         return self.cache[candidate.key]
+
+    @property
+    def turns(self) -> Array:
+        """Numbers of the vehicle, shape (parameter,), 1 for those that any flight can show: they are those of all."""
+        return np.asarray(np.max([flight.turns for flight in self.flights], axis=0))
 
     def by_flight(self, make: Callable[[WeakFlight, Signals], Array]) -> Array:
         """Compute rows from each flight and its signals, shape (window, ...)."""
@@ -84,7 +90,7 @@ class System:
                 parts.append(np.zeros((len(flight), 6, place.stop - place.start)))
                 continue
             noise = flight.noise(columns_of(candidate, signals))
-            parts.append(noise * flight.turns if candidate.effect.kind == "parameter" else noise)
+            parts.append(noise * self.turns if candidate.effect.kind == "parameter" else noise)
         return np.concatenate([*parts, flight.noise(flight.inertial)[..., None]], axis=2)
 
     @cached_property

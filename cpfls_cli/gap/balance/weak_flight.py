@@ -89,8 +89,7 @@ class WeakFlight:
         if not (as_logged or of_vehicle):
             return self.averaged(columns_of(candidate, signals))
         if candidate.key not in self.seen:
-            rows = self.averaged(columns_of(candidate, self.signals))
-            self.seen[candidate.key] = rows * self.turns if of_vehicle else rows
+            self.seen[candidate.key] = self.averaged(columns_of(candidate, self.signals))
         rows = self.seen[candidate.key]
         # Of the vehicle's numbers only the scale of the thrust meets what the rotors do; the motion stays.
         return rows if as_logged else with_thrust(rows, self.windows.average(signals.wrench[:, 5]) * self.known[5])
@@ -116,8 +115,7 @@ class WeakFlight:
 
     def as_stated(self, axes: BoolArray) -> WeakFlight:
         """Hold the inertia about some body axes, shape (3,), at what the config states."""
-        seen = {key: rows for key, rows in self.seen.items() if key != nuisance().key}
-        return replace(self, turns=self.turns * shown(~axes), seen=seen)
+        return replace(self, turns=self.turns * shown(~axes))
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows, shape (window, 6, ...)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import NamedTuple
 
@@ -110,6 +110,8 @@ def held_out(
     `floor`, shape (6,): of the training flights, above which the effects scatter there.
     Raises InputError if they lack a signal that the effects need.
     """
+    # What a fit shows of the vehicle holds for a flight that would not show it by itself.
+    repaired = [replace(flight, turns=fitted.turns) for flight in repaired]
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")

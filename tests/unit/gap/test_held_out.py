@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
@@ -80,6 +81,16 @@ def test_an_effect_that_is_there_closes_the_gap_of_a_flight_not_seen():
 
 def test_an_effect_that_is_not_there_does_not():
     assert max(unseen([candidate("linear_damping")]).shares().values()) < 0.1
+
+
+def test_an_inertia_that_training_flights_show_is_that_of_a_flight_that_hardly_turns():
+    wrong = [(candidate("parameter_error"), [0.4, *[0.0] * 9])]
+    fitted, flight = system([weak(fly(seed, wrong)) for seed in (1, 2)]), weak(fly(3, wrong))
+    gentle = replace(flight, turns=shown(np.array([False, True, True])))
+    linear = fit(fitted, np.ones(6))
+    own, other = (held_out([each], [each], fitted, linear, np.ones(6)) for each in (gentle, flight))
+    np.testing.assert_array_equal(own.parameters, other.parameters)
+    assert own.size(own.parameters).value[0] < 0.1 * own.size(own.before).value[0]
 
 
 def sinking(seed, speed):
