@@ -209,6 +209,8 @@ def read_xml(file: Path) -> Node:
             f"{file}: has a DOCTYPE or entities of its own, which no model needs and which can fill a memory; remove "
             "them"
         ) from None
+    except (ValueError, LookupError):
+        raise InputError(f"{file}: is in an encoding that cannot be read; save it in UTF-8") from None
     except ParseError as error:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
     assert isinstance(root, Node), "a file without an element is no XML"

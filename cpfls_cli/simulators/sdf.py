@@ -57,11 +57,13 @@ class _Parts:
         self.motors: list[tuple[str, Node]] = []
         self.plugins: list[Node] = []
         self.files: dict[Path, None] = {root.file: None}
-        self._frames: dict[str, tuple[Node, str, str]] = {}
+        # Element, scope of the names that it refers to, frame of the model that it is in, frame that it starts from.
+        self._frames: dict[str, tuple[Node, str, str, str]] = {}
         self._poses: dict[str, Array | None] = {"": np.eye(4)}
-        self._add(root, "", 0)
+        self._add(root, "", "", 0)
 
-    def _add(self, model: Node, scope: str, depth: int) -> None:
+    def _add(self, model: Node, scope: str, own: str, depth: int) -> None:
+        """Add the parts of a model to those of a scope, placed in a frame of its own."""
         if depth > 8:
             raise model.error("includes itself; remove that <include>")
         for node in model.children:
@@ -70,18 +72,18 @@ class _Parts:
                 case "link":
                     self._named(node, name)
                     self.links[name] = node
-                    self._frames[name] = node, scope, scope
+                    self._frames[name] = node, scope, own, own
                 case "joint":
                     self.joints[name] = node
-                    self._frames[name] = node, scope, scope + _text(node, "child")
+                    self._frames[name] = node, scope, own, scope + _text(node, "child")
                 case "frame":
                     attached = node.attributes.get("attached_to", "")
-                    self._frames[name] = node, scope, scope + attached if attached else scope
+                    self._frames[name] = node, scope, own, scope + attached if attached else own
                 case "model":
-                    self._frames[f"{name}::"] = node, scope, scope
-                    self._add(node, f"{name}::", depth + 1)
+                    self._frames[f"{name}::"] = node, scope, own, own
+                    self._add(node, f"{name}::", f"{name}::", depth + 1)
                 case "include":
-                    self._include(node, scope, depth)
+                    self._include(node, scope, own, depth)
                 case "plugin":
                     self.plugins.append(node)
                     if MOTOR.search(node.attributes.get("filename", "")):
@@ -91,25 +93,29 @@ class _Parts:
         if name in self.links:
             raise node.error(f"a second link is named {name}; rename one")
 
-    def _include(self, node: Node, scope: str, depth: int) -> None:
+    def _include(self, node: Node, scope: str, own: str, depth: int) -> None:
         file = _included(node)
         self.files[file] = None
         model = _model_of(read_xml(file))
+        placed = (node if node.first("pose") else model), scope, own, own
         if node.attributes.get("merge", "false") in ("true", "1"):
-            self._add(model, scope, depth + 1)
+            # Its parts are those of the scope, and where they are follows from a frame without a name.
+            frame = f"{scope}<include {len(self._frames)}>"
+            self._frames[frame] = placed
+            self._add(model, scope, frame, depth + 1)
             return
-        name = _text(node, "name") or model.name
-        self._frames[f"{scope}{name}::"] = (node if node.first("pose") else model), scope, scope
-        self._add(model, f"{scope}{name}::", depth + 1)
+        name = f"{scope}{_text(node, 'name') or model.name}::"
+        self._frames[name] = placed
+        self._add(model, name, name, depth + 1)
 
     def pose(self, name: str) -> Array:
         """Give the pose of a link, a joint, a frame or a nested model in the frame of the model, shape (4, 4)."""
         if name not in self._poses:
-            node, scope, usual = self._frames[name]
+            node, scope, model, usual = self._frames[name]
             self._poses[name] = None
             own = node.first("pose")
             asked = "" if own is None else own.attributes.get("relative_to", own.attributes.get("frame", ""))
-            base = usual if not asked else self._frame_named(node, scope, asked)
+            base = usual if not asked else model if asked == "__model__" else self._frame_named(node, scope, asked)
             self._poses[name] = self.pose(base) @ _pose(own)
         found = self._poses[name]
         if found is None:
@@ -117,7 +123,7 @@ class _Parts:
         return found
 
     def _frame_named(self, node: Node, scope: str, asked: str) -> str:
-        if asked in ("__model__", "world"):
+        if asked == "world":
             return scope
         for name in (scope + asked, f"{scope}{asked}::"):
             if name in self._frames:

@@ -102,7 +102,8 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     mass_node, inertia_node = (None if inertial is None else inertial.first(tag) for tag in ("mass", "inertia"))
     if inertial is None or mass_node is None:
         notes.append(f"{link.where} states no mass, and counts as none")
-        return part_of(link.name, Stated(0.0, f"{link.where}: states no mass"), (), placed)
+        nothing = Stated(0.0, f"{link.where}: states no mass")
+        return Body(link.name, nothing, placed[:3, 3], np.zeros((3, 3)), placed[:3, :3])
     mass = mass_node.number("value")
     if inertia_node is None:
         raise inertial.error("has a mass and no <inertia>; write ixx to izz")
