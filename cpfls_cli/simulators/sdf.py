@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from os.path import isdir, isfile
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from cpfls_cli.simulators.model import (
     pose,
     rotated,
     turning,
+    unit,
 )
 
 MOTOR = re.compile(r"multicopter-motor-model|gazebo_motor_model")
@@ -136,9 +138,10 @@ def _included(node: Node) -> Path:
     name = uri.removeprefix("model://").removeprefix("file://")
     folders = [node.file.parent, node.file.parent.parent]
     for place in (folder / name for folder in folders if name):
-        if place.is_file():
+        # Unlike methods of a path, these take names that no system has.
+        if isfile(place):
             return place
-        sdf = sorted(place.glob("*.sdf")) if place.is_dir() else []
+        sdf = sorted(place.glob("*.sdf")) if isdir(place) else []
         model = [each for each in sdf if each.name == "model.sdf"] or sdf
         if len(model) == 1:
             return model[0]
@@ -158,7 +161,7 @@ def _pose(node: Node | None) -> Array:
         return np.eye(4)
     if node.attributes.get("rotation_format") == "quat_xyzw":
         x, y, z, *turn = (each.value for each in node.numbers(count=7))
-        return pose(of_quaternion([turn[3], *turn[:3]]), (x, y, z))
+        return pose(of_quaternion(unit(node, "its quaternion", [turn[3], *turn[:3]])), (x, y, z))
     x, y, z, *rpy = (each.value for each in node.numbers(count=6))
     degrees = node.attributes.get("degrees", "false") in ("true", "1")
     return pose(rotated([angle * (np.pi / 180 if degrees else 1.0) for angle in rpy]), (x, y, z))
@@ -263,7 +266,7 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
     if inertial is None or mass_node is None:
         notes.append(f"{link.where} states no mass, for which Gazebo takes 1 kg and moments of 1 kg m^2")
         mass = Stated(1.0, f"{link.where}: states no mass; Gazebo takes 1 kg")
-        return Body(name, mass, placed[:3, 3], np.eye(3), placed[:3, :3])
+        return Body(name, mass, placed[:3, 3], np.eye(3), placed[:3, :3], placed[:3, :3])
     stated = [inertial.first("inertia", entry) for entry in ENTRIES]
     entries = tuple(
         node.number() if node else Stated(float(index < 3), f"{link.where}: {entry} not stated; taken as Gazebo does")
@@ -271,7 +274,7 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
     )
     own = inertial.first("pose")
     place = own.numbers()[:3] if own is not None and own.text.strip() else []
-    return part_of(name, mass_node.number(), entries, placed @ _pose(own), place, inertial)
+    return part_of(name, mass_node.number(), entries, placed, _pose(own), place, inertial)
 
 
 def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inverse: Array) -> Rotor:
@@ -284,7 +287,7 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
     if _text(plugin, "motorType") not in ("", "velocity"):
         raise plugin.error(f"motorType is {_text(plugin, 'motorType')!r}; the plugin knows velocity alone: write that")
     found = {tag: _stated(plugin, tag) for tag in DEFAULTS}
-    for tag in ("motorConstant", "maxRotVelocity", "timeConstantUp", "timeConstantDown"):
+    for tag in ("motorConstant", "momentConstant", "maxRotVelocity", "timeConstantUp", "timeConstantDown"):
         if not found[tag].value > 0:
             raise plugin.error(f"{tag} is {found[tag].value:g}; write a number above 0")
     return Rotor(
