@@ -37,6 +37,7 @@ from cpfls_cli.stages.compare import check_ignored, compared, learned_from, prog
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -132,7 +133,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file, base.vehicle)
+        found = _with_file(run, found, of_file, base.vehicle, split.training)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -171,10 +172,11 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings) -> Diagnosis:
+def _with_file(
+    run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings, training: Sequence[Recording]
+) -> Diagnosis:
     """Put what was found into the simulator's file."""
-    flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
-    said, files = corrected(of, vehicle, found, flights)
+    said, files = corrected(of, vehicle, found, training)
     run.texts.update({run.output / name: text for name, text in files.items()})
     return replace(found, corrected=said)
 
