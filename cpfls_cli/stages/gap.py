@@ -28,14 +28,15 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.simulators.corrected import corrected
-from cpfls_cli.simulators.formats import is_simulator_file, read_model
+from cpfls_cli.simulators.formats import is_simulator_file
 from cpfls_cli.simulators.study import VehicleOf, flown
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
-from cpfls_cli.stages.init import Stated, proposed
+from cpfls_cli.stages.init import Stated, proposed, taken
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -132,7 +133,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file, split)
+        found = _with_file(run, found, of_file, base.vehicle, split)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -151,8 +152,11 @@ def gap(
 
 def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
-    run.take({"simulator": file})
-    stated = Stated(model=read_model(file))
+    stated = Stated(model=taken(run, file, "simulator"))
+    # Files that it includes may lie in the output folder, and none of them may be written over.
+    assert stated.model is not None, "it was just read"
+    names = stated.model.output_names.values()
+    run.outputs += [run.output / name for name in (_STUDY, *names)]
     logs = [path for path in flights if path.is_file() and not format_name(path)]
     made, _, text = proposed(run, logs, stated)
     if made.asked or made.vehicle is None:
@@ -168,13 +172,11 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) -> Diagnosis:
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings, split: FlightSplit) -> Diagnosis:
     """Put what was found into the simulator's file, and play held-out flights back in it."""
-    flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
-    stated = run.study.vehicle
-    said, files = corrected(of, stated, found, flights)
+    said, files = corrected(of, vehicle, found, split.training)
     run.texts.update({run.output / name: text for name, text in files.items()})
-    before_after = flown(of, files, stated, split.training, split.held_out, run.study.gap)
+    before_after = flown(of, files, vehicle, split.training, split.held_out, run.study.gap)
     return replace(found, corrected=replace(said, flown=before_after))
 
 

@@ -37,7 +37,7 @@ def test_a_file_of_gazebo_is_flown_by_the_equations_of_its_plugin(tmp_path, drag
     flight = probe_flight(flies)
     course = Course(flight, np.arange(0, len(flight) - 9, 7), 8, finer=40)
     published = course.errors(fly_sdf(text, course))
-    own = free_runs(player_of(vehicle_of(of, STATED), flight), flight, course.starts, 8).errors
+    own = free_runs(player_of(vehicle_of(of, of, STATED), flight), flight, course.starts, 8).errors
     moved = np.abs(published).max(axis=(0, 1, 3))
     assert (np.abs(own - published).max(axis=(0, 1, 3)) < 0.02 * moved).all()
 
