@@ -18,7 +18,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test test-fast decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
+.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test test-fast decides oldest lint site tutorials wheel bench blind-study blind-quick gallery fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -40,6 +40,7 @@ help:
 	@echo "  make bench       benchmarks, as Markdown tables; hours, and goes on where it was stopped"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
+	@echo "  make gallery REPOSITORIES=FOLDER   what one public log says of each of many vehicles, from clones of them"
 	@echo "  make fuzz [EACH=N]   hostile files against all that reads them"
 	@echo "  make clean       remove what studies produced"
 
@@ -415,6 +416,11 @@ blind-study: $(INSTALLED_DEV)
 # A few sets of each group on a seed for development: what a change of the rules does. Flights are flown once and kept.
 blind-quick: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.blind_study quick --out data/blind-quick --seed 31 --processes 1 $(SIZE)
+
+# What one public log says of each of many vehicles; REPOSITORIES is a folder of clones, owner/name each.
+gallery: $(INSTALLED_DEV)
+	$(BIN)/python -m benchmarks.gallery $(REPOSITORIES) > docs/gallery.md.new
+	mv docs/gallery.md.new docs/gallery.md
 
 # Hostile files, as a table; hours at full size. FUZZ takes more options.
 EACH := 10000

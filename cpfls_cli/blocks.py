@@ -63,6 +63,24 @@ def jackknife_error(left_out: Array) -> Array:
     return np.asarray(np.sqrt((blocks - 1) / blocks * (apart**2).sum(axis=0)))
 
 
+def serial_error(left_out: Array) -> Array:
+    """Compute the same where neighbouring blocks may correlate: what is as slow as a few blocks, such as gusts.
+
+    Parameters
+    ----------
+    left_out : array, shape (block, ...)
+        In the order of time.
+
+    References
+    ----------
+    Newey and West 1987, with one lag that counts whole where it is positive.
+    """
+    apart = left_out - left_out.mean(axis=0)
+    alike = (apart[1:] * apart[:-1]).sum(axis=0)
+    own = np.maximum((apart**2).sum(axis=0), np.finfo(float).tiny)
+    return np.asarray(jackknife_error(left_out) * np.sqrt(1.0 + 2.0 * np.maximum(alike, 0.0) / own))
+
+
 def mean_error(values: Array) -> Array:
     """Compute the standard error of the mean of two or more independent values, shape (value, ...) to (...)."""
     return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))

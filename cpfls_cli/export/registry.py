@@ -18,6 +18,7 @@ from cpfls_cli.export.simulators import ardupilot
 from cpfls_cli.export.simulators.crazyflow import crazyflow_held, crazyflow_text
 from cpfls_cli.export.simulators.functions import casadi_text, jax_text
 from cpfls_cli.export.simulators.mjcf import mjcf_held, mjcf_text
+from cpfls_cli.export.simulators.pegasus import pegasus_held, pegasus_text
 from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
 from cpfls_cli.export.simulators.rotorpy import rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
@@ -111,6 +112,7 @@ FORMS: dict[str, Form] = {
         otherwise=ardupilot.OTHERWISE,
     ),
     "rotorpy": Form("RotorPy", ".py", rotorpy_held, rotorpy_text),
+    "pegasus": Form("Pegasus Simulator", ".py", pegasus_held, pegasus_text),
     "casadi": Form("CasADi", ".py", _whole, casadi_text),
     "jax": Form("JAX", ".py", _whole, jax_text),
 }

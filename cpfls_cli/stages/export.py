@@ -27,7 +27,7 @@ from cpfls_cli.result import about, part, plain, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.stages._sheets import sheet_of
 
-Formats = StrEnum("Formats", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv")
+Formats = StrEnum("Formats", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy pegasus casadi jax mcap csv")
 ModelArgument = Annotated[
     Path,
     typer.Argument(
@@ -43,9 +43,9 @@ FormatOption = Annotated[
         help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
         "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
         "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
-        "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
-        "flight, replay, gap or response holds, on the log's own clock; default: by the suffix of "
-        "FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
+        "pegasus (Isaac Sim), casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv "
+        "(PlotJuggler): what a flight, replay, gap or response holds, on the log's own clock; default: by the "
+        "suffix of FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
     ),
 ]
 NameOption = Annotated[
@@ -58,7 +58,7 @@ VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
 """What is drawn by other programs, which is no model."""
 ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 # What the module imports beside the standard library: under such a name it would import itself.
-_IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
+_IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
 @result

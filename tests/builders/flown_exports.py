@@ -192,6 +192,22 @@ def fly_rotorpy(text: str, course: Course) -> State:
     return State(*(np.array(part).reshape(*shape, *part[0].shape) for part in zip(*rows, strict=True)))
 
 
+def fly_pegasus(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the published equations of Pegasus."""
+    module = executed(text)
+    curve, axes = module["THRUST_CURVE"], np.array(module["AXES"])
+    thrust, yaw, turns = (np.array(curve[name]) for name in ("rotor_constant", "rolling_moment_coefficient", "rot_dir"))
+    hubs, drag = np.array(module["POSITIONS"]), np.array(module["DRAG"])
+
+    def wrench(speed: Array, air: Array, _rate: Array, _rotation: Array) -> tuple[Array, Array]:
+        lifts = (thrust * speed**2)[..., None] * [0.0, 0.0, 1.0]
+        torque = rotations.cross(hubs, lifts).sum(axis=1)
+        torque[:, 2] += (yaw * speed**2) @ turns
+        return torque, lifts.sum(axis=1) - drag * air
+
+    return fly_body(course, module["MASS"], axes @ np.diag(module["MOMENTS"]) @ axes.T, wrench, 0.0)
+
+
 def fly_casadi(text: str, course: Course) -> State:
     """Fly an exported vehicle in CasADi."""
     module, flight = executed(text), course.flight
@@ -278,6 +294,7 @@ FLYING = {
     "urdf": Flying(fly_urdf, step_s=1e-3),
     "ardupilot": Flying(fly_ardupilot, step_s=STEP_S),
     "rotorpy": Flying(fly_rotorpy, "rotorpy"),
+    "pegasus": Flying(fly_pegasus, step_s=1e-3),
     "casadi": Flying(fly_casadi, "casadi", levels=0),
     "jax": Flying(fly_jax, "jax", levels=0),
 }

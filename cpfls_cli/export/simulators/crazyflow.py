@@ -28,8 +28,8 @@ from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
 
 STEP_S = 2.5e-3
-_FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
-_DRAG = (*_FORCE_OF_VELOCITY, 0)
+FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
+DRAG = (*FORCE_OF_VELOCITY, 0)
 """Places in a table of weights."""
 
 _ROTORS, _RPM = 4, 30 / np.pi
@@ -52,13 +52,13 @@ def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
 
     def holds(weights: Array) -> Array:
         held = numbers.holds(weights)
-        held[_DRAG] = _in_hover(weights[_FORCE_OF_VELOCITY], hover)
+        held[DRAG] = in_hover(weights[FORCE_OF_VELOCITY], hover)
         return held
 
     return held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model), numbers), holds
 
 
-def _in_hover(weights: Array, hover: float) -> Array:
+def in_hover(weights: Array, hover: float) -> Array:
     """Sum the terms of rotors that hover, from which on the drag of rotors is one of the body, shape (3, 3)."""
     rotors = (weights.shape[2] - 1) // 4
     turning = np.concatenate([[1.0], np.full(rotors, hover), np.full(rotors, hover**2), np.zeros(2 * rotors)])
@@ -86,7 +86,7 @@ def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str)
         "rpm2torque": [0.0, found["yaw_linear"] / _RPM, found["yaw"] / _RPM**2],
         "rotor_dyn_coef": [rate, 0.0, rate, 0.0],
         "mixing_matrix": [(hubs[:, 1] / length).tolist(), (-hubs[:, 0] / length).tolist(), spins(vehicle).tolist()],
-        "drag_matrix": held.weights[_DRAG].tolist(),
+        "drag_matrix": held.weights[DRAG].tolist(),
         "prop_inertia": 0.0,
         "thrust_min": 0.0,
         "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,

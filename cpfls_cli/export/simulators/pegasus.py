@@ -7,19 +7,21 @@ speeds follow commands at once. What is called rolling moment there is the yaw t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.simulators.crazyflow import DRAG, FORCE_OF_VELOCITY, in_hover
 from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.vehicle.motion import Instant, Wrench
 
 _ROTORS = 4
 
@@ -31,18 +33,14 @@ def pegasus_held(model: VehicleModel) -> tuple[Held, Holds]:
             f"Pegasus pushes at four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax and casadi "
             "take any number"
         )
-    numbers = numbers_of(model, _wrenches, alike=False)
-    return held_by(model, numbers.holds, RotorResponse(), of_a_body(constant_body(model)), numbers), numbers.holds
+    numbers, hover = numbers_of(model, lambda _see: {}, alike=False), hover_speed(model.vehicle)
 
+    def holds(weights: Array) -> Array:
+        held = numbers.holds(weights)
+        held[DRAG] = np.diag(np.diag(in_hover(weights[FORCE_OF_VELOCITY], hover)))
+        return held
 
-def _wrenches(see: Instant) -> Mapping[str, Wrench]:
-    """Write the drag of Pegasus for a unit of each coefficient."""
-    x, y, z = see.air_velocity
-    return {
-        "drag_x": Wrench(force=(-x, 0, 0)),
-        "drag_y": Wrench(force=(0, -y, 0)),
-        "drag_z": Wrench(force=(0, 0, -z)),
-    }
+    return held_by(model, holds, RotorResponse(), of_a_body(constant_body(model)), numbers), holds
 
 
 def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
@@ -66,7 +64,7 @@ def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) ->
         "source": comment_text(file),
         "facts": comment_lines([*sheet.facts, "", *remarks]),
         "curve": curve,
-        "drag": python_rows(np.array([found[f"drag_{axis}"] for axis in "xyz"]), 0),
+        "drag": python_rows(-np.diag(held.weights[DRAG]), 0),
         "mass": number(held.body.mass),
         "moments": python_rows(moments, 0),
         "axes": python_rows(axes, 0),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import half_width, jackknife_error
+from cpfls_cli.blocks import half_width, serial_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
@@ -200,7 +200,7 @@ def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, sha
     value, *without = np.concatenate([linear, shapes], axis=1)
     half = np.full(len(value), np.inf)
     if len(without) > 1:
-        half = np.hypot(half_width(jackknife_error(np.array(without)), len(without)), _KNOWN_TO * value)
+        half = np.hypot(half_width(serial_error(np.array(without)), len(without)), _KNOWN_TO * value)
     return tuple(
         Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle))
         for one, v, h in zip(known, value, half, strict=True)
