@@ -3,8 +3,8 @@
     python -m benchmarks.gallery REPOSITORIES > docs/gallery.md        make gallery REPOSITORIES=...
 
 REPOSITORIES is a folder of clones, `owner/name` each, with or without a working tree; `benchmarks/gallery.tsv` lists
-repository, path and vehicle. Numbers are those of `look.json`, with 95 % intervals; a log that is not there is listed as
-such, and none is copied.
+repository, path and vehicle. Numbers are those of `look.json`, with 95 % intervals; a log that is not there is listed
+as such, and none is copied.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from benchmarks.shared.measure import program, progress
 LISTED = Path(__file__).with_suffix(".tsv")
 HEAD = """# Gallery: public logs of {} vehicles
 
-What `cpfls look` identifies in one log of each, with nothing else known of the vehicle, as it comes out: numbers with 95 %
-intervals, which questions are answered, and what the first advice is. The logs are other people's, in the repositories
-named, and are not part of this one. `make gallery REPOSITORIES=FOLDER` writes this page anew from clones of them.
+What `cpfls look` identifies in one log of each, with nothing else known of the vehicle, as it comes out: numbers with
+95 % intervals, which questions are answered, and what the first advice is. The logs are other people's, in the
+repositories named, and are not part of this one. `make gallery REPOSITORIES=FOLDER` writes this page anew from clones
+of them.
 
 Effectiveness is the angular acceleration for a full command of the axis, with the total delay from command to rotation;
 uneven rotors are shares of thrust off the mean, beyond their intervals. Answers are counted as yes, roughly and no.
