@@ -25,6 +25,9 @@ _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
 """Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
 rate's, so that each says less that is new."""
 
+_STILL = 1e-9
+"""Speed of a rotor that stands, rad/s."""
+
 _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
@@ -42,11 +45,14 @@ class FitWindows:
     starts : array of int, shape (window,)
     loss : Loss
         In errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
+    every : int
+        Samples of a step of the runs.
     """
 
     flight: PlaybackFlight
     starts: IntArray
     loss: Loss
+    every: int = 1
 
     @property
     def horizon(self) -> int:
@@ -57,37 +63,57 @@ class FitWindows:
     def together(self) -> tuple[str, int, float, bool]:
         """What windows have in common that are flown side by side."""
         flight = self.flight
-        return flight.group, self.horizon, flight.motion.period, flight.translates
+        return flight.group, self.horizon, self.every * flight.motion.period, flight.translates
 
     @cached_property
     def samples(self) -> IntArray:
-        """Samples of the flight in the windows, window by window: only there the weights are needed."""
-        return np.asarray((self.starts[:, None] + np.arange(self.horizon + 1)).ravel())
+        """Samples of the flight between steps, window by window: only there the weights are needed."""
+        return np.asarray((self.starts[:, None] + self.every * np.arange(self.horizon + 1)).ravel())
 
     @cached_property
     def motion(self) -> MeasuredMotion:
         """Motion at these samples."""
-        return motion_at(self.flight.motion, self.samples)
+        motion = self.flight.motion
+        return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
 
-    @cached_property
-    def places(self) -> IntArray:
-        """Where the windows start in `samples`."""
-        return np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
+    @property
+    def runs(self) -> Runs:
+        """Runs in the windows."""
+        starts = np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
+        return Runs(self.motion, starts, self.flight.translates)
 
     @classmethod
-    def of(cls, flight: PlaybackFlight, horizon: int, every: int) -> FitWindows:
+    def of(cls, flight: PlaybackFlight, horizon: int, interval: int) -> FitWindows:
         """Take every n-th window of a flight.
 
         Parameters
         ----------
-        horizon, every : int
+        horizon, interval : int
             Samples.
         """
-        starts = flight.starts(horizon, every)
+        starts = flight.starts(horizon, interval)
         return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
 
+    def rotor_terms(self, at: VehicleAt, by: str = "") -> Array:
+        """Average the terms of the rotors, or their derivatives by a number, over steps, shape (step, run, column).
 
-def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float) -> list[FitWindows]:
+        The speed of several samples is the root of their mean square, which gives the mean thrust.
+        """
+        steps = self.starts + np.arange(self.every * self.horizon)[:, None]
+        terms = at.rotor_terms(self.flight, steps, by)
+        if self.every == 1:
+            return terms
+        means = terms.reshape(self.horizon, self.every, *terms.shape[1:]).mean(axis=1)
+        rotors = terms.shape[-1] // 4
+        speed, square = (slice(1 + n * rotors, 1 + (n + 1) * rotors) for n in range(2))
+        root = np.sqrt(means[..., square]) if not by else self.rotor_terms(at)[..., speed]
+        means[..., speed] = 0.5 * means[..., square] / np.maximum(root, _STILL) if by else root
+        return means
+
+
+def windows_of(
+    flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float, step_s: float = 0.0
+) -> list[FitWindows]:
     """Take windows of flights, errors weighed so that a lively flight counts more, by the square root.
 
     A model misses more of a lively flight, but not in proportion: the noise of rotor speeds is there in hover as well.
@@ -96,24 +122,34 @@ def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: 
     Parameters
     ----------
     horizon_s, interval_s : float, s
+    step_s : float, s
+        Longest step of runs; one sample at least.
     """
     periods = [flight.motion.period for flight in flights]
-    horizons = [max(1, round(horizon_s / period)) for period in periods]
+    every = [max(1, int(min(step_s, horizon_s) / period + 1e-9)) for period in periods]
+    horizons = [max(1, round(horizon_s / (own * period))) for own, period in zip(every, periods, strict=True)]
     starts = [
-        flight.starts(horizon, max(1, round(interval_s / period)))
-        for flight, horizon, period in zip(flights, horizons, periods, strict=True)
+        flight.starts(own * horizon, max(1, round(interval_s / period)))
+        for flight, own, horizon, period in zip(flights, every, horizons, periods, strict=True)
     ]
-    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, strict=True)]
+    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, every, strict=True)]
     lively = np.array([scale.mean(axis=0) for scale in scales])
     weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
     return [
-        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)))
-        for flight, start, scale, own in zip(flights, starts, scales, weight, strict=True)
+        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)), step)
+        for flight, start, scale, own, step in zip(flights, starts, scales, weight, every, strict=True)
     ]
 
 
-def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
+def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int, every: int = 1) -> Array:
     """Compute mean errors of "rate stays": the attitude turns with it, and velocity stays.
+
+    Parameters
+    ----------
+    horizon : int
+        Steps.
+    every : int
+        Samples of a step.
 
     Returns
     -------
@@ -124,7 +160,7 @@ def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
     motion, errors = flight.motion, np.zeros((horizon, 4))
     turned = Rotation.from_matrix(motion.rotation[starts])
     for step in range(1, horizon + 1):
-        at, elapsed = starts + step, step * motion.period
+        at, elapsed = starts + every * step, every * step * motion.period
         moved = motion.position[starts] + elapsed * motion.velocity[starts] - motion.position[at]
         turn = (turned * Rotation.from_rotvec(elapsed * motion.rate[starts])).inv()
         away = (turn * Rotation.from_matrix(motion.rotation[at])).magnitude()
@@ -371,11 +407,11 @@ class _SideBySide:
 
     def steps(self, at: VehicleAt, numbers: Iterable[str] = ()) -> Steps:
         """Give the rotors over all steps, with derivatives by numbers of their response."""
-        return Steps(self._terms(at), terms_by={at.free.index[name]: self._terms(at, name) for name in numbers})
+        by = {at.free.index[name]: self._terms(at, name) for name in numbers}
+        return Steps(self._terms(at), terms_by=by)
 
     def _terms(self, at: VehicleAt, by: str = "") -> Array:
-        terms = np.concatenate([at.rotor_terms(each.flight, each.samples, by) for each in self.windows])
-        return terms.reshape(len(self.owner), -1, terms.shape[1])[:, :-1].swapaxes(0, 1)
+        return np.concatenate([each.rotor_terms(at, by) for each in self.windows], axis=1)
 
     def losses(self, at: VehicleAt) -> Array:
         """Weigh the errors of each run."""
@@ -553,5 +589,5 @@ def weighed(loss: Loss, errors: Array) -> Array:
 def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
     weight, delta = window.loss.weight, window.loss.delta
-    size = rate_stays(window.flight, window.starts, window.horizon)
+    size = rate_stays(window.flight, window.starts, window.horizon, window.every)
     return float((weight * delta**2 * (np.sqrt(1.0 + (size / delta) ** 2) - 1.0)).sum())

@@ -121,14 +121,14 @@ def _between(windows: FitWindows) -> FitWindows:
     """Take windows that begin in the middle between two that follow each other; those there are of a single one."""
     middle = windows.starts[:-1] + np.diff(windows.starts) // 2
     # Not across a pause.
-    known = middle[np.isin(middle, windows.flight.starts(windows.horizon, 1))]
-    return FitWindows(windows.flight, known if len(known) else windows.starts, windows.loss)
+    known = middle[np.isin(middle, windows.flight.starts(windows.every * windows.horizon, 1))]
+    return replace(windows, starts=known if len(known) else windows.starts)
 
 
 def _chunks(windows: Sequence[FitWindows]) -> Iterator[FitWindows]:
     for window in windows:
         for first in range(0, len(window.starts), _CHUNK):
-            yield FitWindows(window.flight, window.starts[first : first + _CHUNK], window.loss)
+            yield replace(window, starts=window.starts[first : first + _CHUNK])
 
 
 def _vehicle(fitted: FittedNumbers) -> VehicleAt:
@@ -161,18 +161,18 @@ class _Begun(NamedTuple):
         errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
         missed = np.zeros((len(samples) + 1, 6))
         missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
-        own = at.rotor_terms(flight, window.starts + np.arange(window.horizon)[:, None])
-        return cls(window, own, missed[steps - samples[0]] * known[:, :, None])
+        return cls(window, window.rotor_terms(at), missed[steps - samples[0]] * known[:, :, None])
 
     @property
     def runs(self) -> Runs:
-        return Runs(self.window.flight.motion, self.window.starts, self.window.flight.translates)
+        return self.window.runs
 
     def pushed(self, observer: Observer) -> Array:
         """Give what pushes the runs, shape (step, run, 6)."""
-        period = self.window.flight.motion.period
+        window, period = self.window, self.window.flight.motion.period
         begun = np.einsum("rsa,sa->ra", self.missed, observer.weights(period))
-        return np.asarray(begun * observer.fading(period, self.window.horizon)[:, None])
+        fading = observer.fading(period, window.every * window.horizon).reshape(window.horizon, window.every, 1, -1)
+        return np.asarray(begun * fading.mean(axis=1))
 
     def steps(self, pushed: Array, by: Mapping[int, Array] | None = None) -> Steps:
         """Give what drives the runs, with derivatives of what pushes them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -19,6 +19,9 @@ from cpfls_cli.playback.settings import PlaybackSettings
 
 _FEWEST_BLOCKS = 8
 """Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
+
+_STEP_S = 0.01
+"""Longest step of the runs that structures are compared by; what is kept is fitted at all samples."""
 
 _QUICK = 100
 """Windows of a quick search at most."""
@@ -40,7 +43,7 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     most = min(settings.search_windows, _QUICK) if settings.quick else settings.search_windows
     interval = max(settings.window_interval_s, flown / most)
-    windows = windows_of(flights, settings.horizon_s, interval)
+    windows = windows_of(flights, settings.horizon_s, interval, _STEP_S)
     count = min(settings.folds, len(windows))
     ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
     together = [windows[start:end] for start, end in pairwise(ends)]
@@ -54,8 +57,9 @@ def _pieces(windows: FitWindows, count: int) -> list[FitWindows]:
     """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
     pieces = np.array_split(windows.starts, count)
     ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
-    kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
-    return [FitWindows(windows.flight, piece, windows.loss) for piece in kept]
+    samples = windows.every * windows.horizon
+    kept = [piece[piece + samples < end] for piece, end in zip(pieces, ends, strict=True)]
+    return [replace(windows, starts=piece) for piece in kept]
 
 
 def _lacks_an_axis(parts: Sequence[Sequence[FitWindows]]) -> bool:
