@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -337,26 +337,29 @@ def fit_parts(
     place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     bounds = free.lows, free.highs
 
-    def best(kept: BoolArray, point: FitPoint, steps: int) -> FitPoint:
+    @cache
+    def at(values: tuple[float, ...]) -> WindowSums:
+        return WindowSums(free, windows, np.array(values))
+
+    def best(kept: BoolArray, point: FitPoint, steps: int, tolerance: float) -> FitPoint:
         def evaluated(values: Array) -> FitPoint:
-            return WindowSums(free, windows, values).mean(kept=kept)
+            return at(tuple(values.tolist())).mean(kept)
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
+    every = place >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
-    begun = [WindowSums(free, windows, np.array(each)).mean() for each in values]
+    begun = [at(each).mean(every) for each in values]
     finite = [each for each in begun if np.isfinite(each.objective)]
     if not finite:
         raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")
-    start = smallest(finite, lambda each: each.objective)
-    sums = WindowSums(free, windows, best(place >= 0, start, steps).values)
-    losses = sums.losses()
-    whole = sums.mean(losses)
+    whole = best(every, smallest(finite, lambda each: each.objective), steps, tolerance)
+    sums = at(tuple(whole.values.tolist()))
 
     def without(part: int) -> HeldOut:
         kept = place != part
-        point = best(kept, sums.mean(losses, kept), 1)
-        errors = windows.errors(free, point.values)
+        point = best(kept, sums.mean(kept), 1, 0.0)
+        errors = at(tuple(point.values.tolist())).errors
         return HeldOut(
             FittedNumbers(free, point.values, point.loss),
             [own for own, other in zip(errors, kept, strict=True) if not other],
@@ -464,10 +467,6 @@ class WindowSet:
                 found[place] = losses[each.owner == own]
         return found
 
-    def losses(self, free: JointNumbers, values: Array) -> Array:
-        """Sum the loss along each flight, shape (flight,)."""
-        return np.array([each.sum() for each in self.errors(free, values)])
-
     def derivatives(self, free: JointNumbers, values: Array, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
         """Sum gradient and Hessian by all numbers along each flight, the first axis that of the groups.
 
@@ -504,21 +503,23 @@ class WindowSums:
         gradient, hessian = zip(*self.windows.derivatives(self.free, self.values, none), strict=True)
         return np.concatenate(gradient), np.concatenate(hessian)
 
-    def losses(self) -> Array:
-        """Sum the loss along each, shape (flight,)."""
-        return self.windows.losses(self.free, self.values)
+    @cached_property
+    def errors(self) -> list[Array]:
+        """Errors of each run, flight by flight, shapes (run,)."""
+        return self.windows.errors(self.free, self.values)
 
-    def mean(self, losses: Array | None = None, kept: BoolArray | slice = slice(None)) -> FitPoint:
-        """Take the means over the runs of some of the flights; their losses, where they are known."""
+    def mean(self, kept: BoolArray) -> FitPoint:
+        """Take the means over the runs of some of the flights."""
         count = self.windows.counts[kept].sum()
 
         def derivatives() -> tuple[Array, Array]:
             gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_flight)
             return gradient, hessian
 
-        found = self.losses() if losses is None else losses
-        believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
-        return FitPoint(self.values, float(found[kept].sum() / count), derivatives, believed)
+        loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
+        return FitPoint(
+            self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads)
+        )
 
 
 @dataclass(frozen=True)

@@ -140,8 +140,8 @@ class Outlook:
         own, errors = self._own(blocks), np.empty(len(self.loss))
         for part, mean in enumerate(self._without):
             step, aside = self._step(mean, own), self.part == part
-            square = 0.5 * np.einsum("i,pij,j->p", step, self.hessian[aside], step, optimize=True)
-            errors[aside] = (self.loss[aside] + self.gradient[aside] @ step + square) / self.count[aside]
+            slope = self.gradient[aside] + 0.5 * self.hessian[aside] @ step
+            errors[aside] = (self.loss[aside] + slope @ step) / self.count[aside]
         return errors
 
     def start(self, blocks: Collection[str]) -> dict[str, float]:
