@@ -135,6 +135,11 @@ class Outlook:
             np.repeat(place, [len(own) for own in loss]),
         )
 
+    @property
+    def blocks(self) -> set[str]:
+        """Blocks of the models that are predicted."""
+        return {number.block for number in self.free.numbers}
+
     def errors(self, blocks: Collection[str]) -> Array:
         """Predict the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
         own, errors = self._own(blocks), np.empty(len(self.loss))

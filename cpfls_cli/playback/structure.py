@@ -239,6 +239,7 @@ class _Bench:
     expected: int
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
+    _outlooks: dict[Structure, Outlook] = field(default_factory=dict)
 
     @cached_property
     def stays(self) -> float:
@@ -288,11 +289,14 @@ class _Bench:
     def outlook(self, near: Judged, blocks: Iterable[str]) -> Outlook:
         """Evaluate what predicts the errors of structures of some blocks and its own, from the fit of one."""
         own = near.structure
-        union = Structure(tuple(dict.fromkeys((*own.blocks, *blocks))), own.rules).free(self.vehicle)
-        known = near.fit.free.named(near.fit.values)
-        return Outlook.of(
-            union, union.values({number.name: number.absent for number in union.numbers} | known), self.parts
-        )
+        asked = tuple(dict.fromkeys((*own.blocks, *blocks)))
+        found = self._outlooks.get(own)
+        if found is None or not found.blocks.issuperset(asked):
+            union = Structure(asked, own.rules).free(self.vehicle)
+            absent = {number.name: number.absent for number in union.numbers}
+            values = union.values(absent | near.fit.free.named(near.fit.values))
+            self._outlooks[own] = found = Outlook.of(union, values, self.parts)
+        return found
 
 
 def _judged(structure: Structure, whole: Fitted, held: tuple[HeldOut, ...]) -> Judged:
