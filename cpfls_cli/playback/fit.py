@@ -76,12 +76,6 @@ class FitWindows:
         motion = self.flight.motion
         return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
 
-    @property
-    def runs(self) -> Runs:
-        """Runs in the windows."""
-        starts = np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
-        return Runs(self.motion, starts, self.flight.translates)
-
     @classmethod
     def of(cls, flight: PlaybackFlight, horizon: int, interval: int) -> FitWindows:
         """Take every n-th window of a flight.
@@ -370,7 +364,7 @@ def fit_parts(
 
 
 @dataclass(frozen=True)
-class _SideBySide:
+class SideBySide:
     """Windows of several flights of one configuration that are flown at once.
 
     Attributes
@@ -388,10 +382,12 @@ class _SideBySide:
 
     @cached_property
     def owner(self) -> IntArray:
+        """Flight of each run."""
         return np.repeat(np.arange(len(self.windows)), [len(each.starts) for each in self.windows])
 
     @cached_property
     def runs(self) -> Runs:
+        """All runs."""
         motions = [each.motion for each in self.windows]
         parts = zip(*(each[:4] for each in motions), strict=True)
         position, velocity, rotation, rate = (np.concatenate(each) for each in parts)
@@ -404,6 +400,7 @@ class _SideBySide:
 
     @cached_property
     def loss(self) -> Loss:
+        """How their errors are weighed."""
         return Loss(
             *(np.stack(each, axis=2)[:, :, self.owner] for each in zip(*(w.loss for w in self.windows), strict=True))
         )
@@ -436,6 +433,14 @@ class _SideBySide:
         return found
 
 
+def side_by_side(windows: Sequence[FitWindows]) -> list[SideBySide]:
+    """Put together what is flown at once."""
+    alike: dict[tuple[str, int, float, bool], list[int]] = {}
+    for place, each in enumerate(windows):
+        alike.setdefault(each.together, []).append(place)
+    return [SideBySide(np.array(own), tuple(windows[place] for place in own)) for own in alike.values()]
+
+
 @dataclass(frozen=True)
 class WindowSet:
     """Windows of flights, made ready to be flown again and again."""
@@ -443,18 +448,15 @@ class WindowSet:
     windows: tuple[FitWindows, ...]
 
     @cached_property
-    def _together(self) -> list[_SideBySide]:
-        alike: dict[tuple[str, int, float, bool], list[int]] = {}
-        for place, each in enumerate(self.windows):
-            alike.setdefault(each.together, []).append(place)
-        return [_SideBySide(np.array(own), tuple(self.windows[place] for place in own)) for own in alike.values()]
+    def _together(self) -> list[SideBySide]:
+        return side_by_side(self.windows)
 
     @cached_property
     def counts(self) -> IntArray:
         """Runs of each flight."""
         return np.array([len(each.starts) for each in self.windows])
 
-    def _of_group(self, free: JointNumbers, values: Array, each: _SideBySide) -> tuple[VehicleAt, IntArray]:
+    def _of_group(self, free: JointNumbers, values: Array, each: SideBySide) -> tuple[VehicleAt, IntArray]:
         own, places = free.of_flight(each.windows[0].flight)
         return VehicleAt(own, values[places]), places
 
@@ -508,7 +510,7 @@ class WindowSums:
         """Errors of each run, flight by flight, shapes (run,)."""
         return self.windows.errors(self.free, self.values)
 
-    def mean(self, kept: BoolArray) -> FitPoint:
+    def mean(self, kept: BoolArray | slice = slice(None)) -> FitPoint:
         """Take the means over the runs of some of the flights."""
         count = self.windows.counts[kept].sum()
 

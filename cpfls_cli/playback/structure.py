@@ -37,7 +37,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
 """Of the fits that structures are compared by: a tenth of what is worth a name is close enough."""
 
-_STEPS, _TOLERANCE = 60, 3e-5
+_STEPS, _TOLERANCE = 60, 3e-6
 """Of the fit that is kept."""
 
 _VISIBLE = 0.02
