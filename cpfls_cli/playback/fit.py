@@ -97,11 +97,13 @@ class FitWindows:
         terms = at.rotor_terms(self.flight, steps, by)
         if self.every == 1:
             return terms
-        means = terms.reshape(self.horizon, self.every, *terms.shape[1:]).mean(axis=1)
+        means = np.asarray(terms.reshape(self.horizon, self.every, *terms.shape[1:]).mean(axis=1))
         rotors = terms.shape[-1] // 4
         speed, square = (slice(1 + n * rotors, 1 + (n + 1) * rotors) for n in range(2))
-        root = np.sqrt(means[..., square]) if not by else self.rotor_terms(at)[..., speed]
-        means[..., speed] = 0.5 * means[..., square] / np.maximum(root, _STILL) if by else root
+        if by:
+            means[..., speed] = 0.5 * means[..., square] / np.maximum(self.rotor_terms(at)[..., speed], _STILL)
+        else:
+            means[..., speed] = np.sqrt(means[..., square])
         return means
 
 
@@ -519,9 +521,7 @@ class WindowSums:
             return gradient, hessian
 
         loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
-        return FitPoint(
-            self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads)
-        )
+        return FitPoint(self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads))
 
 
 @dataclass(frozen=True)
