@@ -48,6 +48,10 @@ _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
     "mjcf": "data.xfrc_applied of the body at each step",
+    "rotorpy": "a class of your own under Multirotor, whose compute_body_wrench adds it",
+    "ardupilot": "lines of your own in SIM_Frame.cpp",
+    "crazyflow": "dist_f and dist_t at each step",
+    "crazyflie": "nothing: the firmware has no model of it",
 }
 _TAGS = {
     "sdf": {
@@ -60,6 +64,16 @@ _TAGS = {
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
     "mjcf": {},
+    "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
+    "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
+    "crazyflow": {
+        "thrust": "rpm2thrust",
+        "torque": "rpm2torque",
+        "lag_up": "rotor_dyn_coef",
+        "lag_down": "rotor_dyn_coef",
+        "drag": "drag_matrix",
+    },
+    "crazyflie": {"ratio": "THRUST2TORQUE"},
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
 
@@ -151,8 +165,9 @@ class _Corrections:
 
     def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
         """Put a number in the place of the stated one, where that is outside the interval."""
-        new, low, high = (stated.scale * each for each in found)
-        before, text = stated.scale * stated.value, f"{new:.4g}"
+        new, low, high = (stated.written(each) for each in found)
+        low, high, name = min(low, high), max(low, high), stated.name or name
+        before, text = stated.written(stated.value), f"{new:.4g}"
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -162,6 +177,11 @@ class _Corrections:
         elif stated.span is not None:
             self.edits[stated.span] = text.encode()
             self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
+            for other in stated.also:
+                share = found.value / stated.value if stated.value else 0.0
+                own = Stated(other.value, other.where, other.span, other.scale, other.power, other.name)
+                ends = _Found(*(each / stated.value * other.value if share else each for each in found))
+                self.replace(name, own, ends, f"{words}, in proportion", whom, None)
         elif room is not None and self.of.model.format == "sdf":
             self.put(room, f"<{name}>{text}</{name}>")
             self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +125,10 @@ class SimulatorModel:
         What is odd about the file.
     files : tuple of Path
         All files that it was read from, itself first.
+    effects : mapping from str to mapping from str to Stated
+        Numbers of effects by their coefficients, where the format has their very formulas.
+    of_commands : bool
+        Whether speeds are commands times the largest speed, so that logged speeds are others.
     """
 
     name: str
@@ -134,6 +138,8 @@ class SimulatorModel:
     cannot: tuple[str, ...]
     notes: tuple[str, ...]
     files: tuple[Path, ...]
+    effects: Mapping[str, Mapping[str, Stated]] = field(default_factory=dict)
+    of_commands: bool = False
 
     @property
     def file(self) -> Path:
@@ -158,6 +164,11 @@ class SimulatorModel:
             apart = body.centre - self.centre
             total += body.inertia + body.mass.value * (apart @ apart * np.eye(3) - np.outer(apart, apart))
         return total
+
+    @property
+    def states_inertia(self) -> bool:
+        """Whether the file states any inertia."""
+        return bool(self.inertia.any())
 
     @property
     def moments(self) -> tuple[float, ...]:
@@ -212,7 +223,7 @@ def checked(model: SimulatorModel) -> SimulatorModel:
     for body in model.bodies:
         _require_body(body)
     if not model.mass_kg > 0:
-        raise InputError(f"{model.file}: no link has a mass; write one, such as <mass>1.5</mass>")
+        raise InputError(f"{model.file}: states no mass above 0 ({model.bodies[0].mass.where}); write one")
     for rotor in model.rotors:
         if rotor.axis[2] < _STRAIGHT:
             raise InputError(
@@ -241,6 +252,11 @@ def part_of(
     turned = at[:3, :3]
     inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
     return Body(name, mass, at[:3, 3], inertia, turned, tuple(entries), tuple(place), node)
+
+
+def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
+    """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
+    return part_of(name, mass, entries, np.eye(4), [Stated(0.0, centre)] * 3)
 
 
 def turning(node: Node, what: str) -> InputError:

@@ -14,7 +14,16 @@ from cpfls_cli.flightlog.proposal import Proposal
 from cpfls_cli.simulators.document import Stated
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 
-_PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
+_PROGRAMS = {
+    "sdf": "Gazebo",
+    "urdf": "gym-pybullet-drones",
+    "mjcf": "MuJoCo",
+    "rotorpy": "RotorPy",
+    "ardupilot": "ArduPilot's SITL",
+    "crazyflow": "crazyflow",
+    "crazyflie": "the Crazyflie's firmware",
+    "vehicle": "cpfls",
+}
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -54,6 +63,8 @@ class VehicleOf:
     order: tuple[int, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    by_speed: bool = True
+    """Whether the speeds of the log are those that the file's thrust goes by."""
 
     @property
     def program(self) -> str:
@@ -66,9 +77,9 @@ class VehicleOf:
         return _short(self.model.centre.tolist())
 
     @property
-    def inertia(self) -> list[float]:
-        """Moments of inertia, kg m^2, and products where there are any."""
-        return _short(list(self.model.moments))
+    def inertia(self) -> list[float] | None:
+        """Moments of inertia, kg m^2, and products where there are any; None where the file states none."""
+        return _short(list(self.model.moments)) if self.model.states_inertia else None
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -88,8 +99,9 @@ class VehicleOf:
         hubs, found = self.model.hubs, []
         for index in self.order:
             rotor = self.model.rotors[index]
-            thrust = None if rotor.thrust is None else rotor.thrust.value
-            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor))
+            thrust = rotor.thrust.value if rotor.thrust is not None and self.by_speed else None
+            drag = rotor.drag_factor if self.by_speed else None
+            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, drag))
             found.append(
                 RotorLine(_short(hubs[index].tolist()), rotor.spin, thrust, drag, f"{rotor.name}, {rotor.where}")
             )
@@ -99,7 +111,9 @@ class VehicleOf:
         """Say where a quantity of the first rotor stands."""
         rotor = self.model.rotors[self.order[0]]
         if quantity == "thrust":
-            return "not stated, for controls are thrusts" if rotor.thrust is None else rotor.thrust.where
+            if not self.by_speed:
+                return "by command, and the log has speeds"
+            return "not stated by speed" if rotor.thrust is None else rotor.thrust.where
         stated = rotor.torque or rotor.ratio
         ratio = f", {rotor.ratio.value:g} m times the thrust" if rotor.ratio is not None else ""
         return "not stated" if stated is None else f"{stated.where}{ratio}"
@@ -149,7 +163,10 @@ def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | No
         warnings += _turned(model, airframe, order)
     speed, where = _speed(model, proposal)
     mass = model.mass_kg if mass_kg is None else mass_kg
-    return VehicleOf(model, mass_kg is not None, _short([mass])[0], speed, where, order, tuple(notes), tuple(warnings))
+    by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
+    return VehicleOf(
+        model, mass_kg is not None, _short([mass])[0], speed, where, order, tuple(notes), tuple(warnings), by_speed
+    )
 
 
 def _order(model: SimulatorModel, airframe: Airframe) -> tuple[int, ...]:

@@ -28,7 +28,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.simulators.corrected import corrected
-from cpfls_cli.simulators.formats import is_simulator_file, read_model
+from cpfls_cli.simulators.formats import file_of, is_simulator_file, read_model
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
@@ -150,7 +150,7 @@ def gap(
 
 def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
-    run.take({"simulator": file})
+    run.take({"simulator": file_of(file)})
     stated = Stated(model=read_model(file))
     logs = [path for path in flights if path.is_file() and not format_name(path)]
     made, _, text = proposed(run, logs, stated)

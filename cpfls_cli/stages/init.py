@@ -35,7 +35,7 @@ from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
-from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.formats import file_of, read_model
 from cpfls_cli.simulators.model import SimulatorModel
 from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
@@ -282,7 +282,7 @@ def init(
         raise InputError("Missing argument 'LOG...': give logs, or a simulator's file by --from, or both")
     file = None
     if model is not None:
-        run.take({"model": model})
+        run.take({"model": file_of(model)})
         file = read_model(model)
         _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
     stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
