@@ -16,6 +16,7 @@ from cpfls_cli.errors import InputError
 
 _LARGEST = 20_000_000
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
+_ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _WORD = re.compile(rb"\S+")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
@@ -113,9 +114,11 @@ class Node:
         """Make the error of this element."""
         return InputError(f"{self.file}, line {self.line}, <{self.tag}>: {message}")
 
-    def numbers(self, attribute: str | None = None, count: int | None = None, scale: float = 1.0) -> list[Stated]:
-        """Read the numbers of its text, or of an attribute, each with its place."""
-        text = self.text if attribute is None else self.attributes.get(attribute, "")
+    def numbers(
+        self, attribute: str | None = None, count: int | None = None, scale: float = 1.0, usual: str = ""
+    ) -> list[Stated]:
+        """Read the numbers of its text, or of an attribute or what it is by default, each with its place."""
+        text = self.text if attribute is None else self.attributes.get(attribute, usual)
         words, spans = text.split(), self._spans(attribute)
         try:
             values = [float(word) for word in words]
@@ -141,14 +144,19 @@ class Node:
         )
         return self.error(f"{of}{text!r} is not {wanted}{template}")
 
+    @property
+    def opening(self) -> re.Match[bytes] | None:
+        """Its first tag in the file; the group is the slash of one that is closed at once."""
+        return _TAG.match(raw_bytes(self.file), self.start)
+
     def _spans(self, attribute: str | None) -> list[Span | None]:
-        raw = raw_bytes(self.file)
-        tag = _TAG.match(raw, self.start)
+        raw, tag = raw_bytes(self.file), self.opening
         if tag is None:
             return []
         if attribute is not None:
-            own = re.search(rb"\s" + re.escape(attribute.encode()) + rb"\s*=\s*[\"']([^\"']*)[\"']", tag[0])
-            first, last = (self.start + own.start(1), self.start + own.end(1)) if own else (0, 0)
+            named = (each for each in _ATTRIBUTE.finditer(tag[0]) if each[1] == attribute.encode())
+            own = next(((each.start(each.lastindex or 0), each.end(each.lastindex or 0)) for each in named), (0, 0))
+            first, last = (self.start + end for end in own) if own != (0, 0) else own
         else:
             first, last = tag.end(), self.close
         # Comments inside count as blanks, so that what follows keeps its place.
@@ -221,7 +229,7 @@ def read_xml(file: Path) -> Node:
         If it cannot be read, or is no XML.
     """
     raw = read_bytes(file)
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw[:4]:
         raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
     builder = _Builder(file)
     parser = DefusedXMLParser(target=builder, forbid_dtd=True)
@@ -234,6 +242,8 @@ def read_xml(file: Path) -> Node:
             f"{file}: has a DOCTYPE or entities of its own, which no model needs and which can fill a memory; remove "
             "them"
         ) from None
+    except (ValueError, LookupError):
+        raise InputError(f"{file}: is in an encoding that cannot be read; save it in UTF-8") from None
     except ParseError as error:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
     assert isinstance(root, Node), "a file without an element is no XML"

@@ -18,6 +18,7 @@ ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 """Names of the entries of an inertia in files."""
 _STRAIGHT = 0.9998
 """Cosine of one degree: up to there an axis of thrust is that of the body."""
+_SHORTEST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Body:
         Its centre of mass, in the frame of the vehicle's first link: x forward, y left, z up.
     inertia : array, shape (3, 3), kg m^2
         About its centre of mass, in the same axes.
-    turned : array, shape (3, 3)
-        From the axes that its inertia is stated in to those of the vehicle.
+    turned, link : array, shape (3, 3)
+        From the axes that its inertia and its place are stated in to those of the vehicle.
     entries : tuple of Stated
         Ixx Iyy Izz Ixy Ixz Iyz as stated; empty where they are not stated so.
     place : tuple of Stated
@@ -45,6 +46,7 @@ class Body:
     centre: Array
     inertia: Array
     turned: Array
+    link: Array
     entries: tuple[Stated, ...] = ()
     place: tuple[Stated, ...] = ()
     node: Node | None = None
@@ -118,7 +120,7 @@ class SimulatorModel:
     Attributes
     ----------
     bodies : tuple of Body
-        Parts with mass; the first one is that which the rotors hang on.
+        Parts with mass; the first one is that which the rotors hang on, though another may be heavier.
     cannot : tuple of str
         What files of this format cannot state.
     notes : tuple of str
@@ -150,6 +152,11 @@ class SimulatorModel:
     def mass_kg(self) -> float:
         """Mass of all parts."""
         return float(sum(body.mass.value for body in self.bodies))
+
+    @property
+    def heaviest(self) -> Body:
+        """The part that corrections of inertia and centre of mass go into."""
+        return max(self.bodies, key=lambda body: body.mass.value)
 
     @property
     def centre(self) -> Array:
@@ -244,14 +251,16 @@ def part_of(
     name: str,
     mass: Stated,
     entries: Sequence[Stated],
-    at: Array,
+    link: Array,
+    own: Array,
     place: Sequence[Stated] = (),
     node: Node | None = None,
 ) -> Body:
-    """Make a part of its inertia as stated, in the axes of the pose `at`, shape (4, 4)."""
+    """Make a part of its inertia as stated, by the poses of its link and, in that, of its inertial, shape (4, 4)."""
+    at = link @ own
     turned = at[:3, :3]
     inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
-    return Body(name, mass, at[:3, 3], inertia, turned, tuple(entries), tuple(place), node)
+    return Body(name, mass, at[:3, 3], inertia, turned, link[:3, :3], tuple(entries), tuple(place), node)
 
 
 def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
@@ -262,6 +271,20 @@ def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str)
 def turning(node: Node, what: str) -> InputError:
     """Make the error of a joint that turns."""
     return node.error(f"{what} turns, and a study has one rigid body; fix it in the file that you give")
+
+
+def unit(node: Node, name: str, direction: Sequence[float] | Array) -> Array:
+    """Scale what an element states to length 1.
+
+    Raises
+    ------
+    InputError
+        If it has no length.
+    """
+    length = float(np.linalg.norm(direction))
+    if not length > _SHORTEST:
+        raise node.error(f"{name} has no direction; write one whose length is not 0")
+    return np.asarray(direction, dtype=float) / length
 
 
 def rotated(rpy: Sequence[float]) -> Array:
@@ -276,9 +299,9 @@ def rotated(rpy: Sequence[float]) -> Array:
     )
 
 
-def of_quaternion(quaternion: Sequence[float]) -> Array:
-    """Rotation by a quaternion w, x, y, z of any length, shape (3, 3)."""
-    w, x, y, z = np.array(quaternion) / np.linalg.norm(quaternion)
+def of_quaternion(quaternion: Sequence[float] | Array) -> Array:
+    """Rotation by a quaternion w, x, y, z of length 1, shape (3, 3)."""
+    w, x, y, z = quaternion
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
