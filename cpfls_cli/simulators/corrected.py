@@ -33,6 +33,7 @@ from cpfls_cli.errors import visible
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
+from cpfls_cli.simulators.literals import with_comment
 from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
@@ -44,6 +45,7 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+_OF_XML = ("sdf", "urdf", "mjcf")
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
@@ -292,10 +294,22 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
         held = quantity == "scales" or (
             rule is not None and rule(made, {number.name: number for number in each.numbers})
         )
+        held = held or _of_formula(made, each)
         if not held and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
+    """Correct the numbers of an effect whose very formula the simulator has; False where it has not."""
+    stated = made.of.model.effects.get(each.name)
+    if stated is None or any(number.name not in stated for number in each.numbers):
+        return False
+    for number in each.numbers:
+        own = stated[number.name]
+        made.replace(own.name, own, _Found(number.value, number.low, number.high), f"{find(each.name).title}: {{share}}", "", None)
+    return True
 
 
 def _not_found(made: _Corrections, found: Conclusion) -> None:
@@ -307,9 +321,17 @@ def _not_found(made: _Corrections, found: Conclusion) -> None:
         stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
         if kind not in tags or quantity in named or stated is None or stated.value == 0:
             continue
-        reason = hidden.get(quantity)
-        why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
-        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
+        _say_hidden(made, stated.name or tags[kind], stated, hidden.get(quantity))
+    names, reasons = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    for effect, numbers in made.of.model.effects.items():
+        for stated in numbers.values() if effect not in names else ():
+            if stated.value != 0:
+                _say_hidden(made, stated.name, stated, reasons.get(effect))
+
+
+def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | None) -> None:
+    why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
+    made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
 def _not_held(made: _Corrections, each: NamedEffect) -> None:
@@ -477,9 +499,11 @@ def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[st
             continue
         for span in own:
             raw = raw[: span.start] + edits[span] + raw[span.end :]
-        if own:
+        if own and made.of.model.format in _OF_XML:
             at = _root_at(file)
             raw = raw[:at] + _comment(changes, flights, raw) + raw[at:]
+        elif own:
+            raw = with_comment(file, raw, _comment_lines(changes, flights))
         found[file] = raw
     return found
 
@@ -497,13 +521,20 @@ def _root_at(file: Path) -> int:
             return at
 
 
-def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
-    """Write what was changed as a comment, with intervals and flights."""
-    lines = [f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:"]
-    lines += [
-        f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
-        for each in changes
+def _comment_lines(changes: Sequence[Change], flights: Sequence[str]) -> list[str]:
+    """Write what was changed, with intervals and flights."""
+    return [
+        f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:",
+        *(
+            f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
+            for each in changes
+        ),
     ]
+
+
+def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
+    """Write what was changed as a comment of XML."""
+    lines = _comment_lines(changes, flights)
     end = "\r\n" if b"\r\n" in raw else "\n"
     text = end.join(lines).replace("--", "- -")
     return f"<!-- {text} -->{end}".encode()

@@ -23,7 +23,10 @@ from cpfls_cli.simulators.literals import Numbers, toml_numbers
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel, of_one_body
 
 _RPM = 30 / pi
-CANNOT = ("its centre of mass: L is from there", "what differs between its rotors: it has one curve for all")
+CANNOT = (
+    "its centre of mass, and how high its rotors are: mixing_matrix and L are in the plane of that",
+    "what differs between its rotors: it has one curve for all",
+)
 
 
 def read_crazyflow(file: Path, section: str) -> SimulatorModel:

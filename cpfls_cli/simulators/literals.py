@@ -147,7 +147,7 @@ class Expressions:
                 return self._array(node, [self.value(part) for part in parts])
         called = self._called(node)
         if called is not None and called[0] in _ARRAYS:
-            return np.asarray(self._number(called[1]), dtype=float)
+            return np.asarray(self.value(called[1]), dtype=float)
         if called is not None:
             return _FUNCTIONS[called[0]](self._number(called[1]))
         raise _RefusedError(node, f"{_short(node)} is no number, nor arithmetic of them")
@@ -157,7 +157,8 @@ class Expressions:
             return parts
         if sum(np.size(part) for part in parts) > _MOST:
             raise _RefusedError(node, _TOO_MANY)
-        return np.array(parts, dtype=float)
+        # Of lists, sums and multiples are longer lists, so none of them is an array.
+        return np.array(parts, dtype=float).tolist()
 
     def _number(self, node: ast.expr) -> Any:
         value = self.value(node)
@@ -194,18 +195,18 @@ class Expressions:
             yield from self._leaf(node, key)
 
     def _leaf(self, node: ast.expr, key: Key) -> Iterator[tuple[Key, Stated]]:
-        value, where = self.value(node), f"{self.file.name} line {node.lineno}: {written(key)}"
+        value, where = self.value(node), f"{self.file.name} line {node.lineno}: "
         if value is None or isinstance(value, str | list):
             return
         if np.ndim(value):
-            words = f"{where}, which is an expression"
             for place in np.ndindex(np.shape(value)):
-                yield (*key, *place), Stated(float(value[place]), words, name=written((*key, *place)))
+                name = written((*key, *place))
+                yield (*key, *place), Stated(float(value[place]), f"{where}{name} (an expression)", name=name)
             return
         if not abs(value) < math.inf:
             raise _RefusedError(node, f"{written(key)} is {value:g}")
         ends = self.start(node.lineno, node.col_offset), self.start(node.end_lineno or 0, node.end_col_offset or 0)
-        yield key, Stated(float(value), where, Span(self.file, *ends), name=written(key))
+        yield key, Stated(float(value), where + written(key), Span(self.file, *ends), name=written(key))
 
 
 def _short(node: ast.AST) -> str:
@@ -386,3 +387,17 @@ def _holds(names: Expressions, defined: set[str], word: str, rest: str, line: in
         return bool(names.value(ast.parse(text.strip(), mode="eval").body))
     except (_RefusedError, SyntaxError, ArithmeticError, ValueError, TypeError, RecursionError, MemoryError):
         raise InputError(f"{names.file}, line {line}: the condition {rest!r} is not understood; resolve it") from None
+
+
+def with_comment(file: Path, raw: bytes, lines: Sequence[str]) -> bytes:
+    """Put a comment at the top of a file, behind lines that begin with ``#``; none into JSON that has none."""
+    end = "\r\n" if b"\r\n" in raw else "\n"
+    if file.suffix.lower() == ".h":
+        text = end.join(lines).replace("*/", "* /")
+        return f"/* {text} */{end}".encode() + raw
+    if file.suffix.lower() == ".json" and not re.search(rb"^[ \t]*#", raw, re.MULTILINE):
+        return raw
+    # A byte order mark, an interpreter and an encoding stay first.
+    first = re.match(rb"(?:\xef\xbb\xbf)?(?:#[^\r\n]*(?:\r\n|\r|\n))*", raw)
+    at = first.end() if first else 0
+    return raw[:at] + "".join(f"# {line}{end}" for line in lines).encode() + raw[at:]

@@ -265,7 +265,7 @@ def part_of(
 
 def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
     """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
-    return part_of(name, mass, entries, np.eye(4), [Stated(0.0, centre)] * 3)
+    return part_of(name, mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
 
 
 def turning(node: Node, what: str) -> InputError:
