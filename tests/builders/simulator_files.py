@@ -83,7 +83,7 @@ import numpy as np
 grams = {grams:.8g}
 d = {arm:.10g}  # Arm length, \u00e4hnlich
 side = d * np.cos(np.pi / 4)
-directions = np.array([1, -1, 1, -1])
+spins = np.array([-1, 1, -1, 1])
 
 quad_params = {{
     'mass': grams / 1000, 'Ixx': {x:.8g}, 'Iyy': {y:.8g}, 'Izz': {z:.8g},   # kg m^2
@@ -95,7 +95,7 @@ quad_params = {{
         'r3': [-side, side, 0.],
         'r4': np.array([side, side, 0.0]),
     }},
-    'rotor_directions': -directions,
+    'rotor_directions': -spins,
     'k_eta': {thrust:.8g},  # from a data sheet
     'k_m': {drag:.8g}, 'k_d': 0.0, 'tau_m': 0.02,
     'rotor_speed_min': 0, 'rotor_speed_max': 6000.0, 'name': "mine", 'aero': True,

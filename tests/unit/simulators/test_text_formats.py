@@ -117,8 +117,8 @@ def test_python_that_does_anything_else_is_refused(mine, line, words):
     [
         ("'mass'", "'weight'", "no dictionary with mass and k_eta"),
         ("'Ixx'", "'I_xx'", "states no quad_params.Ixx; write a number for it"),
-        ("[1, -1, 1, -1]", "[1, -1, 1]", "rotor_directions has 3 numbers; write 4"),
-        ("[1, -1, 1, -1]", "[1, -1, 2, -1]", "rotor_directions.2. is -2; write 1 or -1"),
+        ("[-1, 1, -1, 1]", "[1, -1, 1]", "rotor_directions has 3 numbers; write 4"),
+        ("[-1, 1, -1, 1]", "[1, -1, 2, -1]", "rotor_directions.2. .an expression. is -2; write 1 or -1"),
         ("'mass': grams / 1000", "'mass': float('inf')", "no number, nor arithmetic"),
         ("'mass': grams / 1000", "'mass': 45", "it cannot hover"),
         ("'mass': grams / 1000", "'mass': -1", "a mass of -1 kg"),
