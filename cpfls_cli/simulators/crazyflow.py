@@ -121,5 +121,5 @@ def _lag(rates: list[Stated], hover: float) -> Stated | None:
         return None
     main, other = rates if parts[0] >= parts[1] else rates[::-1]
     value = 1 / sum(parts)
-    rest = (replace(other, power=-1),) if other.value != 0 else ()
+    rest = (other,) if other.value != 0 else ()
     return Stated(value, f"{main.where}, in hover", main.span, main.value * value, -1, main.name, rest)

@@ -47,7 +47,7 @@ class Stated:
     name : str
         As files write it; empty where its format has one name for it.
     also : tuple of Stated
-        Other numbers of the file that change in proportion, such as the rest of a curve.
+        Other numbers, as the file has them, that change in proportion to that of the file, as the rest of a curve does.
     """
 
     value: float

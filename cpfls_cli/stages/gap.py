@@ -27,15 +27,16 @@ from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
-from cpfls_cli.simulators.corrected import corrected
-from cpfls_cli.simulators.formats import file_of, is_simulator_file, read_model
+from cpfls_cli.simulators.corrected import corrected, corrected_names
+from cpfls_cli.simulators.formats import is_simulator_file
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
-from cpfls_cli.stages.init import Stated, proposed
+from cpfls_cli.stages.init import Stated, proposed, taken
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -131,7 +132,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file)
+        found = _with_file(run, found, of_file, base.vehicle)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -150,8 +151,11 @@ def gap(
 
 def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
-    run.take({"simulator": file_of(file)})
-    stated = Stated(model=read_model(file))
+    stated = Stated(model=taken(run, file, "simulator"))
+    # Files that it includes may lie in the output folder, and none of them may be written over.
+    assert stated.model is not None, "it was just read"
+    names = corrected_names(stated.model.files).values()
+    run.outputs += [run.output / name for name in (_STUDY, *names)]
     logs = [path for path in flights if path.is_file() and not format_name(path)]
     made, _, text = proposed(run, logs, stated)
     if made.asked or made.vehicle is None:
@@ -167,10 +171,10 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf) -> Diagnosis:
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings) -> Diagnosis:
     """Put what was found into the simulator's file."""
     flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
-    said, files = corrected(of, run.study.vehicle, found, flights)
+    said, files = corrected(of, vehicle, found, flights)
     run.texts.update({run.output / name: text for name, text in files.items()})
     return replace(found, corrected=said)
 

@@ -111,9 +111,7 @@ class Stated:
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
-    """List the keys of the config that only a person can fill in; not those of rotors that a simulator's file has."""
-    if stated.model is not None and stated.model.rotors:
-        return ()
+    """List the keys of the config of logs that only a person can fill in."""
     keys = [] if stated.mass_kg is not None or stated.model is not None else ["vehicle.mass_kg"]
     airframe = proposal.airframe
     if not proposal.rotors:
@@ -141,9 +139,9 @@ class Proposed:
     @cached_property
     def asked(self) -> tuple[str, ...]:
         """Keys of the config that only a person can fill in."""
-        if self.proposal is not None:
-            return asked_keys(self.proposal, self.stated)
-        return () if self.vehicle is None else self.vehicle.asked
+        if self.vehicle is not None and (self.vehicle.model.rotors or self.proposal is None):
+            return self.vehicle.asked
+        return () if self.proposal is None else asked_keys(self.proposal, self.stated)
 
     @property
     def edits(self) -> str:
@@ -282,8 +280,7 @@ def init(
         raise InputError("Missing argument 'LOG...': give logs, or a simulator's file by --from, or both")
     file = None
     if model is not None:
-        run.take({"model": file_of(model)})
-        file = read_model(model)
+        file = taken(run, model, "model")
         _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
     stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
@@ -295,6 +292,14 @@ def init(
         # A config that asks for something is refused by every command until it is filled in.
         run.next += _next(run, proposal, given) if not made.asked else ()
     return made
+
+
+def taken(run: Run, model: Path, role: str) -> SimulatorModel:
+    """Read a simulator's file, which is an input of the run with all that it includes."""
+    run.take({role: file_of(model)})
+    read = read_model(model)
+    run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
+    return read
 
 
 def _refuse_stated(file: SimulatorModel, *given: object) -> None:
