@@ -7,11 +7,13 @@ between ``spin_min`` and ``spin_max`` of ``pwmMin`` to ``pwmMax``, lifts by
 x forward, y right, z down. Without positions the motors are those of the frame that is named on the command line, at
 ``diagonal_size`` from the middle, which the comments of such files have as the diameter.
 
-No speed of rotors is in it: a study's are commands times its largest speed, and thrust by squared speed is that of hover.
+It has no speed of rotors: a study's are commands times its largest speed, and thrust by squared speed is that of hover,
+as the slope of the yaw torque is, for torques cancel there.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, sqrt
 from pathlib import Path
 
@@ -59,7 +61,9 @@ def read_ardupilot(file: Path) -> SimulatorModel:
     if any(each is None or each.value == 0 for each in given):
         notes.append("it states no moment_inertia, for which ArduPilot takes half of the mass on a ring")
     moments = [
-        Stated(share * mass.value * (size.value / 2) ** 2, f"{file.name}: no moment_inertia", name=f"moment_inertia[{at}]")
+        Stated(
+            share * mass.value * (size.value / 2) ** 2, f"{file.name}: no moment_inertia", name=f"moment_inertia[{at}]"
+        )
         if notes
         else each
         for at, (share, each) in enumerate(zip(shares, given, strict=True))
@@ -88,8 +92,8 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
         return ()
     if not all(places):
         notes.append(
-            "it states no motorN_position: the motors of ArduPilot's X are taken, and diagonal_size for the arm, as SITL "
-            "does"
+            "it states no motorN_position: the motors of ArduPilot's X are taken, and diagonal_size for the arm, as "
+            "SITL does"
         )
     hover, expo, low, high = (_or_usual(numbers, key) for key in ("hoverThrOut", "propExpo", "spin_min", "spin_max"))
     if not 0 < hover.value <= 1 or not 0 <= expo.value <= 1 or not low.value < high.value:
@@ -108,36 +112,32 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
     # Torques of rotors cancel in hover, so their slope counts, and not their value.
     slope = hover.value + command * (1 - expo.value + 2 * expo.value * command)
     arm = _YAW_SHARE * size * slope / hover.value * turning / (2 * speed.value * (high.value - low.value))
-    thrust = Stated(
-        factor, f"{hover.where}, in hover", hover.span, hover.value * factor, -1, name="hoverThrOut"
-    )
+    thrust = Stated(factor, f"{hover.where}, in hover", hover.span, hover.value * factor, -1, name="hoverThrOut")
     most = Stated(lift / hover.value, f"{hover.where}: weight over it")
-    found = []
-    for motor in range(1, count + 1):
-        own = numbers.get(f"motor{motor}_yaw")
-        sign = own.value if own is not None and own.value != 0 else float(cross[motor - 1][2] if count == len(cross) else 0)
-        lever = arm * abs(sign)
-        where = f"{numbers.file.name}: no motor{motor}_yaw, for which ArduPilot takes 1 or -1" if own is None else own.where
-        found.append(
-            Rotor(
-                f"motor {motor}",
-                where,
-                hubs[motor - 1],
-                np.array([0.0, 0.0, 1.0]),
-                int(np.sign(sign)),
-                thrust=thrust,
-                ratio=Stated(
-                    lever,
-                    f"{where}, in hover",
-                    None if own is None else own.span,
-                    sign / lever if lever else 1.0,
-                    name=f"motor{motor}_yaw",
-                ),
-                speed_max=speed,
-                most=most,
-            )
+    yaws = [_yaw(numbers, motor, count) for motor in range(1, count + 1)]
+    return tuple(
+        Rotor(
+            f"motor {motor}",
+            yaw.where,
+            hub,
+            np.array([0.0, 0.0, 1.0]),
+            int(np.sign(yaw.value)),
+            thrust=thrust,
+            ratio=replace(yaw, value=arm * abs(yaw.value), scale=float(np.sign(yaw.value)) / arm),
+            speed_max=speed,
+            most=most,
         )
-    return tuple(found)
+        for motor, (hub, yaw) in enumerate(zip(hubs, yaws, strict=True), 1)
+    )
+
+
+def _yaw(numbers: Numbers, motor: int, count: int) -> Stated:
+    """Give the yaw factor of a motor, that of its frame where there is none or 0."""
+    own, cross = numbers.get(f"motor{motor}_yaw"), AUTOPILOTS["ardupilot"].cross
+    if own is not None and own.value != 0:
+        return own
+    turn = float(cross[motor - 1][2]) if count == len(cross) else 0.0
+    return Stated(turn, f"{numbers.file.name}: no motor{motor}_yaw, for which the frame has its own")
 
 
 def _hub(numbers: Numbers, motor: int, size: float, *, given: bool) -> list[float]:

@@ -341,7 +341,14 @@ def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
         return False
     for number in each.numbers:
         own = stated[number.name]
-        made.replace(own.name, own, _Found(number.value, number.low, number.high), f"{find(each.name).title}: {{share}}", "", None)
+        made.replace(
+            own.name,
+            own,
+            _Found(number.value, number.low, number.high),
+            f"{find(each.name).title}: {{share}}",
+            "",
+            None,
+        )
     return True
 
 

@@ -1,9 +1,9 @@
 """The Crazyflie's firmware: mass, arm and thrust in ``platform_defaults_*.h``, by the options that it is built with.
 
-As its ``power_distribution_quadrotor.c`` has it, motors lift along z at ``ARM_LENGTH`` from the middle on the diagonals,
-motor 1 in front on the right, motor 2 behind it, and turn the body by ``THRUST2TORQUE`` times their thrust, motors 1 and
-3 counter-clockwise. Thrust follows the volts of a motor by ``VMOTOR2THRUST``, and commands are shares of ``THRUST_MAX``,
-so the header states no thrust by speed, and no inertia.
+As its ``power_distribution_quadrotor.c`` has it, motors lift along z at ``ARM_LENGTH`` from the middle on the
+diagonals, motor 1 in front on the right, motor 2 behind it, and turn the body by ``THRUST2TORQUE`` times their thrust,
+motors 1 and 3 counter-clockwise. Thrust follows the volts of a motor by ``VMOTOR2THRUST``, and commands are shares of
+``THRUST_MAX``, so the header states no thrust by speed, and no inertia.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def read_crazyflie(file: Path, option: str) -> SimulatorModel:
     unknown = [Stated(0.0, f"{file.name}: no inertia")] * 6
     body = of_one_body("platform", numbers.need("CF_MASS"), unknown, f"{file.name}: no centre of mass")
     notes = (
-        f"options CONFIG_{option} and {_ALWAYS} count as set, and no other; {file.name}:THRUST_UPGRADE_KIT reads it with "
-        "another one",
+        f"options CONFIG_{option} and {_ALWAYS} count as set, and no other; {file.name}:CRAZYFLIE_THRUST_UPGRADE_KIT "
+        "reads it with that one in place of the first",
     )
     return SimulatorModel(file.stem, "crazyflie", (body,), rotors, CANNOT, notes, (file,))

@@ -40,7 +40,9 @@ def read_crazyflow(file: Path, section: str) -> SimulatorModel:
     numbers = toml_numbers(file)
     sections = [str(name) for name in numbers.below() if "mass" in numbers.below(name)]
     if not sections:
-        raise InputError(f"{file}: has no section that states a mass; give drone_models/data/params.toml, or one like it")
+        raise InputError(
+            f"{file}: has no section that states a mass; give drone_models/data/params.toml, or one like it"
+        )
     if section not in sections and (section or len(sections) > 1):
         raise InputError(f"{file}: has the vehicles {', '.join(sections)}; name one of them, as {file}:{sections[0]}")
     name = section or sections[0]

@@ -81,7 +81,9 @@ class Numbers:
 
     def below(self, *key: str | int) -> list[str | int]:
         """List the names under one, in the order of the file."""
-        return list(dict.fromkeys(own[len(key)] for own in self.found if own[: len(key)] == key and len(own) > len(key)))
+        return list(
+            dict.fromkeys(own[len(key)] for own in self.found if own[: len(key)] == key and len(own) > len(key))
+        )
 
     def row(self, *key: str | int, count: int, scale: float = 1.0) -> list[Stated]:
         """Find a list of numbers."""
@@ -124,8 +126,8 @@ class Expressions:
         match node:
             case ast.Constant(value=bool() | str() | None):
                 return node.value
-            case ast.Constant(value=int() | float()):
-                return float(node.value)
+            case ast.Constant(value=int() | float() as number):
+                return float(number)
             case ast.Name(id=name) if name in self.values:
                 return self.values[name]
             case ast.Name(id=name) if name in _WORDS:
@@ -263,8 +265,9 @@ def python_numbers(file: Path) -> Numbers:
                     continue
                 case ast.Import(names=imported) if all(each.name in _MODULES for each in imported):
                     names.modules |= {each.asname or each.name for each in imported}
-                case ast.Assign(targets=[ast.Name(id=name)], value=node) | ast.AnnAssign(
-                    target=ast.Name(id=name), value=ast.expr() as node
+                case (
+                    ast.Assign(targets=[ast.Name(id=name)], value=node)
+                    | ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as node)
                 ) if name not in names.nodes:
                     names.assign(name, node)
                     yield (name,), node
@@ -320,7 +323,7 @@ def toml_numbers(file: Path) -> Numbers:
 
 def _at(held: Any, key: Key) -> Any:
     for each in key:
-        held = held.get(each) if isinstance(held, dict) else held[each] if isinstance(held, list) else None
+        held = held.get(each) if isinstance(held, dict) else held[int(each)] if isinstance(held, list) else None
     return held
 
 

@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Stated
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 GRAVITY = 9.81
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -266,6 +267,31 @@ def part_of(
 def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
     """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
     return part_of(name, mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
+
+
+def of_settings(file: Path, vehicle: VehicleSettings, lag_s: float) -> SimulatorModel:
+    """Take what flights found of a vehicle for a model as a simulator's file states one."""
+    where = f"{file.name}: as flights have it"
+    entries = [Stated(value, where) for value in (*vehicle.inertia_kg_m2, 0.0, 0.0, 0.0)[:6]]
+    lag = Stated(lag_s, where) if lag_s > 0 else None
+    rotors = tuple(
+        Rotor(
+            f"rotor {index}",
+            where,
+            np.array(rotor.position_m),
+            np.array([0.0, 0.0, 1.0]),
+            rotor.spin,
+            thrust=Stated(rotor.thrust_factor_n_s2, where),
+            torque=Stated(rotor.drag_factor_n_m_s2, where),
+            speed_max=Stated(vehicle.rotor_speed_max_rad_s, where),
+            lag_up=lag,
+            lag_down=lag,
+        )
+        for index, rotor in enumerate(vehicle.rotors, 1)
+    )
+    body = of_one_body(file.stem, Stated(vehicle.mass_kg, f"{file.name}: of its config"), entries, where)
+    cannot = ("what effects it has: `cpfls gap` takes the file itself with all of them",)
+    return SimulatorModel(file.stem, "vehicle", (body,), rotors, cannot, (), (file,))
 
 
 def turning(node: Node, what: str) -> InputError:

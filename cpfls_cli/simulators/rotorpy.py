@@ -1,8 +1,8 @@
 """RotorPy: the dictionary of numbers that its ``Multirotor`` takes, in a module of Python that is read, not executed.
 
-Its equations, as published with it (``multirotor.py``): with rotor speeds w in rad/s and velocities u of the hubs through
-the air, ``k_eta w^2 + k_h (u_x^2 + u_y^2)`` is the thrust along z, ``rotor_directions k_m w^2`` the torque on the body
-about z, ``-w (k_d u_x, k_d u_y, k_z u_z)`` the drag of a rotor, ``-k_flap w (u_y, -u_x, 0)`` its flapping moment, and
+Its equations, as published with it (``multirotor.py``): with rotor speeds w in rad/s and velocities u of the hubs
+through the air, ``k_eta w^2 + k_h (u_x^2 + u_y^2)`` is the thrust along z, ``rotor_directions k_m w^2`` the torque on
+the body about z, ``-w (k_d u_x, k_d u_y, k_z u_z)`` the drag of a rotor, ``-k_flap w (u_y, -u_x, 0)`` its flapping moment, and
 ``-|v| (c_Dx v_x, c_Dy v_y, c_Dz v_z)`` the drag of the frame; speeds follow commands with ``tau_m``.
 """
 
@@ -40,7 +40,9 @@ def read_rotorpy(file: Path) -> SimulatorModel:
     names = [str(name) for name in numbers.below() if {"mass", "k_eta"} <= set(numbers.below(name))]
     if len(names) != 1:
         many = f"several dictionaries with mass and k_eta, {', '.join(names)}; keep one" if names else ""
-        raise InputError(f"{file}: has {many or 'no dictionary with mass and k_eta, as quad_params of RotorPy; give one'}")
+        raise InputError(
+            f"{file}: has {many or 'no dictionary with mass and k_eta, as quad_params of RotorPy; give one'}"
+        )
     (name,) = names
     body = of_one_body(
         name,

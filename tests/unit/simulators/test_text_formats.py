@@ -100,8 +100,8 @@ def test_python_states_numbers_and_their_places(mine):
         ("aa = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "\n".join(
             f"{2 * chr(98 + i)} = [" + ", ".join([2 * chr(97 + i)] * 10) + "]" for i in range(8)), "more numbers than"),
         ("aa = {}\n" + "\n".join(
-            f"{2 * chr(98 + i)} = {{" + ", ".join(f"'{k}': {2 * chr(97 + i)}" for k in "0123456789") + "}" for i in range(9)),
-         "more numbers than"),
+            f"{2 * chr(98 + i)} = {{" + ", ".join(f"'{k}': {2 * chr(97 + i)}" for k in range(10)) + "}"
+            for i in range(9)), "more numbers than"),
         ("quad_params['mass'] = 1", "states no number"),
     ],
 )  # fmt: skip
@@ -156,8 +156,16 @@ def test_a_section_of_toml(mine):
         ("params.toml", lambda text: text, "has the vehicles a, b; name one of them, as .*params.toml:a"),
         ("params.toml:c", lambda text: text, "has the vehicles a, b"),
         ("params.toml:a", lambda text: text.replace("L =", "L"), "is no valid TOML"),
-        ("params.toml:a", lambda text: text.replace("L = ", 'L = "', 1).replace("0.0325", '0.0325"', 1), "states no a.L"),
-        ("params.toml:a", lambda text: text.replace("L = ", "day = 1979-05-27\nL = ", 1), "is no TOML of plain numbers"),
+        (
+            "params.toml:a",
+            lambda text: text.replace("L = ", 'L = "', 1).replace("0.0325", '0.0325"', 1),
+            "states no a.L",
+        ),
+        (
+            "params.toml:a",
+            lambda text: text.replace("L = ", "day = 1979-05-27\nL = ", 1),
+            "is no TOML of plain numbers",
+        ),
         ("params.toml:a", lambda text: text.replace("mass", "kg"), "has no section that states a mass"),
         ("params.toml:a", lambda text: text.replace("2.5e-10", "-2.5e-10"), "no speed lifts"),
     ],
