@@ -22,7 +22,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 from pathlib import Path
@@ -33,7 +33,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Quantity
 from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import visible
+from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
@@ -43,6 +45,7 @@ from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.vehicle.rotors import gain_modes
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import joined
 
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
@@ -162,6 +165,7 @@ class _Corrections:
     changes: dict[tuple[str, str, float, float], tuple[Change, list[str]]] = field(default_factory=dict)
     unchanged: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
+    turned: list[int] = field(default_factory=list)
 
     @property
     def names(self) -> dict[Path, str]:
@@ -177,8 +181,9 @@ class _Corrections:
 
     @property
     def rotors(self) -> list[Rotor]:
-        """In the order of the study."""
-        return [self.of.model.rotors[index] for index in self.of.order]
+        """In the order of the study; the sign of a yaw torque is that of the turn as corrected."""
+        found = [self.of.model.rotors[index] for index in self.of.order]
+        return [_turned_round(rotor) if place in self.turned else rotor for place, rotor in enumerate(found)]
 
     def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
         """Put a number in the place of the stated one, where that is outside the interval."""
@@ -265,7 +270,7 @@ class _Corrections:
 
 
 def corrected(
-    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[str]
+    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[Recording]
 ) -> tuple[Corrected, dict[str, bytes]]:
     """Put what a diagnosis names into a simulator's file: what there is to say, and the files by name.
 
@@ -273,10 +278,12 @@ def corrected(
     ----------
     vehicle : VehicleSettings
         That flights were compared with: of the study that was made of the file, or one that was given.
-    flights : sequence of str
-        Names of the flights that it was found in.
+    flights : sequence of Recording
+        That it was found in.
     """
     made = _Corrections(of, vehicle, sum(len(each.numbers) for each in found.effects))
+    if not found.contradictions:
+        _directions(made, [each.signals for each in flights])
     if found.verdict in _WRITES and not found.contradictions:
         sure = [each for each in found.effects if each.name not in found.rivals]
         for each in found.effects:
@@ -290,7 +297,7 @@ def corrected(
     elif found.contradictions:
         made.unchanged.append("the log or its vehicle contradicts itself, so nothing is put in")
     changes = tuple(_said(change, whom) for change, whom in made.changes.values())
-    files = _written(made, changes, flights)
+    files = _written(made, changes, [each.name for each in flights])
     names = made.names
     texts = {names[file]: text for file, text in files.items()}
     diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
@@ -313,6 +320,47 @@ def _sizes(change: Change) -> dict[str, str]:
     share = change.after / change.before - 1 if change.before else 0.0
     more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
     return {"share": more if change.before else "not 0"}
+
+
+def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
+    """Turn rotors round that the log has turn the other way, where flights show each of them by itself."""
+    if not made.of.turned:
+        return
+    measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
+    turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
+    for place in made.of.turned:
+        rotor, spin = made.rotors[place], made.of.spins[place]
+        # The body turns against its rotors.
+        shown, whom = _Found(-turns[place], -turns[place] - half[place], -turns[place] + half[place]), f"M{place + 1}"
+        size = f"{shown.value:.2g} [{shown.low:.2g}, {shown.high:.2g}]"
+        way = "counter-clockwise" if spin > 0 else "clockwise"
+        says = f"{whom} turns {way}: fitted by itself, its yaw torque is {size} times the mean of all rotors"
+        if spin * shown.value < 0 or not shown.contradicts(0.0, made.wider):
+            made.unchanged.append(
+                f"the direction of {whom}: the log has it turn {way}, and flights do not show it ({size})"
+            )
+        elif rotor.turn is None or rotor.turn.span is None:
+            where = "the format states no direction" if rotor.turn is None else rotor.turn.where
+            made.elsewhere.append(f"{says}; {where}: turn it round there")
+        else:
+            span, is_word = rotor.turn.span, made.of.model.format == "sdf"
+            old = raw_bytes(span.file)[span.start : span.end]
+            flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
+            made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
+            name = "turningDirection" if is_word else "gear yaw"
+            after = -rotor.turn.value
+            numbers = (rotor.turn.value, after, *shown.times(after * spin)[1:])
+            made.note(span.file, name, rotor.turn.where, numbers, says, whom)
+            made.turned.append(place)
+
+
+def _turned_round(rotor: Rotor) -> Rotor:
+    """Change the sign of a yaw torque whose number in the file has that of the turn."""
+    ratio, torque = (
+        replace(own, scale=-own.scale) if own and rotor.turn and own.span == rotor.turn.span else own
+        for own in (rotor.ratio, rotor.torque)
+    )
+    return replace(rotor, ratio=ratio, torque=torque)
 
 
 def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:

@@ -119,7 +119,7 @@ class Node:
     ) -> list[Stated]:
         """Read the numbers of its text, or of an attribute or what it is by default, each with its place."""
         text = self.text if attribute is None else self.attributes.get(attribute, usual)
-        words, spans = text.split(), self._spans(attribute)
+        words, spans = text.split(), self.spans(attribute)
         try:
             values = [float(word) for word in words]
         except ValueError:
@@ -149,7 +149,8 @@ class Node:
         """Its first tag in the file; the group is the slash of one that is closed at once."""
         return _TAG.match(raw_bytes(self.file), self.start)
 
-    def _spans(self, attribute: str | None) -> list[Span | None]:
+    def spans(self, attribute: str | None = None) -> list[Span | None]:
+        """Find the words of its text, or of an attribute, in the file."""
         raw, tag = raw_bytes(self.file), self.opening
         if tag is None:
             return []

@@ -342,6 +342,7 @@ def _rotor(node: Node, own: Mapping[str, str], gear: list[Stated], gain: float, 
         else None,
         lag_up=lagging,
         lag_down=lagging,
+        turn=replace(turn, where=words) if turns else None,
         node=node,
     )
 

@@ -78,6 +78,8 @@ class Rotor:
         Yaw torque over squared speed, where that is what the file states.
     most : Stated or None, N
         Largest thrust, where controls are thrusts.
+    turn : Stated or None
+        Where its spin stands.
     node : Node or None
         The element that holds its numbers, to put something into.
     """
@@ -96,6 +98,7 @@ class Rotor:
     lag_down: Stated | None = None
     drag: Stated | None = None
     rolling: Stated | None = None
+    turn: Stated | None = None
     node: Node | None = None
 
     @property

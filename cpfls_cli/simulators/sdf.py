@@ -281,9 +281,10 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
     name = scope + _text(plugin, "linkName")
     if name not in placed:
         raise plugin.error(f"its link {name!r} is not a part of the vehicle; correct <linkName>")
-    turning = _text(plugin, "turningDirection")
-    if turning not in ("ccw", "cw"):
-        raise plugin.error(f"turningDirection is {turning!r}; write ccw or cw")
+    turn = plugin.first("turningDirection")
+    if turn is None or turn.text.strip() not in ("ccw", "cw"):
+        raise plugin.error(f"turningDirection is {_text(plugin, 'turningDirection')!r}; write ccw or cw")
+    spin = 1 if turn.text.strip() == "ccw" else -1
     if _text(plugin, "motorType") not in ("", "velocity"):
         raise plugin.error(f"motorType is {_text(plugin, 'motorType')!r}; the plugin knows velocity alone: write that")
     found = {tag: _stated(plugin, tag) for tag in DEFAULTS}
@@ -295,7 +296,7 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
         f"{plugin.file.name} line {plugin.line}: motor plugin of {name}",
         placed[name].centre,
         (inverse @ parts.pose(name))[:3, 2],
-        1 if turning == "ccw" else -1,
+        spin,
         thrust=found["motorConstant"],
         ratio=found["momentConstant"],
         speed_max=found["maxRotVelocity"],
@@ -303,6 +304,7 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
         lag_down=found["timeConstantDown"],
         drag=found["rotorDragCoefficient"],
         rolling=found["rollingMomentCoefficient"],
+        turn=Stated(spin, turn.where, next(iter(turn.spans()), None)),
         node=plugin,
     )
 

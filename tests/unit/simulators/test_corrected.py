@@ -28,6 +28,9 @@ PROP = """  <link name="prop{index}_link"><inertial><origin xyz="{x} {y} 0"/><ma
 """
 
 
+ONE, TWO = (SimpleNamespace(name=f"{name}.csv", signals=None) for name in ("one", "two"))
+
+
 def urdf():
     places = ((1, -1), (-1, -1), (-1, 1), (1, 1))
     props = "".join(PROP.format(index=i, x=0.0325 * x, y=0.0325 * y) for i, (x, y) in enumerate(places))
@@ -63,7 +66,7 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(),
     found = SimpleNamespace(
         verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects, not_excited=hidden
     )
-    said, files = corrected(of, vehicle, found, ["one.csv", "two.csv"])
+    said, files = corrected(of, vehicle, found, [ONE, TWO])
     (path.parent / "new").mkdir(exist_ok=True)
     for name, content in files.items():
         (path.parent / "new" / name).write_bytes(content)
@@ -289,7 +292,7 @@ def test_inertia_and_centre_of_mjcf(tmp_path):
         effect("rotor_drag", k_d=(1e-5, 1e-6)),
     )
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, vehicle, found, ["one.csv"])
+    said, files = corrected(of, vehicle, found, [ONE])
     (new,) = files.values()
     assert b'pos="0.002 0 0" mass="0.045" diaginertia="4.438e-05 4.2e-5 6.6e-5"/> <!-- by CAD -->' in new
     assert [each.element for each in said.changes] == ["ixx", "pose x"]
@@ -346,7 +349,7 @@ def test_thrusts_as_controls_leave_the_ratio_to_correct(tmp_path):
     of = of_log(read_model(path), None, None)
     effects = (effect("drag_factor_error", error=0.25), effect("rotor_mismatch", difference_1=(0.1, 0.001)))
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, SMALL.vehicle, found, ["one.csv"])
+    said, files = corrected(of, SMALL.vehicle, found, [ONE])
     assert re.findall(rb'gear="0 0 1 0 0 (\S+)"', files["cf2.xml"]) == [b"0.0075", b"-0.0075", b"0.0075", b"-0.0075"]
     assert [each.element for each in said.changes] == ["gear yaw"] * 2
     assert said.elsewhere[0].startswith(
@@ -360,7 +363,7 @@ def test_what_was_found_counts_from_the_vehicle_that_was_given(mine):
     other = SMALL._replace(thrust_factor=1e-8, inertia=(5e-5, 4.2e-5, 6.6e-5)).vehicle
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("parameter_error", inertia_x=0.1, thrust_scale=0.5),))  # fmt: skip
-    _, files = corrected(of, other, found, ["one.csv"])
+    _, files = corrected(of, other, found, [ONE])
     (mine.parent / "new.sdf").write_bytes(files["mine.sdf"])
     new = read_model(mine.parent / "new.sdf")
     assert new.rotors[0].thrust.value == pytest.approx(1.5e-8)
@@ -394,7 +397,7 @@ def test_no_name_of_a_log_ends_the_comment(mine, name):
     of = of_log(read_model(mine), None, None)
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("drag_factor_error", error=0.25),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [name])
+    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name, signals=None)])
     comment = files["mine.sdf"].decode("ascii").partition("<!-- Corrected")[2].partition("-->")[0]
     assert "--" not in comment
     assert comment.endswith(" ")
@@ -419,7 +422,7 @@ def test_each_file_says_its_own_changes(tmp_path):
     of = of_log(read_model(path), None, None)
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, ["one.csv"])
+    _, files = corrected(of, SMALL.vehicle, found, [ONE])
     assert list(files) == ["model.sdf", "base-model.sdf"]
     own, base = (text.decode().partition("<!-- Corrected")[2].partition("-->")[0] for text in files.values())
     assert "motorConstant" in own
