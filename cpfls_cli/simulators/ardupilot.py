@@ -126,6 +126,7 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
             ratio=replace(yaw, value=arm * abs(yaw.value), scale=float(np.sign(yaw.value)) / arm),
             speed_max=speed,
             most=most,
+            turn=yaw,
         )
         for motor, (hub, yaw) in enumerate(zip(hubs, yaws, strict=True), 1)
     )

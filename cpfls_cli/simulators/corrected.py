@@ -347,7 +347,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             old = raw_bytes(span.file)[span.start : span.end]
             flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
             made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
-            name = "turningDirection" if is_word else "gear yaw"
+            name = rotor.turn.name or ("turningDirection" if is_word else "gear yaw")
             after = -rotor.turn.value
             numbers = (rotor.turn.value, after, *shown.times(after * spin)[1:])
             made.note(span.file, name, rotor.turn.where, numbers, says, whom)

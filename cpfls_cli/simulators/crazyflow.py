@@ -88,6 +88,7 @@ def _rotors(numbers: Numbers, name: str, weight: float) -> tuple[tuple[Rotor, ..
             lag_up=_lag(dynamics[:2], hover),
             lag_down=_lag(dynamics[2:], hover),
             drag=drag,
+            turn=mixing[2][index],
         )
         for index in range(count)
     )

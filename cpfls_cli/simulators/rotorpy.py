@@ -2,8 +2,8 @@
 
 Its equations, as published with it (``multirotor.py``): with rotor speeds w in rad/s and velocities u of the hubs
 through the air, ``k_eta w^2 + k_h (u_x^2 + u_y^2)`` is the thrust along z, ``rotor_directions k_m w^2`` the torque on
-the body about z, ``-w (k_d u_x, k_d u_y, k_z u_z)`` the drag of a rotor, ``-k_flap w (u_y, -u_x, 0)`` its flapping moment, and
-``-|v| (c_Dx v_x, c_Dy v_y, c_Dz v_z)`` the drag of the frame; speeds follow commands with ``tau_m``.
+the body about z, ``-w (k_d u_x, k_d u_y, k_z u_z)`` the drag of a rotor, ``-k_flap w (u_y, -u_x, 0)`` its flapping
+moment, and ``-|v| (c_Dx v_x, c_Dy v_y, c_Dz v_z)`` the drag of the frame; speeds follow commands with ``tau_m``.
 """
 
 from __future__ import annotations
@@ -86,6 +86,7 @@ def _rotors(numbers: Numbers, name: str) -> tuple[Rotor, ...]:
                 lag_up=lag,
                 lag_down=lag,
                 drag=_or_zero(numbers, name, "k_d"),
+                turn=direction,
             )
         )
     return tuple(found)

@@ -52,7 +52,7 @@ ConfigArgument = Annotated[
     Path,
     typer.Argument(
         metavar="CONFIG",
-        help="Study config (YAML); or a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow), which is "
+        help="Study config (YAML); a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow), which is "
         "corrected; or vehicle.h5.",
         show_default=False,
     ),
