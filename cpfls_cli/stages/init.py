@@ -347,7 +347,8 @@ def proposed(
     text, whole = config_text(made), not made.asked
     if whole and stated.knows_constants:
         # Numbers that the log's rotors make impossible, such as a thrust that lifts nothing.
-        validate(parse_config(text, str(run.output)), str(run.output))
+        name = str(run.output) if model is None else f"{model.file}, as a config"
+        validate(parse_config(text, name), name)
     if proposal is None:
         return made, given, text
     wrong, doubted = _parted(_findings(text, given[0], whole=whole), guessed_keys(proposal))

@@ -176,13 +176,15 @@ def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_
     result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert result.exit_code == 0, result.stderr
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
-    # Still: nothing of its motion says which rotor is which.
-    lines = (folder / "log0.csv").read_text().splitlines()
-    still = [",".join([line.partition(",")[0], *lines[1].split(",")[1:]]) for line in lines[1:]]
-    (tmp_path / "still.csv").write_text("\n".join([lines[0], *still]))
-    result = cpfls("init", "--from", mine, tmp_path / "still.csv", "-o", tmp_path / "asked.yaml", "--json")
+    # Rotors of another time say nothing of the motion.
+    header, *rows = (folder / "log0.csv").read_text().splitlines()
+    mixed = [
+        ",".join([*row.split(",")[:13], *late.split(",")[13:]]) for row, late in zip(rows, rows[::-1], strict=True)
+    ]
+    (tmp_path / "mixed.csv").write_text("\n".join([header, *mixed]))
+    result = cpfls("init", "--from", mine, tmp_path / "mixed.csv", "-o", tmp_path / "asked.yaml", "--json")
     assert json.loads(result.stdout)["asked"] == ["vehicle.rotors.0.spin"]
     assert "spin: ASK" in (tmp_path / "asked.yaml").read_text()
-    (message,) = refuse("gap", mine, tmp_path / "still.csv", "-o", tmp_path / "gap")
+    (message,) = refuse("gap", mine, tmp_path / "mixed.csv", "-o", tmp_path / "gap")
     assert "does not state all that a gap needs; `cpfls init --from" in message
     assert "write spin of M1 in place of ASK" in message
