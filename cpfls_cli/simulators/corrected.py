@@ -39,6 +39,7 @@ from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
+from cpfls_cli.simulators.literals import with_comment
 from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
@@ -51,11 +52,16 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+_OF_XML = ("sdf", "urdf", "mjcf")
 _ROUNDING = 1e-9
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
     "mjcf": "data.xfrc_applied of the body at each step",
+    "rotorpy": "a class of your own under Multirotor, whose compute_body_wrench adds it",
+    "ardupilot": "lines of your own in SIM_Frame.cpp",
+    "crazyflow": "dist_f and dist_t at each step",
+    "crazyflie": "nothing: the firmware has no model of it",
 }
 _TAGS = {
     "sdf": {
@@ -68,6 +74,16 @@ _TAGS = {
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
     "mjcf": {"thrust": "gear z", "torque": "gear yaw", "ratio": "gear yaw"},
+    "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
+    "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
+    "crazyflow": {
+        "thrust": "rpm2thrust",
+        "torque": "rpm2torque",
+        "lag_up": "rotor_dyn_coef",
+        "lag_down": "rotor_dyn_coef",
+        "drag": "drag_matrix",
+    },
+    "crazyflie": {"ratio": "THRUST2TORQUE"},
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
 _NOT_STATED = {
@@ -75,6 +91,8 @@ _NOT_STATED = {
     "urdf": "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
     "forces and torques that you apply",
     "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
+    "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
+    "crazyflie": "thrust follows the volts of a motor; scale VMOTOR2THRUST0 to VMOTOR2THRUST3 by it",
 }
 """Why thrust or yaw torque of rotors is not put in, and what would do it."""
 
@@ -169,8 +187,9 @@ class _Corrections:
 
     def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
         """Put a number in the place of the stated one, where that is outside the interval."""
-        new, low, high = found.times(stated.scale)
-        before, text = stated.scale * stated.value, f"{new:.4g}"
+        new, low, high = (stated.written(each) for each in found)
+        low, high, name = min(low, high), max(low, high), stated.name or name
+        before, text = stated.written(stated.value), f"{new:.4g}"
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -178,6 +197,11 @@ class _Corrections:
         elif stated.span is not None:
             self.edits[stated.span] = text.encode()
             self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
+            for other in stated.also:
+                # An entry of a matrix that stands twice may be 0, and is the same then.
+                share = other.value / before if before else 1.0
+                same = share * new, *sorted((share * low, share * high))
+                self.replace(name, other, _Found(*same), words, whom, None)
         elif room is not None and self.of.model.format == "sdf":
             self.put(room, f"<{name}>{text}</{name}>")
             self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
@@ -231,7 +255,7 @@ class _Corrections:
         held: list[Stated] = [own for rotor in self.rotors if (own := getattr(rotor, kind)) is not None]
         if name is None or not held or len(held) < len(self.rotors):
             return False
-        wanted = [f"{own.scale * each.value:.4g}" for own, each in zip(held, found, strict=True)]
+        wanted = [f"{own.written(each.value):.4g}" for own, each in zip(held, found, strict=True)]
         for index, own in enumerate(held):
             alike = [other for other, each in enumerate(held) if own.span is not None and each.span == own.span]
             new = found[index]
@@ -322,7 +346,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             old = raw_bytes(span.file)[span.start : span.end]
             flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
             made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
-            name = "turningDirection" if is_word else "gear yaw"
+            name = rotor.turn.name or ("turningDirection" if is_word else "gear yaw")
             after = -rotor.turn.value
             numbers = (rotor.turn.value, after, *shown.times(after * spin)[1:])
             made.note(span.file, name, rotor.turn.where, numbers, says, whom)
@@ -350,10 +374,29 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
         held = quantity == "scales" or (
             rule is not None and rule(made, {number.name: number for number in each.numbers})
         )
+        held = held or _of_formula(made, each)
         if not held and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
+    """Correct the numbers of an effect whose very formula the simulator has; False where it has not."""
+    stated = made.of.model.effects.get(each.name)
+    if stated is None or any(number.name not in stated for number in each.numbers):
+        return False
+    for number in each.numbers:
+        own = stated[number.name]
+        made.replace(
+            own.name,
+            own,
+            _Found(number.value, number.low, number.high),
+            f"{find(each.name).title}: {{share}}",
+            "",
+            None,
+        )
+    return True
 
 
 def _not_found(made: _Corrections, found: Conclusion) -> None:
@@ -365,9 +408,17 @@ def _not_found(made: _Corrections, found: Conclusion) -> None:
         stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
         if kind not in tags or quantity in named or stated is None or stated.value == 0:
             continue
-        reason = hidden.get(quantity)
-        why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
-        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
+        _say_hidden(made, stated.name or tags[kind], stated, hidden.get(quantity))
+    names, reasons = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    for effect, numbers in made.of.model.effects.items():
+        for stated in numbers.values() if effect not in names else ():
+            if stated.value != 0:
+                _say_hidden(made, stated.name, stated, reasons.get(effect))
+
+
+def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | None) -> None:
+    why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
+    made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
 def _not_held(made: _Corrections, each: NamedEffect) -> None:
@@ -572,10 +623,12 @@ def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[st
             continue
         for span in own:
             raw = raw[: span.start] + edits[span] + raw[span.end :]
-        if own:
+        own_changes = [change for change in changes if change.file == made.names[file]]
+        if own and made.of.model.format in _OF_XML:
             at = _root_at(file)
-            own_changes = [change for change in changes if change.file == made.names[file]]
-            raw = raw[:at] + _comment(own_changes, flights, raw) + raw[at:]
+            raw = raw[:at] + _comment(_comment_lines(own_changes, flights), raw) + raw[at:]
+        elif own:
+            raw = with_comment(file, raw, _comment_lines(own_changes, flights))
         found[file] = raw
     return found
 
@@ -593,13 +646,19 @@ def _root_at(file: Path) -> int:
             return at
 
 
-def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
-    """Write what was changed as a comment, with intervals and flights."""
-    lines = [f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:"]
-    lines += [
-        f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
-        for each in changes
+def _comment_lines(changes: Sequence[Change], flights: Sequence[str]) -> list[str]:
+    """Write what was changed, with intervals and flights."""
+    return [
+        f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:",
+        *(
+            f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
+            for each in changes
+        ),
     ]
+
+
+def _comment(lines: Sequence[str], raw: bytes) -> bytes:
+    """Write what was changed as a comment of XML."""
     end = "\r\n" if b"\r\n" in raw else "\n"
     # Two hyphens end a comment, and files are in many encodings.
     text = re.sub("-(?=-)", "- ", end.join(map(visible, lines)))

@@ -15,7 +15,16 @@ from cpfls_cli.flightlog.proposal import Proposal
 from cpfls_cli.simulators.document import Stated
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 
-_PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
+_PROGRAMS = {
+    "sdf": "Gazebo",
+    "urdf": "gym-pybullet-drones",
+    "mjcf": "MuJoCo",
+    "rotorpy": "RotorPy",
+    "ardupilot": "ArduPilot's SITL",
+    "crazyflow": "crazyflow",
+    "crazyflie": "the Crazyflie's firmware",
+    "vehicle": "cpfls",
+}
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -60,6 +69,8 @@ class VehicleOf:
     spins: tuple[int, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    by_speed: bool = True
+    """Whether the speeds of the log are those that the file's thrust goes by."""
 
     @property
     def program(self) -> str:
@@ -72,9 +83,9 @@ class VehicleOf:
         return _short(self.model.centre.tolist())
 
     @property
-    def inertia(self) -> list[float]:
-        """Moments of inertia, kg m^2, and products where there are any."""
-        return _short(list(self.model.moments))
+    def inertia(self) -> list[float] | None:
+        """Moments of inertia, kg m^2, and products where there are any; None where the file states none."""
+        return _short(list(self.model.moments)) if self.model.states_inertia else None
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -100,8 +111,9 @@ class VehicleOf:
         hubs, found = self.model.hubs, []
         for index, spin in zip(self.order, self.spins, strict=True):
             rotor = self.model.rotors[index]
-            thrust = None if rotor.thrust is None else rotor.thrust.value
-            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor))
+            thrust = rotor.thrust.value if rotor.thrust is not None and self.by_speed else None
+            drag = rotor.drag_factor if self.by_speed else None
+            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, drag))
             comment = f"{rotor.name}, {rotor.where}"
             comment += "; it turns the other way there" if spin * rotor.spin < 0 else ""
             found.append(RotorLine(_short(hubs[index].tolist()), spin, thrust, drag, comment))
@@ -111,7 +123,9 @@ class VehicleOf:
         """Say where a quantity of the first rotor stands."""
         rotor = self.model.rotors[self.order[0]]
         if quantity == "thrust":
-            return "not stated, for controls are thrusts" if rotor.thrust is None else rotor.thrust.where
+            if not self.by_speed:
+                return "by command, and the log has speeds"
+            return "not stated by speed" if rotor.thrust is None else rotor.thrust.where
         stated = rotor.torque or rotor.ratio
         ratio = f", {rotor.ratio.value:g} m times the thrust" if rotor.ratio is not None else ""
         return "not stated" if stated is None else f"{stated.where}{ratio}"
@@ -164,9 +178,9 @@ def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | No
         warnings += turned
     speed, where = _speed(model, proposal)
     mass = model.mass_kg if mass_kg is None else mass_kg
-    return VehicleOf(
-        model, mass_kg is not None, _short([mass])[0], speed, where, order, spins, tuple(notes), tuple(warnings)
-    )
+    by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
+    given, short = mass_kg is not None, _short([mass])[0]
+    return VehicleOf(model, given, short, speed, where, order, spins, tuple(notes), tuple(warnings), by_speed)
 
 
 def _order(model: SimulatorModel, airframe: Airframe) -> tuple[tuple[int, ...], str]:
