@@ -167,7 +167,7 @@ class _Corrections:
     elsewhere: list[str] = field(default_factory=list)
     turned: list[int] = field(default_factory=list)
 
-    @property
+    @cached_property
     def names(self) -> dict[Path, str]:
         """Of the corrected files, by those that were given."""
         return corrected_names(self.of.model.files)
@@ -312,14 +312,12 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
-    from_to = f"{whom[0]} to {whom[-1]}" if len(whom) > 2 else joined(list(dict.fromkeys(whom)))
-    return Change(**{**vars(change), "sentence": change.sentence.format(whom=from_to, **_sizes(change))})
-
-
-def _sizes(change: Change) -> dict[str, str]:
+    first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
+    in_turn = len(whom) > 2 and list(whom) == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(list(dict.fromkeys(whom)))
     share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
-    return {"share": more if change.before else "not 0"}
+    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}" if change.before else "not 0"
+    return replace(change, sentence=change.sentence.format(whom=names, share=more))
 
 
 def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
@@ -328,6 +326,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
         return
     measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
     turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
+    stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
     for place in made.of.turned:
         rotor, spin = made.rotors[place], made.of.spins[place]
         # The body turns against its rotors.
@@ -339,7 +338,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             made.unchanged.append(
                 f"the direction of {whom}: the log has it turn {way}, and flights do not show it ({size})"
             )
-        elif rotor.turn is None or rotor.turn.span is None:
+        elif rotor.turn is None or rotor.turn.span is None or sum(rotor.turn.span == each for each in stated) > 1:
             where = "the format states no direction" if rotor.turn is None else rotor.turn.where
             made.elsewhere.append(f"{says}; {where}: turn it round there")
         else:

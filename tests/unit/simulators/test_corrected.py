@@ -330,6 +330,10 @@ def test_gear_of_mjcf_is_thrust_and_yaw_torque(tmp_path):
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], 1.5e-10)
     assert [rotor.spin for rotor in new.rotors] == [-1, 1, -1, 1]
     assert said.elsewhere == ()
+    assert all(change.low < change.after < change.high for change in said.changes)
+    assert [change.sentence for change in said.changes if change.before == 1] == [
+        "thrust of M1, M2 and M4 is 17 % less"
+    ]
 
 
 def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
