@@ -35,7 +35,7 @@ from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
-"""Of the fits that structures are compared by: a tenth of what is worth a name is close enough."""
+"""Of the fits that structures are compared by: a twentieth of what is worth a name is close enough."""
 
 _STEPS, _TOLERANCE = 60, 3e-6
 """Of the fit that is kept."""
@@ -338,7 +338,7 @@ def choose(
         As stated.
     flights : sequence of PlaybackFlight
         Training flights alone.
-    kept : mapping of Structure to sequence of Solution
+    kept : mapping of Structure to Solution
         Of the same search, stopped before; it goes on to the same end.
     """
     blocks = tried_blocks(vehicle, flights, settings)
