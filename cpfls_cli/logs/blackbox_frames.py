@@ -30,8 +30,15 @@ _LONGEST_STEP_US = 10_000_000
 _END = np.frombuffer(b"End of log", dtype=np.uint8)
 _LOG_END, _RESUMED, _ADJUSTED = 255, 14, 13
 # Numbers of variable length, or bytes, that follow the kind of an event.
-_VARIABLE_EVENTS = ((0, 1), (_RESUMED, 2), (15, 1), (30, 2), (40, 1))
-_FIXED_EVENTS = ((10, 5), (11, 4), (12, 8))
+# Of known events: kind, and how many numbers of variable length and then bytes follow it.
+_EVENTS = ((0, 1, 0), (14, 2, 0), (15, 1, 0), (30, 2, 0), (40, 1, 0), (10, 0, 5), (11, 0, 4), (12, 0, 8))
+# Shift and number of bits of three numbers in three bytes, narrow and wide, by the tag in their first two bits.
+_PACKED = np.array(
+    [
+        [[[20, 2], [18, 2], [16, 2]], [[16, 4], [12, 4], [8, 4]], [[16, 6], [8, 6], [0, 6]]],
+        [[[20, 2], [18, 2], [16, 2]], [[17, 5], [12, 5], [8, 4]], [[14, 8], [7, 7], [0, 7]]],
+    ]
+)
 
 
 class Fields(NamedTuple):
@@ -73,41 +80,28 @@ def _signed(data: Bytes, place: int) -> tuple[Any, int]:
     return (value >> 1) ^ -(value & 1), place
 
 
-@part
-def _whole_bytes(data: Bytes, place: int, tag: int, values: IntArray) -> int:
-    """Read three numbers of one to four bytes, the least first."""
-    for number in range(3):
-        size = 1 + ((tag >> (2 * number)) & 3)
-        value = np.int64(0)
-        for own in range(size):
-            value |= _byte(data, place) << (8 * own)
-            place += 1
-        values[number] = _extended(value, 8 * size)
-    return place
 
 
 @part
 def _three(data: Bytes, place: int, values: IntArray, wide: bool) -> Any:
-    """Read three numbers of 2, of 4 or 6 (wide: 5, 5, 4 or 8, 7, 7) bits, or of whole bytes."""
-    first, second, third = _byte(data, place), _byte(data, place + 1), _byte(data, place + 2)
-    kind = first >> 6
-    if kind == 0:
+    """Read three numbers of few bits, as the tag in front of them says, or of one to four bytes, the least first."""
+    first = _byte(data, place)
+    tag = first >> 6
+    if tag < 3:
+        bits = (first << 16) | (_byte(data, place + 1) << 8) | _byte(data, place + 2)
         for number in range(3):
-            values[number] = _extended(first >> (4 - 2 * number), 2)
-        return place + 1
-    if kind == 3:
-        return _whole_bytes(data, place + 1, first, values)
-    if wide:
-        bits = (first << 16) | (second << 8) | third
-        shifts = ((17, 5), (12, 5), (8, 4)) if kind == 1 else ((14, 8), (7, 7), (0, 7))
-        for number in range(3):
-            values[number] = _extended(bits >> shifts[number][0], shifts[number][1])
-        return place + 1 + kind
-    if kind == 1:
-        values[0], values[1], values[2] = _extended(first, 4), _extended(second >> 4, 4), _extended(second, 4)
-    else:
-        values[0], values[1], values[2] = _extended(first, 6), _extended(second, 6), _extended(third, 6)
-    return place + 1 + kind
+            shift, size = _PACKED[int(wide), tag, number]
+            values[number] = _extended(bits >> shift, size)
+        return place + 1 + tag
+    place += 1
+    for number in range(3):
+        size = 1 + ((first >> (2 * number)) & 3)
+        value = np.int64(0)
+        for own in range(size):
+            value |= _byte(data, place + own) << (8 * own)
+        place += size
+        values[number] = _extended(value, 8 * size)
+    return place
 
 
 @part
@@ -223,16 +217,12 @@ def _event(data: Bytes, place: int) -> tuple[int, int]:
     if kind == _ADJUSTED:
         if _byte(data, place) >= 128:
             return kind, place + 5
-        _, place = _unsigned(data, place + 1)
-        return kind, place
-    for known, count in _VARIABLE_EVENTS:
+        return kind, _unsigned(data, place + 1)[1]
+    for known, count, size in _EVENTS:
         if kind == known:
             for _ in range(count):
                 _, place = _unsigned(data, place)
-            return kind, place
-    for known, count in _FIXED_EVENTS:
-        if kind == known:
-            return kind, place + count
+            return kind, place + size
     return -1, place
 
 
