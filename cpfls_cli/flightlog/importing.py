@@ -43,16 +43,8 @@ def import_log(
 ) -> ImportedFlight:
     """Turn the columns of a log into a flight.
 
-    Parameters
-    ----------
-    columns : mapping from str to array, shape (sample,)
-    rotor_torque : callable, optional
-        Body torque, array of shape (time, 3), N m, FLU, from the signals of the rotors; called where
-        `torque_source` names the rotors.
-    delay_share : float
-        Leading share of the flight that an estimate of the delay may look at.
-    stamped_hz : mapping from str to float, optional
-        See `slow_signals`.
+    Where `torque_source` names the rotors, `rotor_torque` gives the body torque, shape (time, 3), N m, FLU, from their
+    signals. An estimate of the delay looks at the leading `delay_share` of it. `stamped_hz`: see `slow_signals`.
     """
     signals = apply_rotor_lag(read_signals(columns, settings, stamped_hz), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
@@ -156,12 +148,10 @@ def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
-    """Filter all signals alike and derive rates, accelerations and torques.
+    """Filter all signals alike, derive rates, accelerations and torques, and interpolate to `rate_hz` last.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
-    between the raw ones. The result is interpolated to `rate_hz` last. Setpoints stay as they were asked for.
-
-    The signals are aligned and have the body torque (section 1 of the method's description).
+    between the raw ones (section 1 of the method's description). Setpoints stay as they were asked for.
     """
     filtered: dict[str, Any] = {
         name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
@@ -222,9 +212,8 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
     """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
 
-    Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
-
-    The signals are not yet filtered, and an estimate looks at a leading share of their samples.
+    Measured rotor speeds are motion and stay, unless the torque is computed from them. The signals are not yet
+    filtered, and an estimate looks at a leading share of their samples.
     """
     estimate = None
     if settings.delay_s == "estimate":
@@ -312,16 +301,8 @@ def estimate_delay(
     axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
     sample is refined between its neighbours (section 8 of the method's description).
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Uniform.
-    body_rate, body_torque : array, shape (time, 3), rad/s and N m, body frame
-        The torque as commanded, or as computed from the rotors.
-    delay_max_s : float
-        Longest delay tried, s.
-    share : float
-        Leading share of the samples that is looked at, so that data held out for a test stay unseen.
+    On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
+    Only the leading `share` of the samples is looked at, so that data held out for a test stay unseen.
     """
     from scipy.optimize import minimize_scalar
 

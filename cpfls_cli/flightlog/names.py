@@ -14,7 +14,17 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog import agreement, vocabulary
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
-from cpfls_cli.flightlog.vocabulary import CRAZYFLIE, KIN, MEANINGS, NOT_MEASURED, PX4, WISHED, Meaning
+from cpfls_cli.flightlog.vocabulary import (
+    CRAZYFLIE,
+    KIN,
+    MEANINGS,
+    NOT_MEASURED,
+    PX4,
+    RATE_WORDS,
+    WISHED,
+    WRITTEN,
+    Meaning,
+)
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName
 
@@ -22,12 +32,6 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 _MEASURED: Final = tuple(own for own in vocabulary.KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
-_WRITTEN: Final = {
-    text: (unit, scale)
-    for unit, own in vocabulary.SPELLINGS.items()
-    for scale, written in own.items()
-    for text in written.split()
-}
 Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 
@@ -45,13 +49,13 @@ class ColumnGroup:
         before, star, after = self.pattern.partition("*")
         bracket = re.search(r"[\[(]([^\[\]()*]*[A-Za-z%][^\[\]()*]*)[\])]$", after if star else before)
         if bracket:
-            return bracket[0] if _symbols(bracket[1]) in _WRITTEN else ""
+            return bracket[0] if _symbols(bracket[1]) in WRITTEN else ""
         name = after if any(letter.isalnum() for letter in after) else before.rstrip("[(")
         # The axis stands before what follows the star, and a letter that stands before the star may be a name.
         starts = [found.start() for found in re.finditer(r"[_ ]|(?<=[a-z])(?=[A-Z])|^", name)]
         for start in starts if name is after else starts[1:]:
             text = name[start:].strip("_ ")
-            if _symbols(text) in _WRITTEN and (name is after or len(text) > 1):
+            if _symbols(text) in WRITTEN and (name is after or len(text) > 1):
                 return name[start:]
         return ""
 
@@ -186,7 +190,7 @@ def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
 def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
     count = len(group.columns)
     enough = count >= meaning.number if meaning.signal in ROTORS else count == meaning.number
-    return enough and group.kind in meaning.kinds.split()
+    return enough and group.kind in meaning.kinds
 
 
 def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
@@ -231,7 +235,7 @@ def _stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, floa
     """Give the unit that a name states for a signal, at its end or as a word, and the factor that makes it."""
     words = (_symbols(word) for word in group.words if word in vocabulary.A_WORD)
     for text in (_symbols(group.ending), *words):
-        for own in (_WRITTEN.get(text), _WRITTEN.get(f"{text}/s")):
+        for own in (WRITTEN.get(text), WRITTEN.get(f"{text}/s")):
             # Of a rate "deg" is deg/s.
             if own is not None and KNOWN_UNITS[own[0]].si in UNITS_OF_SIGNAL[signal]:
                 return own
@@ -242,9 +246,9 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     """Tell whether words mean a signal; positions, rotors and angles have ways of their own."""
     own, signal = {*words}, meaning.signal
     # A name that ends in the unit of a rate or of a speed is one.
-    ending = _WRITTEN.get(_symbols(group.ending))
+    ending = WRITTEN.get(_symbols(group.ending))
     ends_in_speed = ending is not None and KNOWN_UNITS[ending[0]].si == "rad/s"
-    if own & set(meaning.never.split()):
+    if own & meaning.never:
         return False
     if signal in ROTORS:
         asked = own & vocabulary.ASKED
@@ -257,9 +261,9 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"
-        turns = pqr or ends_in_speed or bool(own & {*vocabulary.RATE_WORDS.split(), "speed"})
+        turns = pqr or ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
-    return bool({*words[-meaning.last :]} & set(meaning.words.split()))
+    return bool({*words[-meaning.last :]} & meaning.words)
 
 
 # Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.
@@ -369,8 +373,8 @@ def _matrix_attitude(
             continue
         rotation = agreement.on_clock(agreement.rotations_of(values, order, inverse), time, grid)
         turning = agreement.turning_of(rotation, rate_hz)
-        for other, measured in () if turning is None else rates:
-            if other + 3 <= first or other >= first + 4:
+        for other, measured in rates:
+            if turning is not None and (other + 3 <= first or other >= first + 4):
                 share = agreement.fit_axes(turning, measured).as_named
                 found += [(share, first, rotation, other)] if share > _FOLLOWS else []
     return largest(found, lambda own: own[0])[1:] if found else None

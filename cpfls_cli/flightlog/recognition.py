@@ -59,23 +59,10 @@ _UP: Final = {"FLU": "up", "FRD": "down"}
 
 
 def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
-    """Propose what the columns of a log are.
+    """Propose what the columns of a log are; refuse one in which nothing is recognised or flies, or no multirotor.
 
-    Parameters
-    ----------
-    topics : mapping from topic to mapping from field to array, shape (sample,)
-        As a reader gives them: stamps of topics in s, a flat log as one topic without a name.
-    units : mapping from column to str
-        That the log states.
-    parameters : mapping
-        Of the autopilot, or of a header.
-    system : str
-        What wrote the log; empty where that is not known.
-
-    Raises
-    ------
-    InputError
-        If nothing in the log is recognised, nothing in it flies, or what flies is no multirotor.
+    The arguments are as a reader gives them (`logs.formats.LogContents`): stamps of topics in s, a flat log as one
+    topic without a name.
     """
     kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)

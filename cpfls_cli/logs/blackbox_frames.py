@@ -240,13 +240,9 @@ def decode(
 ) -> tuple[int, int, int]:
     """Count main frames, broken ones (that are none, or jump in time) and slow ones from where the header ends.
 
-    Parameters
-    ----------
-    constants : array of int, shape (4,)
-        Least throttle, least motor output, reference of the battery, and the field of the first motor.
-    rows, slow : array of int, shape (frame, field) and (frame, 1 + field)
-        Filled as far as they go; empty ones are counted alone. What changes slowly is behind the number of the main
-        frame that comes next.
+    The constants are least throttle, least motor output, reference of the battery, and the field of the first motor.
+    Rows, shape (frame, field), and slow ones, shape (frame, 1 + field), are filled as far as they go; empty ones are
+    counted alone. What changes slowly is behind the number of the main frame that comes next.
     """
     # Arrays are made here and copied by element: numba would compile the words of errors of shapes for two seconds.
     width = fields.encoding.shape[1]
