@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -135,14 +135,14 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
 
 def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
     """Lay a clock over stamps, and say where its rate is none of a log."""
-    period = float(np.median(np.diff(time)))
-    if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
+    period, span = float(np.median(np.diff(time))), float(time[-1] - time[0])
+    if period < _SHORTEST_PERIOD_S or span / period > _LARGEST_REFINEMENT * len(time):
         raise InputError(
-            f"import.time_column: the median step is {period:.3g} s in {time[-1] - time[0]:.3g} s of {len(time)} rows,"
-            " which no log has; check import.time_unit and import.time_column"
+            f"import.time_column: the median step is {period:.3g} s in {span:.3g} s of {len(time)} rows, which no log"
+            " has; check import.time_unit and import.time_column"
         )
     # A whole number of periods that rounding made a little short must not lose its last sample.
-    samples, rate_hz = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
+    samples, rate_hz = int(span / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
     words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
     return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
@@ -187,10 +187,8 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
 
 
 def _derived(signals: LogSignals) -> dict[str, Array]:
-    derived: dict[str, Array] = {}
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
-    if body_rate is not None:
-        derived["body_rate"] = body_rate
+    derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
         return derived
     steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > _STEEPEST_PITCH)
@@ -230,10 +228,11 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
-    odd = "at the estimated delay, a moment of inertia is negative; check signs and axes"
-    last = "the estimated delay is the longest one tried; raise import.delay_max_s"
-    negative = bool((estimate.inertia[:3] < 0).any())
-    holds = {last: estimate.at_bound, poor: estimate.pooled_r2 < _POOR_R2, odd: negative}
+    holds = {
+        "the estimated delay is the longest one tried; raise import.delay_max_s": estimate.at_bound,
+        poor: estimate.pooled_r2 < _POOR_R2,
+        "at the estimated delay, a moment of inertia is negative; check signs and axes": estimate.inertia[:3].min() < 0,
+    }
     return tuple(sentence for sentence, so in holds.items() if so)
 
 
@@ -258,31 +257,6 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
 
 
-class _Fit(NamedTuple):
-    """Regression of the shifted torque on the columns of a rigid body."""
-
-    window: slice
-    period: float
-    torque: Array
-    scale: Array
-    regressor: Array
-    basis: Array
-
-    def scaled_torque(self, delay: float) -> Array:
-        moved = delayed(self.torque, delay / self.period)[self.window] / self.scale
-        return np.asarray(moved - moved.mean(axis=0))
-
-    def r2(self, delay: float) -> tuple[float, Array]:
-        torque = self.scaled_torque(delay)
-        fitted = (self.basis @ (self.basis.T @ torque.ravel())).reshape(torque.shape)
-        residual, total = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
-        acting = total > 0
-        unexplained = residual[acting] / total[acting]
-        r2 = np.ones(3)
-        r2[acting] = 1 - unexplained
-        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
-
-
 def estimate_delay(
     time: Array,
     body_rate: Array,
@@ -304,38 +278,53 @@ def estimate_delay(
     On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
     Only the leading `share` of the samples is looked at, so that data held out for a test stay unseen.
     """
+    from scipy.linalg import orth
     from scipy.optimize import minimize_scalar
 
-    used = slice(0, round(share * len(time)))
-    fit = _prepare(time[used], body_rate[used], body_torque[used], delay_max_s, lowpass_hz, lowpass_order)
-    delays = np.append(np.arange(0.0, delay_max_s, time[1] - time[0]), delay_max_s)
-    curve = np.array([fit.r2(delay)[0] for delay in delays])
+    time, *pair = (own[: round(share * len(own))] for own in (time, body_rate, body_torque))
+    if len(time) < 2:
+        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
+    period = time[1] - time[0]
+    rate, torque = (low_pass(own, 1 / period, lowpass_hz, lowpass_order) for own in pair)
+    window = _window(time, delay_max_s, lowpass_hz)
+    scale = torque[window].std(axis=0)
+    if not scale.any():
+        raise ComputationError("the delay cannot be estimated: the torque is constant")
+    scale[scale == 0] = np.inf
+    columns = body_torque_columns(rate, derivative(time, rate))[window] / scale[:, None]
+    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
+    # Of columns of one length, so that a weakly excited one is not lost.
+    lengths = np.linalg.norm(regressor, axis=0)
+    basis = orth(regressor / np.where(lengths > 0, lengths, 1.0), rcond=1e-10)
+
+    def moved(delay: float) -> Array:
+        own = delayed(torque, delay / period)[window] / scale
+        return np.asarray(own - own.mean(axis=0))
+
+    def explained(delay: float) -> tuple[float, Array]:
+        own, r2 = moved(delay), np.ones(3)
+        residual = own - (basis @ (basis.T @ own.ravel())).reshape(own.shape)
+        acting = own.any(axis=0)
+        unexplained = (residual**2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
+        r2[acting] = 1 - unexplained
+        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
+
+    delays = np.append(np.arange(0.0, delay_max_s, period), delay_max_s)
+    curve = np.array([explained(delay)[0] for delay in delays])
     best = int(np.argmin(levelled(-curve)))
     bounds = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
-    refined = float(minimize_scalar(lambda own: -fit.r2(float(own))[0], bounds=bounds, method="bounded").x)
-    delay = refined if less(fit.r2(float(delays[best]))[0], fit.r2(refined)[0]) else float(delays[best])
-    pooled, r2 = fit.r2(delay)
-    inertia = np.linalg.lstsq(fit.regressor, fit.scaled_torque(delay).ravel(), rcond=None)[0]
+    refined = float(minimize_scalar(lambda own: -explained(float(own))[0], bounds=bounds, method="bounded").x)
+    delay = refined if less(curve[best], explained(refined)[0]) else float(delays[best])
+    pooled, r2 = explained(delay)
+    inertia = np.asarray(np.linalg.lstsq(regressor, moved(delay).ravel(), rcond=None)[0], dtype=float)
+    last = bool(delay > delays[-2])
     return DelayEstimate(
-        delay_s=delay,
-        r2=r2,
-        pooled_r2=pooled,
-        inertia=np.asarray(inertia, dtype=float),
-        delays=delays,
-        curve=curve,
-        at_bound=bool(delay > delays[-2]),
+        delay_s=delay, r2=r2, pooled_r2=pooled, inertia=inertia, delays=delays, curve=curve, at_bound=last
     )
 
 
-def _prepare(
-    time: Array, body_rate: Array, body_torque: Array, delay_max_s: float, lowpass_hz: float | None, order: int
-) -> _Fit:
-    if len(time) < 2:
-        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
-    rate_hz = 1 / (time[1] - time[0])
-    smooth_rate = low_pass(body_rate, rate_hz, lowpass_hz, order)
-    smooth_torque = low_pass(body_torque, rate_hz, lowpass_hz, order)
-    # Without the filter's transients and, at the start, the longest delay.
+def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
+    """Leave out the filter's transients and, at the start, the longest delay."""
     edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
     first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge]).tolist()
     if last - first < _SMALLEST_WINDOW:
@@ -344,17 +333,7 @@ def _prepare(
             f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
             f" remain, and at least {_SMALLEST_WINDOW} are needed",
         )
-    window = slice(first, last)
-    scale = smooth_torque[window].std(axis=0)
-    if not scale.any():
-        raise ComputationError("the delay cannot be estimated: the torque is constant")
-    scale[scale == 0] = np.inf
-    columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
-    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
-    # Of columns of one length, so that a weakly excited one is not lost.
-    lengths = np.linalg.norm(regressor, axis=0)
-    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
-    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, directions[:, sizes > 1e-10 * sizes[0]])
+    return slice(first, last)
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
