@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from math import cos, radians, sin
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 Parameters = Mapping[str, float | str]
 # x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1.
@@ -12,9 +12,10 @@ Place = tuple[float, float, int]
 TABLE: Final = tomllib.loads(Path(__file__).with_name("vehicles.toml").read_text("utf-8"))
 
 
-def numbered(table: Mapping[str, Any]) -> dict[int, Any]:
-    """Give a table whose keys are numbers."""
-    return {int(number): value for number, value in table.items()}
+def numbered(text: str) -> dict[int, str]:
+    """Read numbers and what they stand for, ``1: X; 2: V``."""
+    pairs = (each.split(":") for each in text.split(";"))
+    return {int(number): words.strip() for number, words in pairs}
 
 
 def spans(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -41,7 +42,10 @@ def _layouts() -> Iterator[tuple[str, tuple[Place, ...]]]:
 
 LAYOUTS: Final = dict(own for own in _layouts() if own[1])
 _CLASSES, _TYPES = numbered(TABLE["frame_class"]), numbered(TABLE["frame_type"])
-_OF_CLASS, _OF_MAV_TYPE = (numbered(TABLE["motors"][name]) for name in ("class", "mav_type"))
+_OF_CLASS, _OF_MAV_TYPE = (
+    {number: int(count) for number, count in numbered(TABLE[f"motors_of_{name}"]).items()}
+    for name in ("class", "mav_type")
+)
 # Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone.
 _COUNTS_OF_FORMS: Final = (8, 6, 4)
 _AIRFRAMES: Final = spans("airframes")
