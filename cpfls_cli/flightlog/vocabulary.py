@@ -12,6 +12,7 @@ from cpfls_cli.units import UnitName
 
 _TABLE: Final = tomllib.loads(Path(__file__).with_name("columns.toml").read_text("utf-8"))
 PX4, ARDUPILOT, BETAFLIGHT, CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
+_UNITS: Final[dict[str, UnitName]] = {own.replace(" ", "~"): own for own in get_args(UnitName)}
 KIN: Final = {ARDUPILOT: ("Ardu",), BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
 
 
@@ -23,10 +24,6 @@ def _rows(name: str, separator: str | None = None) -> list[list[str]]:
 def _number(text: str) -> float:
     parts = [float(part) for part in text.split("/")]
     return parts[0] / parts[1] if len(parts) > 1 else parts[0]
-
-
-def _unit(text: str) -> UnitName | None:
-    return next((own for own in get_args(UnitName) if own == text.replace("~", " ")), None)
 
 
 class Known(NamedTuple):
@@ -48,8 +45,8 @@ def _known(system: str, signal: str, pattern: str, unit: str, frame: str, factor
     columns = tuple(f"{before}{axis}{after}" for axis in axes.split(","))
     scale, _, offset = factor.partition(",")
     sign = None if signs == "+" else tuple(1.0 if own == "+" else -1.0 for own in signs)
-    axes_of = None if frame == "-" else frame
-    return Known(system, signal, columns, _unit(unit), axes_of, _number(scale), float(offset or 0), sign)
+    own = (None if unit == "-" else _UNITS[unit], None if frame == "-" else frame)
+    return Known(system, signal, columns, *own, _number(scale), float(offset or 0), sign)
 
 
 class Meaning(NamedTuple):
@@ -91,9 +88,7 @@ def _each(name: str) -> frozenset[str]:
 KNOWN: Final = tuple(_known(*row) for row in _rows("known"))
 # What names write, as the unit and the factor that makes it.
 WRITTEN: Final = {
-    text: (cast("UnitName", _unit(unit)), _number(scale))
-    for unit, scale, *written in _rows("spellings")
-    for text in written
+    text: (_UNITS[unit], _number(scale)) for unit, scale, *written in _rows("spellings") for text in written
 }
 IN_FULL: Final[dict[str, str]] = _TABLE["in_full"]
 ONE_WORD: Final[dict[str, str]] = _TABLE["one_word"]
@@ -117,4 +112,4 @@ RANGES: Final = tuple(Range._make((*map(_number, row[:5]), *row[5:7], tuple(row[
 def sizes(of: str) -> tuple[Row, ...]:
     """Give the sizes that speak for units of a kind."""
     rows = (own for kind, *own in _rows("sizes") if kind == of)
-    return tuple(Row(float(size), cast("UnitName", _unit(unit)), _number(scale)) for size, unit, scale in rows)
+    return tuple(Row(float(size), _UNITS[unit], _number(scale)) for size, unit, scale in rows)
