@@ -115,7 +115,9 @@ def test_rows_of_the_table_fit_their_signals():
         assert row.unit is None or KNOWN_UNITS[row.unit].si in UNITS_OF_SIGNAL[row.signal], row
         assert row.sign is None or len(row.sign) in (len(row.columns), 3), row
         assert row.frame in (None, "FLU", "FRD", "ENU", "NED"), row
-    assert {own.signal for own in MEANINGS} | set(ALLOWED) | set(sum(IN_RADIANS.values(), [])) <= set(UNITS_OF_SIGNAL)
+    assert {own.signal for own in MEANINGS} | set(ALLOWED) | {
+        signal for own in IN_RADIANS.values() for signal in own
+    } <= set(UNITS_OF_SIGNAL)
     assert {kind for own in MEANINGS for kind in own.kinds} <= {"xyz", "wxyz", "angles", "numbers", "one"}
     assert {own.clear for own in RANGES} == {"always", "of commands", "never"}
     assert all(sizes(of) for of in ("body_rate", "attitude", "sensed", "over_ground"))
