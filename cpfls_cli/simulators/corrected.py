@@ -2,10 +2,10 @@
 
 Of the effects that `gap` names, those whose formula is the simulator's become numbers of the file:
 
-- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times that of the model that flights were compared
-  with, which is the stated one unless a vehicle was given. Torque and inertia show only as their ratio, so a moment of
-  inertia is ``(1 + inertia) (1 + thrust_scale)`` times; about z only where the yaw torque follows the thrust, as it
-  does where the file states their ratio.
+- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
+  as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
+  where the yaw torque follows the thrust, as it does where the file states their ratio. What flights were compared with
+  and the file does not state, such as the thrust of a vehicle that was given, is listed.
 - ``rotor_mismatch``: thrust of single rotors, by the pattern that was found, and their yaw torque with it; what
   clockwise rotors drag more than they lift is their ratio of torque to thrust. ``drag_factor_error``: that of all.
   Where the file has one number for rotors that differ, only what is common to all is put into it.
@@ -53,7 +53,7 @@ _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_u
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _OF_XML = ("sdf", "urdf", "mjcf")
-_ROUNDING = 1e-9
+_ROUNDING, _SAME = 1e-9, 1e-6
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
@@ -277,7 +277,7 @@ def corrected(
     Parameters
     ----------
     vehicle : VehicleSettings
-        That flights were compared with: of the study that was made of the file, or one that was given.
+        That flights were compared with: of the study that was made of the file, with what it leaves open.
     flights : sequence of Recording
         That it was found in.
     """
@@ -462,14 +462,16 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 
 
 def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: str, common: _Found) -> None:
-    """Correct a number of each rotor by factors on that of the model which flights were compared with, or list it."""
+    """Correct a number of each rotor by factors on it, or list them where flights were compared with another number."""
     known = [
         {"thrust": k, "torque": b, "ratio": b / k}[kind]
         for k, b in ((each.thrust_factor_n_s2, each.drag_factor_n_m_s2) for each in made.vehicle.rotors)
     ]
-    found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
-    if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
-        return
+    stated = [own.value for rotor in made.rotors if (own := getattr(rotor, kind)) is not None]
+    if len(stated) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
+        found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
+        if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
+            return
     off = {
         f"M{index + 1}": f"{each.value:.4g} [{each.low:.4g}, {each.high:.4g}]"
         for index, each in enumerate(factors)
