@@ -228,7 +228,7 @@ def test_flights_that_show_nothing_that_is_predicted_are_refused(flights):
         parts_of([unseen, flights[1]], QUICK)
 
 
-def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples(flights):
+def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
     """Structures are compared by them, with nearly the same errors."""
     fast = flown(truth(), ("figure", "steps"), duration_s=5.0, rate_hz=500.0, noise=MIDDLING, seed=2)
     windows = [each for part in parts_of(fast, QUICK) for each in part]
