@@ -473,7 +473,7 @@ def test_python_is_corrected_in_place(tmp_path):
     )
     differ, comment = lines_that_differ(path)
     assert len(differ) == 3
-    assert "'Ixx': 4.607e-05, 'Iyy'" in differ[0][1]
+    assert "'Ixx': 4.606e-05, 'Iyy'" in differ[0][1]
     assert path.parent.joinpath("new", "mine.py").read_text().startswith("#!/usr/bin/env python3\n# Corrected by cpfls")
     assert len(comment) == 5
 
