@@ -190,6 +190,9 @@ class _Corrections:
         new, low, high = (stated.written(each) for each in found)
         low, high, name = min(low, high), max(low, high), stated.name or name
         before, text = stated.written(stated.value), f"{new:.4g}"
+        if stated.power < 0 and stated.value:
+            # What the number is the reciprocal of is the other way round.
+            words = words.replace("{share}", _share(found.value / stated.value))
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -317,9 +320,11 @@ def _said(change: Change, whom: Sequence[str]) -> Change:
 
 
 def _sizes(change: Change) -> dict[str, str]:
-    share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
-    return {"share": more if change.before else "not 0"}
+    return {"share": _share(change.after / change.before) if change.before else "not 0"}
+
+
+def _share(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.3g} % {'more' if factor > 1 else 'less'}"
 
 
 def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:

@@ -493,6 +493,8 @@ def test_a_curve_is_corrected_in_proportion(tmp_path):
     assert changes["a.rpm2thrust[1]"] == (-5.4e-7, -4.482e-7)
     assert changes["a.rotor_dyn_coef[0]"] == (7.4, 5.0)
     assert new.rotors[0].lag_up.value == pytest.approx(0.2, rel=1e-3)
+    (slower,) = [change.sentence for change in said.changes if change.element == "a.rotor_dyn_coef[0]"]
+    assert slower == "time constant of M1 to M4 is 48 % more"
     assert new.rotors[0].lag_down.value == pytest.approx(0.2, rel=0.1)
     assert changes["a.drag_matrix[0][0]"][1] == changes["a.drag_matrix[1][1]"][1]
     assert new.rotors[0].drag.value == pytest.approx(1e-6, rel=0.1)
@@ -509,6 +511,7 @@ def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, c
     (change,) = said.changes
     assert (change.element, change.before, change.after) == ("hoverThrOut", 0.31, float(f"{0.31 / 0.83:.4g}"))
     assert change.low < change.after < change.high
+    assert change.sentence == "thrust of M1 to M4 is 17 % less"
     differ, comment = lines_that_differ(path)
     assert len(differ) == 1
     # JSON has no comments, unless it has some.
