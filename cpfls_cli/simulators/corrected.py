@@ -2,10 +2,10 @@
 
 Of the effects that `gap` names, those whose formula is the simulator's become numbers of the file:
 
-- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times that of the model that flights were compared
-  with, which is the stated one unless a vehicle was given. Torque and inertia show only as their ratio, so a moment of
-  inertia is ``(1 + inertia) (1 + thrust_scale)`` times; about z only where the yaw torque follows the thrust, as it
-  does where the file states their ratio.
+- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
+  as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
+  where the yaw torque follows the thrust, as it does where the file states their ratio. What flights were compared with
+  and the file does not state, such as the thrust of a vehicle that was given, is listed.
 - ``rotor_mismatch``: thrust of single rotors, by the pattern that was found, and their yaw torque with it; what
   clockwise rotors drag more than they lift is their ratio of torque to thrust. ``drag_factor_error``: that of all.
   Where the file has one number for rotors that differ, only what is common to all is put into it.
@@ -53,7 +53,7 @@ _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_u
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _OF_XML = ("sdf", "urdf", "mjcf")
-_ROUNDING = 1e-9
+_ROUNDING, _SAME = 1e-9, 1e-6
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
@@ -167,7 +167,7 @@ class _Corrections:
     elsewhere: list[str] = field(default_factory=list)
     turned: list[int] = field(default_factory=list)
 
-    @property
+    @cached_property
     def names(self) -> dict[Path, str]:
         """Of the corrected files, by those that were given."""
         return corrected_names(self.of.model.files)
@@ -280,7 +280,7 @@ def corrected(
     Parameters
     ----------
     vehicle : VehicleSettings
-        That flights were compared with: of the study that was made of the file, or one that was given.
+        That flights were compared with: of the study that was made of the file, with what it leaves open.
     flights : sequence of Recording
         That it was found in.
     """
@@ -315,12 +315,12 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
-    from_to = f"{whom[0]} to {whom[-1]}" if len(whom) > 2 else joined(list(dict.fromkeys(whom)))
-    return Change(**{**vars(change), "sentence": change.sentence.format(whom=from_to, **_sizes(change))})
-
-
-def _sizes(change: Change) -> dict[str, str]:
-    return {"share": _share(change.after / change.before) if change.before else "not 0"}
+    whom = list(dict.fromkeys(whom))
+    first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
+    in_turn = len(whom) > 2 and whom == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(whom)
+    more = _share(change.after / change.before) if change.before else "not 0"
+    return replace(change, sentence=change.sentence.format(whom=names, share=more))
 
 
 def _share(factor: float) -> str:
@@ -333,6 +333,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
         return
     measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
     turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
+    stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
     for place in made.of.turned:
         rotor, spin = made.rotors[place], made.of.spins[place]
         # The body turns against its rotors.
@@ -344,7 +345,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             made.unchanged.append(
                 f"the direction of {whom}: the log has it turn {way}, and flights do not show it ({size})"
             )
-        elif rotor.turn is None or rotor.turn.span is None:
+        elif rotor.turn is None or rotor.turn.span is None or sum(rotor.turn.span == each for each in stated) > 1:
             where = "the format states no direction" if rotor.turn is None else rotor.turn.where
             made.elsewhere.append(f"{says}; {where}: turn it round there")
         else:
@@ -468,14 +469,16 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 
 
 def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: str, common: _Found) -> None:
-    """Correct a number of each rotor by factors on that of the model which flights were compared with, or list it."""
+    """Correct a number of each rotor by factors on it, or list them where flights were compared with another number."""
     known = [
         {"thrust": k, "torque": b, "ratio": b / k}[kind]
         for k, b in ((each.thrust_factor_n_s2, each.drag_factor_n_m_s2) for each in made.vehicle.rotors)
     ]
-    found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
-    if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
-        return
+    stated = [own.value for rotor in made.rotors if (own := getattr(rotor, kind)) is not None]
+    if len(stated) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
+        found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
+        if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
+            return
     off = {
         f"M{index + 1}": f"{each.value:.4g} [{each.low:.4g}, {each.high:.4g}]"
         for index, each in enumerate(factors)

@@ -15,6 +15,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 from cpfls_cli.errors import InputError
 
 _LARGEST = 20_000_000
+_DEEPEST = 100
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
 _ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _WORD = re.compile(rb"\S+")
@@ -180,6 +181,7 @@ class _Builder:
         self.file, self._open = file, list[Node]()
         self.expat: Any = None
         self.root: Node | None = None
+        self.deepest = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         above = self._open[-1] if self._open else None
@@ -190,6 +192,7 @@ class _Builder:
         else:
             above.children.append(node)
         self._open.append(node)
+        self.deepest = max(self.deepest, len(self._open))
 
     def end(self, _tag: str) -> None:
         self._open.pop().close = self.expat.CurrentByteIndex
@@ -247,5 +250,7 @@ def read_xml(file: Path) -> Node:
         raise InputError(f"{file}: is in an encoding that cannot be read; save it in UTF-8") from None
     except ParseError as error:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
+    if builder.deepest > _DEEPEST:
+        raise InputError(f"{file}: has {builder.deepest} elements in each other, which no model has; correct it there")
     assert isinstance(root, Node), "a file without an element is no XML"
     return root

@@ -36,7 +36,6 @@ from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
-from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
 PARTS = {
@@ -136,7 +135,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file, base.vehicle, split.training)
+        found = _with_file(run, found, of_file, split.training)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -187,11 +186,9 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(
-    run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings, training: Sequence[Recording]
-) -> Diagnosis:
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, training: Sequence[Recording]) -> Diagnosis:
     """Put what was found into the simulator's file."""
-    said, files = corrected(of, vehicle, found, training)
+    said, files = corrected(of, run.study.vehicle, found, training)
     run.texts.update({run.output / name: text for name, text in files.items()})
     return replace(found, corrected=said)
 

@@ -330,6 +330,10 @@ def test_gear_of_mjcf_is_thrust_and_yaw_torque(tmp_path):
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], 1.5e-10)
     assert [rotor.spin for rotor in new.rotors] == [-1, 1, -1, 1]
     assert said.elsewhere == ()
+    assert all(change.low < change.after < change.high for change in said.changes)
+    assert [change.sentence for change in said.changes if change.before == 1] == [
+        "thrust of M1, M2 and M4 is 17 % less"
+    ]
 
 
 def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
@@ -341,33 +345,23 @@ def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], [1.26e-10, 1.2e-10, 1.14e-10, 1.2e-10])
 
 
-def test_thrusts_as_controls_leave_the_ratio_to_correct(tmp_path):
-    """A control in N says nothing of a thrust over squared speed; the vehicle that was given says the rest."""
+def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
+    """A control in N says nothing of a thrust over squared speed: that is of the vehicle that was given."""
     path = tmp_path / "cf2.xml"
-    path.write_text(GEARS.replace('  <custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>\n', "")
-                    .replace(' gainprm="2e-8"', "").replace("2e-8 0 0 1.2e-10", "1 0 0 .006"))  # fmt: skip
+    text = re.sub(r" *<custom>.*\n", "", GEARS).replace(' gainprm="2e-8"', "").replace("2e-8 0 0 1.2e-10", "1 0 0 .006")
+    path.write_text(text.replace(".006", ".0045"))
     of = of_log(read_model(path), None, None)
     effects = (effect("drag_factor_error", error=0.25), effect("rotor_mismatch", difference_1=(0.1, 0.001)))
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
     said, files = corrected(of, SMALL.vehicle, found, [ONE])
-    assert re.findall(rb'gear="0 0 1 0 0 (\S+)"', files["cf2.xml"]) == [b"0.0075", b"-0.0075", b"0.0075", b"-0.0075"]
-    assert [each.element for each in said.changes] == ["gear yaw"] * 2
+    assert files["cf2.xml"] == path.read_bytes()
     assert said.elsewhere[0].startswith(
-        "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95"
+        "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95 [0.9495, 0.9505]; "
+        "controls are thrusts"
     )
-
-
-def test_what_was_found_counts_from_the_vehicle_that_was_given(mine):
-    """With a vehicle of its own, errors are of that one's numbers and not of the file's."""
-    of = of_log(read_model(mine), None, None)
-    other = SMALL._replace(thrust_factor=1e-8, inertia=(5e-5, 4.2e-5, 6.6e-5)).vehicle
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
-                            effects=(effect("parameter_error", inertia_x=0.1, thrust_scale=0.5),))  # fmt: skip
-    _, files = corrected(of, other, found, [ONE])
-    (mine.parent / "new.sdf").write_bytes(files["mine.sdf"])
-    new = read_model(mine.parent / "new.sdf")
-    assert new.rotors[0].thrust.value == pytest.approx(1.5e-8)
-    assert new.inertia[0, 0] == pytest.approx(5e-5 * 1.1 * 1.5, rel=1e-3)
+    assert said.elsewhere[1].startswith(
+        "yaw torque over thrust, as a factor on that which flights were compared with: "
+    )
 
 
 def test_a_number_goes_into_an_empty_element(mine):
