@@ -2,10 +2,10 @@
 
 Of the effects that `gap` names, those whose formula is the simulator's become numbers of the file:
 
-- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times that of the model that flights were compared
-  with, which is the stated one unless a vehicle was given. Torque and inertia show only as their ratio, so a moment of
-  inertia is ``(1 + inertia) (1 + thrust_scale)`` times; about z only where the yaw torque follows the thrust, as it
-  does where the file states their ratio.
+- ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
+  as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
+  where the yaw torque follows the thrust, as it does where the file states their ratio. What flights were compared with
+  and the file does not state, such as the thrust of a vehicle that was given, is listed.
 - ``rotor_mismatch``: thrust of single rotors, by the pattern that was found, and their yaw torque with it; what
   clockwise rotors drag more than they lift is their ratio of torque to thrust. ``drag_factor_error``: that of all.
   Where the file has one number for rotors that differ, only what is common to all is put into it.
@@ -39,6 +39,7 @@ from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
+from cpfls_cli.simulators.literals import with_comment
 from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
@@ -51,11 +52,16 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
-_ROUNDING = 1e-9
+_OF_XML = ("sdf", "urdf", "mjcf")
+_ROUNDING, _SAME = 1e-9, 1e-6
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
     "mjcf": "data.xfrc_applied of the body at each step",
+    "rotorpy": "a class of your own under Multirotor, whose compute_body_wrench adds it",
+    "ardupilot": "lines of your own in SIM_Frame.cpp",
+    "crazyflow": "dist_f and dist_t at each step",
+    "crazyflie": "nothing: the firmware has no model of it",
 }
 _TAGS = {
     "sdf": {
@@ -68,6 +74,16 @@ _TAGS = {
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
     "mjcf": {"thrust": "gear z", "torque": "gear yaw", "ratio": "gear yaw"},
+    "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
+    "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
+    "crazyflow": {
+        "thrust": "rpm2thrust",
+        "torque": "rpm2torque",
+        "lag_up": "rotor_dyn_coef",
+        "lag_down": "rotor_dyn_coef",
+        "drag": "drag_matrix",
+    },
+    "crazyflie": {"ratio": "THRUST2TORQUE"},
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
 _NOT_STATED = {
@@ -75,6 +91,8 @@ _NOT_STATED = {
     "urdf": "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
     "forces and torques that you apply",
     "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
+    "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
+    "crazyflie": "thrust follows the volts of a motor; scale VMOTOR2THRUST0 to VMOTOR2THRUST3 by it",
 }
 """Why thrust or yaw torque of rotors is not put in, and what would do it."""
 
@@ -164,8 +182,12 @@ class _Corrections:
 
     def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
         """Put a number in the place of the stated one, where that is outside the interval."""
-        new, low, high = (stated.scale * each for each in found)
-        before, text = stated.scale * stated.value, f"{new:.4g}"
+        new, low, high = (stated.written(each) for each in found)
+        low, high, name = min(low, high), max(low, high), stated.name or name
+        before, text = stated.written(stated.value), f"{new:.4g}"
+        if stated.power < 0 and stated.value:
+            # What the number is the reciprocal of is the other way round.
+            words = words.replace("{share}", _share(found.value / stated.value))
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -173,6 +195,11 @@ class _Corrections:
         elif stated.span is not None:
             self.edits[stated.span] = text.encode()
             self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
+            for other in stated.also:
+                # An entry of a matrix that stands twice may be 0, and is the same then.
+                share = other.value / before if before else 1.0
+                same = share * new, *sorted((share * low, share * high))
+                self.replace(name, other, _Found(*same), words, whom, None)
         elif room is not None and self.of.model.format == "sdf":
             self.put(room, f"<{name}>{text}</{name}>")
             self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
@@ -226,7 +253,7 @@ class _Corrections:
         held: list[Stated] = [own for rotor in self.rotors if (own := getattr(rotor, kind)) is not None]
         if name is None or not held or len(held) < len(self.rotors):
             return False
-        wanted = [f"{own.scale * each.value:.4g}" for own, each in zip(held, found, strict=True)]
+        wanted = [f"{own.written(each.value):.4g}" for own, each in zip(held, found, strict=True)]
         for index, own in enumerate(held):
             alike = [other for other, each in enumerate(held) if own.span is not None and each.span == own.span]
             new = found[index]
@@ -248,7 +275,7 @@ def corrected(
     Parameters
     ----------
     vehicle : VehicleSettings
-        That flights were compared with: of the study that was made of the file, or one that was given.
+        That flights were compared with: of the study that was made of the file, with what it leaves open.
     flights : sequence of Recording
         That it was found in.
     """
@@ -283,14 +310,16 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
-    from_to = f"{whom[0]} to {whom[-1]}" if len(whom) > 2 else joined(list(dict.fromkeys(whom)))
-    return Change(**{**vars(change), "sentence": change.sentence.format(whom=from_to, **_sizes(change))})
+    whom = list(dict.fromkeys(whom))
+    first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
+    in_turn = len(whom) > 2 and whom == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(whom)
+    more = _share(change.after / change.before) if change.before else "not 0"
+    return replace(change, sentence=change.sentence.format(whom=names, share=more))
 
 
-def _sizes(change: Change) -> dict[str, str]:
-    share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
-    return {"share": more if change.before else "not 0"}
+def _share(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.3g} % {'more' if factor > 1 else 'less'}"
 
 
 def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
@@ -299,6 +328,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
         return
     measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
     turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
+    stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
     for place in made.of.turned:
         rotor, spin = made.rotors[place], made.of.spins[place]
         # The body turns against its rotors.
@@ -310,7 +340,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             made.unchanged.append(
                 f"the direction of {whom}: the log has it turn {way}, and flights do not show it ({size})"
             )
-        elif rotor.turn is None or rotor.turn.span is None:
+        elif rotor.turn is None or rotor.turn.span is None or sum(rotor.turn.span == each for each in stated) > 1:
             where = "the format states no direction" if rotor.turn is None else rotor.turn.where
             made.elsewhere.append(f"{says}; {where}: turn it round there")
         else:
@@ -318,7 +348,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             old = raw_bytes(span.file)[span.start : span.end]
             flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
             made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
-            name = "turningDirection" if is_word else "gear yaw"
+            name = rotor.turn.name or ("turningDirection" if is_word else "gear yaw")
             after = -rotor.turn.value
             numbers = (rotor.turn.value, after, *shown.times(after * spin)[1:])
             made.note(span.file, name, rotor.turn.where, numbers, says, whom)
@@ -346,10 +376,29 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
         held = quantity == "scales" or (
             rule is not None and rule(made, {number.name: number for number in each.numbers})
         )
+        held = held or _of_formula(made, each)
         if not held and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
+    """Correct the numbers of an effect whose very formula the simulator has; False where it has not."""
+    stated = made.of.model.effects.get(each.name)
+    if stated is None or any(number.name not in stated for number in each.numbers):
+        return False
+    for number in each.numbers:
+        own = stated[number.name]
+        made.replace(
+            own.name,
+            own,
+            _Found(number.value, number.low, number.high),
+            f"{find(each.name).title}: {{share}}",
+            "",
+            None,
+        )
+    return True
 
 
 def _not_found(made: _Corrections, found: Conclusion) -> None:
@@ -361,9 +410,17 @@ def _not_found(made: _Corrections, found: Conclusion) -> None:
         stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
         if kind not in tags or quantity in named or stated is None or stated.value == 0:
             continue
-        reason = hidden.get(quantity)
-        why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
-        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
+        _say_hidden(made, stated.name or tags[kind], stated, hidden.get(quantity))
+    names, reasons = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    for effect, numbers in made.of.model.effects.items():
+        for stated in numbers.values() if effect not in names else ():
+            if stated.value != 0:
+                _say_hidden(made, stated.name, stated, reasons.get(effect))
+
+
+def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | None) -> None:
+    why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
+    made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
 def _not_held(made: _Corrections, each: NamedEffect) -> None:
@@ -407,14 +464,16 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
 
 
 def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: str, common: _Found) -> None:
-    """Correct a number of each rotor by factors on that of the model which flights were compared with, or list it."""
+    """Correct a number of each rotor by factors on it, or list them where flights were compared with another number."""
     known = [
         {"thrust": k, "torque": b, "ratio": b / k}[kind]
         for k, b in ((each.thrust_factor_n_s2, each.drag_factor_n_m_s2) for each in made.vehicle.rotors)
     ]
-    found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
-    if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
-        return
+    stated = [own.value for rotor in made.rotors if (own := getattr(rotor, kind)) is not None]
+    if len(stated) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
+        found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
+        if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
+            return
     off = {
         f"M{index + 1}": f"{each.value:.4g} [{each.low:.4g}, {each.high:.4g}]"
         for index, each in enumerate(factors)
@@ -568,10 +627,12 @@ def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[st
             continue
         for span in own:
             raw = raw[: span.start] + edits[span] + raw[span.end :]
-        if own:
+        own_changes = [change for change in changes if change.file == made.of.model.output_names[file]]
+        if own and made.of.model.format in _OF_XML:
             at = _root_at(file)
-            own_changes = [change for change in changes if change.file == made.of.model.output_names[file]]
-            raw = raw[:at] + _comment(own_changes, flights, raw) + raw[at:]
+            raw = raw[:at] + _comment(_comment_lines(own_changes, flights), raw) + raw[at:]
+        elif own:
+            raw = with_comment(file, raw, _comment_lines(own_changes, flights))
         found[file] = raw
     return found
 
@@ -589,13 +650,19 @@ def _root_at(file: Path) -> int:
             return at
 
 
-def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
-    """Write what was changed as a comment, with intervals and flights."""
-    lines = [f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:"]
-    lines += [
-        f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
-        for each in changes
+def _comment_lines(changes: Sequence[Change], flights: Sequence[str]) -> list[str]:
+    """Write what was changed, with intervals and flights."""
+    return [
+        f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:",
+        *(
+            f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
+            for each in changes
+        ),
     ]
+
+
+def _comment(lines: Sequence[str], raw: bytes) -> bytes:
+    """Write what was changed as a comment of XML."""
     end = "\r\n" if b"\r\n" in raw else "\n"
     # Two hyphens end a comment, and files are in many encodings.
     text = re.sub("-(?=-)", "- ", end.join(map(visible, lines)))

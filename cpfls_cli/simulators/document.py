@@ -15,6 +15,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 from cpfls_cli.errors import InputError
 
 _LARGEST = 20_000_000
+_DEEPEST = 100
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
 _ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _WORD = re.compile(rb"\S+")
@@ -41,13 +42,26 @@ class Stated:
     span : Span or None
         Of the number itself; None where it is not stated.
     scale : float
-        The number in the file over its value in SI units.
+        The number in the file over its value in SI units, to the power.
+    power : int
+        Of the value: -1 where the file states a reciprocal, such as a rate for a time constant.
+    name : str
+        As files write it; empty where its format has one name for it.
+    also : tuple of Stated
+        Other numbers, as the file has them, that change in proportion to that of the file, as the rest of a curve does.
     """
 
     value: float
     where: str
     span: Span | None = None
     scale: float = 1.0
+    power: int = 1
+    name: str = ""
+    also: tuple[Stated, ...] = ()
+
+    def written(self, value: float) -> float:
+        """Give a value in SI units as the file states it."""
+        return self.scale * value**self.power
 
 
 @dataclass
@@ -167,6 +181,7 @@ class _Builder:
         self.file, self._open = file, list[Node]()
         self.expat: Any = None
         self.root: Node | None = None
+        self.deepest = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         above = self._open[-1] if self._open else None
@@ -177,6 +192,7 @@ class _Builder:
         else:
             above.children.append(node)
         self._open.append(node)
+        self.deepest = max(self.deepest, len(self._open))
 
     def end(self, _tag: str) -> None:
         self._open.pop().close = self.expat.CurrentByteIndex
@@ -189,13 +205,13 @@ class _Builder:
         return self.root
 
 
-def read_xml(file: Path) -> Node:
-    """Read a file of XML; entities and document types, which no model needs, are refused.
+def read_bytes(file: Path) -> bytes:
+    """Read a file, and keep its bytes to correct them.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is no XML.
+        If it cannot be read, or is larger than any model.
     """
     try:
         with file.open("rb") as stream:
@@ -204,9 +220,21 @@ def read_xml(file: Path) -> Node:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
     if len(raw) > _LARGEST:
         raise InputError(f"{file}: is larger than {_LARGEST / 1e6:g} MB, which no model is")
+    _READ[file] = raw
+    return raw
+
+
+def read_xml(file: Path) -> Node:
+    """Read a file of XML; entities and document types, which no model needs, are refused.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no XML.
+    """
+    raw = read_bytes(file)
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw[:4]:
         raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
-    _READ[file] = raw
     builder = _Builder(file)
     parser = DefusedXMLParser(target=builder, forbid_dtd=True)
     builder.expat = parser.parser
@@ -222,5 +250,7 @@ def read_xml(file: Path) -> Node:
         raise InputError(f"{file}: is in an encoding that cannot be read; save it in UTF-8") from None
     except ParseError as error:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
+    if builder.deepest > _DEEPEST:
+        raise InputError(f"{file}: has {builder.deepest} elements in each other, which no model has; correct it there")
     assert isinstance(root, Node), "a file without an element is no XML"
     return root

@@ -97,7 +97,7 @@ class _File:
         own = {tag: dict(values) for tag, values in above.items()}
         for child in node.children:
             if child.tag != "default":
-                own[child.tag] = own.get(child.tag, {}) | child.attributes
+                own[_shared(child.tag)] = own.get(_shared(child.tag), {}) | child.attributes
         self.defaults[name] = own
         for child in node.all("default"):
             self._default(child, own, name)
@@ -105,7 +105,7 @@ class _File:
     def of(self, node: Node, childclass: str) -> dict[str, str]:
         """Give the attributes of an element with those that it has by default."""
         usual = self.defaults.get(node.attributes.get("class", childclass), self.defaults.get("main", {}))
-        return {**usual.get(node.tag, {}), **node.attributes}
+        return {**usual.get(_shared(node.tag), {}), **node.attributes}
 
     def placed(self, node: Node, attributes: Mapping[str, str]) -> Array:
         """Give the pose of an element in that of its body, shape (4, 4)."""
@@ -130,6 +130,11 @@ class _File:
         elif "zaxis" in held:
             turn = _upward(unit(node, "zaxis", held["zaxis"]))
         return pose(turn, place)
+
+
+def _shared(tag: str) -> str:
+    """Name the defaults of an element: all actuators have the same."""
+    return "motor" if tag == "general" else tag
 
 
 def _upward(axis: Array) -> Array:

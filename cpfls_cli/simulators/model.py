@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Stated
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 GRAVITY = 9.81
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -130,6 +131,12 @@ class SimulatorModel:
         What is odd about the file.
     files : tuple of Path
         All files that it was read from, itself first.
+    effects : mapping from str to mapping from str to Stated
+        Numbers of effects by their coefficients, where the format has their very formulas.
+    of_commands : bool
+        Whether speeds are commands times the largest speed, so that logged speeds are others.
+    section : str
+        Which vehicle of a file with several.
     """
 
     name: str
@@ -139,6 +146,9 @@ class SimulatorModel:
     cannot: tuple[str, ...]
     notes: tuple[str, ...]
     files: tuple[Path, ...]
+    effects: Mapping[str, Mapping[str, Stated]] = field(default_factory=dict)
+    of_commands: bool = False
+    section: str = ""
 
     @property
     def file(self) -> Path:
@@ -178,6 +188,11 @@ class SimulatorModel:
             apart = body.centre - self.centre
             total += body.inertia + body.mass.value * (apart @ apart * np.eye(3) - np.outer(apart, apart))
         return total
+
+    @property
+    def states_inertia(self) -> bool:
+        """Whether the file states any inertia."""
+        return bool(self.inertia.any())
 
     @property
     def moments(self) -> tuple[float, ...]:
@@ -232,7 +247,7 @@ def checked(model: SimulatorModel) -> SimulatorModel:
     for body in model.bodies:
         _require_body(body)
     if not model.mass_kg > 0:
-        raise InputError(f"{model.file}: no link has a mass; write one, such as <mass>1.5</mass>")
+        raise InputError(f"{model.file}: states no mass above 0 ({model.bodies[0].mass.where}); write one")
     for rotor in model.rotors:
         if rotor.axis[2] < _STRAIGHT:
             raise InputError(
@@ -263,6 +278,36 @@ def part_of(
     turned = at[:3, :3]
     inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
     return Body(name, mass, at[:3, 3], inertia, turned, link[:3, :3], tuple(entries), tuple(place), node)
+
+
+def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
+    """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
+    return part_of(name, mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
+
+
+def of_settings(file: Path, vehicle: VehicleSettings, lag_s: float) -> SimulatorModel:
+    """Take what flights found of a vehicle for a model as a simulator's file states one."""
+    where = f"{file.name}: as flights have it"
+    entries = [Stated(value, where) for value in (*vehicle.inertia_kg_m2, 0.0, 0.0, 0.0)[:6]]
+    lag = Stated(lag_s, where) if lag_s > 0 else None
+    rotors = tuple(
+        Rotor(
+            f"rotor {index}",
+            where,
+            np.array(rotor.position_m),
+            np.array([0.0, 0.0, 1.0]),
+            rotor.spin,
+            thrust=Stated(rotor.thrust_factor_n_s2, where),
+            torque=Stated(rotor.drag_factor_n_m_s2, where),
+            speed_max=Stated(vehicle.rotor_speed_max_rad_s, where),
+            lag_up=lag,
+            lag_down=lag,
+        )
+        for index, rotor in enumerate(vehicle.rotors, 1)
+    )
+    body = of_one_body(file.stem, Stated(vehicle.mass_kg, f"{file.name}: of its config"), entries, where)
+    cannot = ("what effects it has: `cpfls gap` takes the file itself with all of them",)
+    return SimulatorModel(file.stem, "vehicle", (body,), rotors, cannot, (), (file,))
 
 
 def turning(node: Node, what: str) -> InputError:

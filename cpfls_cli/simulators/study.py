@@ -21,12 +21,21 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.document import Stated
-from cpfls_cli.simulators.formats import format_of
+from cpfls_cli.simulators.formats import as_stated
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
-_PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
+_PROGRAMS = {
+    "sdf": "Gazebo",
+    "urdf": "gym-pybullet-drones",
+    "mjcf": "MuJoCo",
+    "rotorpy": "RotorPy",
+    "ardupilot": "ArduPilot's SITL",
+    "crazyflow": "crazyflow",
+    "crazyflie": "the Crazyflie's firmware",
+    "vehicle": "cpfls",
+}
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -78,6 +87,8 @@ class VehicleOf:
     spins: tuple[int, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    by_speed: bool = True
+    """Whether the speeds of the log are those that the file's thrust goes by."""
 
     @property
     def program(self) -> str:
@@ -90,9 +101,9 @@ class VehicleOf:
         return _short(self.model.centre.tolist())
 
     @property
-    def inertia(self) -> list[float]:
-        """Moments of inertia, kg m^2, and products where there are any."""
-        return _short(list(self.model.moments))
+    def inertia(self) -> list[float] | None:
+        """Moments of inertia, kg m^2, and products where there are any; None where the file states none."""
+        return _short(list(self.model.moments)) if self.model.states_inertia else None
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -118,8 +129,9 @@ class VehicleOf:
         hubs, found = self.model.hubs, []
         for index, spin in zip(self.order, self.spins, strict=True):
             rotor = self.model.rotors[index]
-            thrust = None if rotor.thrust is None else rotor.thrust.value
-            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor))
+            thrust = rotor.thrust.value if rotor.thrust is not None and self.by_speed else None
+            drag = rotor.drag_factor if self.by_speed else None
+            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, drag))
             comment = f"{rotor.name}, {rotor.where}"
             comment += "; it turns the other way there" if spin * rotor.spin < 0 else ""
             found.append(RotorLine(_short(hubs[index].tolist()), spin, thrust, drag, comment))
@@ -129,7 +141,9 @@ class VehicleOf:
         """Say where a quantity of the first rotor stands."""
         rotor = self.model.rotors[self.order[0]]
         if quantity == "thrust":
-            return "not stated, for controls are thrusts" if rotor.thrust is None else rotor.thrust.where
+            if not self.by_speed:
+                return "by command, and the log has speeds"
+            return "not stated by speed" if rotor.thrust is None else rotor.thrust.where
         stated = rotor.torque or rotor.ratio
         ratio = f", {rotor.ratio.value:g} m times the thrust" if rotor.ratio is not None else ""
         return "not stated" if stated is None else f"{stated.where}{ratio}"
@@ -182,9 +196,9 @@ def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | No
         warnings += turned
     speed, where = _speed(model, proposal)
     mass = model.mass_kg if mass_kg is None else mass_kg
-    return VehicleOf(
-        model, mass_kg is not None, _short([mass])[0], speed, where, order, spins, tuple(notes), tuple(warnings)
-    )
+    by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
+    given, short = mass_kg is not None, _short([mass])[0]
+    return VehicleOf(model, given, short, speed, where, order, spins, tuple(notes), tuple(warnings), by_speed)
 
 
 def _order(model: SimulatorModel, airframe: Airframe) -> tuple[tuple[int, ...], str]:
@@ -253,7 +267,8 @@ def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> Simulator
             copy = copied / file.resolve().relative_to(folder)
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(texts.get(names[file]) or file.read_bytes())
-        return format_of(model.file).read(copied / model.file.resolve().relative_to(folder))
+        main = copied / model.file.resolve().relative_to(folder)
+        return as_stated(main.with_name(f"{main.name}:{model.section}") if model.section else main)
 
 
 def _settings(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> VehicleSettings:
@@ -263,13 +278,13 @@ def _settings(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehic
         most, before = (each.model.rotors[index].most for each in (of, given))
         more = most.value / before.value if most is not None and before is not None else 1.0
         known = {
-            "spin": line.spin,
+            "spin": of.model.rotors[index].spin,
             "thrust_factor_n_s2": line.thrust or more * own.thrust_factor_n_s2,
             "drag_factor_n_m_s2": line.drag or more * own.drag_factor_n_m_s2,
         }
         numbers = {key: value for key, value in known.items() if value}
         rotors.append(RotorSettings(**{**vars(own), **numbers, "position_m": tuple(line.position_m)}))
-    whole: dict[str, Any] = {"inertia_kg_m2": tuple(of.inertia), "rotors": tuple(rotors)}
+    whole: dict[str, Any] = {"inertia_kg_m2": tuple(of.inertia or stated.inertia_kg_m2), "rotors": tuple(rotors)}
     return replace(stated, mass_kg=of.mass_kg, **whole)
 
 
@@ -282,6 +297,9 @@ def vehicle_of(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehi
     shares = {name: float(np.mean([own(rotor) for rotor in rotors])) for name, own in _FLOWN.items()}
     found = [(each.name, shares.get(str(each.quantity), 0.0)) for each in CATALOGUE.values()]
     effects = [ModelEffect(name, {}, np.array([share])) for name, share in found if share]
+    for name, stated_numbers in of.model.effects.items():
+        values = [stated_numbers[each.name].value for each in CATALOGUE[name].coefficients]
+        effects += [ModelEffect(name, {}, np.array(values))] if any(values) else []
     lag = np.mean([rotor.lag_up.value for rotor in rotors if rotor.lag_up] or [0.0])
     return VehicleModel(
         vehicle=_settings(of, given, stated),

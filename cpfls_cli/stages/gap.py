@@ -13,14 +13,14 @@ from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.artifacts.gate import format_name
+from cpfls_cli.artifacts.gate import format_name, read_origin
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.models import is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
@@ -51,7 +51,8 @@ ConfigArgument = Annotated[
     Path,
     typer.Argument(
         metavar="CONFIG",
-        help="Study config (YAML); or a simulator's own file (SDF, URDF, MJCF), which is corrected.",
+        help="Study config (YAML); a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow), which is "
+        "corrected; or vehicle.h5.",
         show_default=False,
     ),
 ]
@@ -88,7 +89,7 @@ class Gap:
     Gap,
     words={**WORDS, **of_diagnosis.WORDS},
     fills=Filled(PARTS),
-    study=lambda given: not is_simulator_file(given["config"]),
+    study=lambda given: not is_simulator_file(given["config"]) and not is_found(given["config"]),
 )
 def gap(
     run: Run,
@@ -99,10 +100,12 @@ def gap(
 ) -> Gap | None:
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 
-    The search adds one effect after another until nothing more can be named, so once through is all the way. Where the
-    model is a simulator's own file, a study is made of it, and the file corrected.
+    The search adds one effect after another until nothing more can be named, so once through is all the way. Of a
+    simulator's own file a study is made, and the file corrected; a vehicle that was found has its study with it.
     """
     held_out = held_out or []
+    if is_found(config):
+        model = _study_in(run, config, model)
     of_file = _study_of(run, config, [*flights, *held_out]) if is_simulator_file(config) else None
     with_numbers(run, "gap", model)
     why = "" if run.found is None else why_no_body_found(run, run.found)
@@ -150,6 +153,18 @@ def gap(
     return answer
 
 
+def _study_in(run: Run, file: Path, model: Path | None) -> Path:
+    """Take the study that a vehicle was found with, and the vehicle for the model."""
+    if model is not None:
+        raise InputError(f"--model {model}: {file} is the model; give one of the two, with a config for --model")
+    text = read_origin(file).config
+    run.study = stored_study(text, file)
+    run.with_config, run.config = True, run.output / _STUDY
+    run.outputs.append(run.config)
+    run.texts[run.config] = text
+    return file
+
+
 def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
     stated = Stated(model=taken(run, file, "simulator"))
@@ -174,7 +189,7 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
 
 def _with_file(run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings, split: FlightSplit) -> Diagnosis:
     """Put what was found into the simulator's file, and play held-out flights back in it."""
-    said, files = corrected(of, vehicle, found, split.training)
+    said, files = corrected(of, run.study.vehicle, found, split.training)
     run.texts.update({run.output / name: text for name, text in files.items()})
     before_after = flown(of, files, vehicle, split.training, split.held_out, run.study.gap)
     return replace(found, corrected=replace(said, flown=before_after))

@@ -27,6 +27,7 @@ from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.flights.imported import imported
+from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
@@ -35,8 +36,8 @@ from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
-from cpfls_cli.simulators.formats import read_model
-from cpfls_cli.simulators.model import SimulatorModel
+from cpfls_cli.simulators.formats import file_of, read_model
+from cpfls_cli.simulators.model import SimulatorModel, of_settings
 from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -59,7 +60,8 @@ FromOption = Annotated[
     typer.Option(
         "--from",
         metavar="MODEL",
-        help="A simulator's own file, whose vehicle the config gets: SDF, URDF or MJCF.",
+        help="A simulator's own file, whose vehicle the config gets (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow, "
+        "Crazyflie), or vehicle.h5.",
         show_default=False,
     ),
 ]
@@ -295,8 +297,11 @@ def init(
 
 
 def taken(run: Run, model: Path, role: str) -> SimulatorModel:
-    """Read a simulator's file, which is an input of the run with all that it includes."""
-    run.take({role: model})
+    """Read a simulator's file, which is an input of the run with all that it includes, or a vehicle that was found."""
+    run.take({role: file_of(model)})
+    if is_found(model):
+        found = found_vehicle(model).model
+        return of_settings(model, found.vehicle, found.response.lag_s)
     read = read_model(model)
     run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
     return read

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
-from tests.builders.simulator_files import sdf_of, write_log
+from tests.builders.simulator_files import rotorpy_of, sdf_of, write_log
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
@@ -101,3 +101,18 @@ def test_a_file_that_is_right_stays(tmp_path, logs):
     said, _ = corrected(tmp_path, logs)
     assert said["corrected"]["changes"] == []
     assert (tmp_path / "gap" / "mine.sdf").read_bytes() == (tmp_path / "mine.sdf").read_bytes()
+
+
+def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
+    """RotorPy's dictionary, whose other numbers and text stay as they are."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(rotorpy_of(TRUE, thrust=1 / 0.83))
+    result = command_line.run("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", tmp_path / "gap", "--json")
+    assert result.exit_code == 0, result.stderr
+    (change,) = json.loads(result.stdout)["corrected"]["changes"]
+    assert change["element"] == "quad_params.k_eta"
+    assert change["low"] < TRUE.thrust_factor < change["high"]
+    before, after = mine.read_text().splitlines(), (tmp_path / "gap" / "mine.py").read_text().splitlines()
+    assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")
+    (differs,) = [pair for pair in zip(before[1:], after[3:], strict=True) if pair[0] != pair[1]]
+    assert differs[1] == f"    'k_eta': {change['after']:.4g},  # from a data sheet"

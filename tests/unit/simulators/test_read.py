@@ -204,7 +204,7 @@ def test_numbers_of_a_file_in_latin_1_have_their_places(tmp_path):
 
 
 QUAD = """<mujoco><compiler angle="radian"{compiler}/><default><geom density="100"/></default>
-  <default><motor ctrlrange="0 5"/></default>
+  <default><general ctrlrange="0 5"/></default>
   <worldbody><body name="quad"><freejoint/>
     <geom type="box" size="0.05 0.05 0.01"/><inertial pos="0 0 0" mass="0.5" diaginertia="1e-3 1e-3 2e-3"/>
     <site name="a" pos="0.1 0.1 0"{site}/><site name="b" pos="-0.1 -0.1 0"/>{more}</body></worldbody>
@@ -308,6 +308,7 @@ GOOD = sdf_of(SMALL)
 BOMB = """<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]><sdf version="1.9"><model name="&b;"/></sdf>"""
 BAD = {
     "bomb": (BOMB, "has a DOCTYPE or entities of its own"),
+    "deep": ("<sdf>" * 200 + "</sdf>" * 200, "has 200 elements in each other"),
     "broken": (GOOD.replace("</model>", ""), "is no valid XML"),
     "empty": ("", "is no valid XML"),
     "other": ("<html/>", "begins with <html>, which is no model known here"),
