@@ -28,8 +28,9 @@ What `cpfls look` identifies in one log of each, with nothing else known of the 
 repositories named, and are not part of this one. `make gallery REPOSITORIES=FOLDER` writes this page anew from clones
 of them.
 
-Effectiveness is the angular acceleration for a full command of the axis, with the total delay from command to rotation;
-uneven rotors are shares of thrust off the mean, beyond their intervals. Answers are counted as yes, roughly and no.
+Effectiveness is the angular acceleration for a full command of the axis, with the total delay from command to rotation:
+about yaw that may be below 0, for rotors that speed up turn the vehicle before their drag does. Uneven rotors are shares
+of thrust off the mean, beyond their intervals. Answers are counted as yes, roughly and no.
 """
 COLUMNS = ("Vehicle", "Log", "Flown", "Hover throttle", "Effectiveness, delay", "Uneven rotors", "Answers", "Missing")
 
@@ -89,8 +90,8 @@ def _plants(plants: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _interval(number: Mapping[str, float], times: float = 1.0, offset: float = 0.0) -> str:
-    value, low, high = (times * (number[key] + offset) for key in ("value", "low", "high"))
-    return f"{value:.3g} [{low:.3g}, {high:.3g}]"
+    ends = (float(f"{times * (number[key] + offset):.3g}") for key in ("value", "low", "high"))
+    return "{:g} [{:g}, {:g}]".format(*ends)
 
 
 if __name__ == "__main__":
