@@ -29,8 +29,8 @@ repositories named, and are not part of this one. `make gallery REPOSITORIES=FOL
 of them.
 
 Effectiveness is the angular acceleration for a full command of the axis, with the total delay from command to rotation:
-about yaw that may be below 0, for rotors that speed up turn the vehicle before their drag does. Uneven rotors are shares
-of thrust off the mean, beyond their intervals. Answers are counted as yes, roughly and no.
+about yaw that may be below 0, for rotors that speed up turn the vehicle before their drag does. Uneven rotors are
+shares of thrust off the mean, beyond their intervals. Answers are counted as yes, roughly and no.
 """
 COLUMNS = ("Vehicle", "Log", "Flown", "Hover throttle", "Effectiveness, delay", "Uneven rotors", "Answers", "Missing")
 
