@@ -204,13 +204,8 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     plus; the one that explains most is taken. Where that is not clear, slow gusts and the answer to them may hide it:
     then what is fast alone may say it, as a guess. None for another number of rotors, or where nothing is explained.
 
-    Parameters
-    ----------
-    body_rate : array, shape (time, 3), rad/s, body frame FLU
-    speed : array, shape (time, 4)
-        In any unit that is a share of the speed.
-    is_command : bool
-        Whether the motors follow later.
+    Body rates are of shape (time, 3), rad/s, FLU; speeds of shape (time, 4), in any unit that is a share of the speed;
+    motors follow commands later.
     """
     if speed.shape[1] != 4 or len(speed) < 5 * rate_hz or not speed.any():
         return None
