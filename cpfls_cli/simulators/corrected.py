@@ -203,6 +203,9 @@ class _Corrections:
         new, low, high = (stated.written(each) for each in found)
         low, high, name = min(low, high), max(low, high), stated.name or name
         before, text = stated.written(stated.value), f"{new:.4g}"
+        if stated.power < 0 and stated.value:
+            # What the number is the reciprocal of is the other way round.
+            words = words.replace("{share}", _share(found.value / stated.value))
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -325,13 +328,16 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
-    own = list(dict.fromkeys(whom))
-    first = int(own[0][1:]) if re.fullmatch(r"M\d+", own[0]) else 0
-    in_turn = len(own) > 2 and own == [f"M{first + place}" for place in range(len(own))]
-    names = f"{own[0]} to {own[-1]}" if in_turn else joined(own)
-    share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}" if change.before else "not 0"
+    whom = list(dict.fromkeys(whom))
+    first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
+    in_turn = len(whom) > 2 and whom == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(whom)
+    more = _share(change.after / change.before) if change.before else "not 0"
     return replace(change, sentence=change.sentence.format(whom=names, share=more))
+
+
+def _share(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.3g} % {'more' if factor > 1 else 'less'}"
 
 
 def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
