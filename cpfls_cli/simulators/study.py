@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from os.path import commonpath
@@ -151,18 +151,14 @@ class VehicleOf:
     @property
     def besides(self) -> list[str]:
         """What the file states of the first rotor and the vehicle of a study does not hold."""
-        if not self.model.rotors:
-            return []
-        return list(_besides(self.model.rotors[self.order[0]]))
-
-
-def _besides(rotor: Rotor) -> Iterator[str]:
-    for name, (words, unit) in _BESIDES.items():
-        stated: Stated | None = getattr(rotor, name)
-        if stated is None:
-            continue
-        down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
-        yield f"{words} {stated.value:g} {unit}{down} ({stated.where})"
+        found = []
+        for name, (words, unit) in _BESIDES.items() if self.model.rotors else ():
+            rotor = self.model.rotors[self.order[0]]
+            stated: Stated | None = getattr(rotor, name)
+            if stated is not None:
+                down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
+                found.append(f"{words} {stated.value:g} {unit}{down} ({stated.where})")
+        return found
 
 
 def _short(values: list[float]) -> list[float]:
