@@ -135,7 +135,9 @@ class VehicleOf:
         """What the file states of the first rotor and the vehicle of a study does not hold."""
         if not self.model.rotors:
             return []
-        return list(_besides(self.model.rotors[self.order[0]]))
+        known = [own for numbers in self.model.effects.values() for own in numbers.values() if own.value != 0]
+        effects = [f"{own.name.rpartition('.')[2]} {own.value:g} ({own.where})" for own in known]
+        return [*_besides(self.model.rotors[self.order[0]]), *effects]
 
 
 def _besides(rotor: Rotor) -> Iterator[str]:
