@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_dilation, binary_opening, uniform_filter1d
+from scipy.ndimage import binary_closing, binary_dilation, binary_opening, correlate1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.units import STANDARD_GRAVITY
@@ -122,7 +122,8 @@ def averaged(values: Array, period: float, seconds: float) -> Array:
     width = max(1, round(seconds / period))
     if len(values) < width:
         return np.broadcast_to(values.mean(axis=0), values.shape)
-    return np.asarray(uniform_filter1d(np.asarray(values, dtype=float), width, axis=0, mode="constant"))
+    window = np.ones(width) / width
+    return np.asarray(correlate1d(np.asarray(values, dtype=float), window, axis=0, mode="constant"))
 
 
 def smoothed(marked: BoolArray, period: float, shortest_s: float) -> BoolArray:
