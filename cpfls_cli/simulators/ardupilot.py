@@ -30,6 +30,7 @@ KEYS = ("hoverThrOut", "diagonal_size", "propExpo", "refRotRate")
 """Of which such a file has some."""
 _GRAVITY, _YAW_SHARE, _AIR, _THRUST_NUMBER = 9.80665, 0.05, 1.2, 0.025
 """The last is that of usual propellers which fit between the motors."""
+_MOST_MOTORS = 32
 _USUAL = {
     "mass": 3.0, "diagonal_size": 0.35, "hoverThrOut": 0.39, "propExpo": 0.65, "spin_min": 0.15, "spin_max": 0.95,
     "num_motors": 4.0,
@@ -56,6 +57,11 @@ def read_ardupilot(file: Path) -> SimulatorModel:
         raise InputError(f"{file}: states none of {', '.join(KEYS)}, so it is no frame of ArduPilot's SITL; give one")
     notes = list[str]()
     mass, size, motors = (_or_usual(numbers, key) for key in ("mass", "diagonal_size", "num_motors"))
+    for each in (mass, size, motors):
+        if not each.value > 0:
+            raise InputError(f"{each.where} is {each.value:g}; write a number above 0")
+    if motors.value not in range(1, _MOST_MOTORS + 1):
+        raise InputError(f"{motors.where} is {motors.value:g}; write a number of motors, at most {_MOST_MOTORS}")
     given = [numbers.get("moment_inertia", axis) for axis in range(3)]
     shares = (0.25, 0.25, 0.5)
     if any(each is None or each.value == 0 for each in given):

@@ -73,7 +73,13 @@ _TAGS = {
         "rolling": "rollingMomentCoefficient",
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
-    "mjcf": {"thrust": "gear z", "torque": "gear yaw", "ratio": "gear yaw"},
+    "mjcf": {
+        "thrust": "gear z",
+        "torque": "gear yaw",
+        "ratio": "gear yaw",
+        "lag_up": "dynprm",
+        "lag_down": "dynprm",
+    },
     "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
     "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
     "crazyflow": {
@@ -104,6 +110,15 @@ class _Found(NamedTuple):
     low: float
     high: float
 
+    @classmethod
+    def of(cls, number: Estimate) -> _Found:
+        """Take an estimate."""
+        return cls(number.value, number.low, number.high)
+
+    def plus(self, added: float) -> _Found:
+        """Add what is exact."""
+        return _Found(*(each + added for each in self))
+
     def times(self, factor: float) -> _Found:
         ends = factor * self.low, factor * self.high
         return _Found(factor * self.value, min(ends), max(ends))
@@ -133,13 +148,11 @@ _ONE = _Found(1.0, 1.0, 1.0)
 
 def _significant(factor: _Found, wider: float) -> _Found:
     """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0, wider) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+    return factor if factor.contradicts(1.0, wider) else factor.plus(1.0 - factor.value)
 
 
 def _part(number: Estimate | None, times: float) -> _Found:
-    return (
-        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
-    )
+    return _Found(0.0, 0.0, 0.0) if number is None else _Found.of(number).times(float(times))
 
 
 def _sum(*parts: _Found) -> _Found:
@@ -150,7 +163,7 @@ def _sum(*parts: _Found) -> _Found:
 
 
 def _factor(number: Estimate | None) -> _Found:
-    return _ONE if number is None else _Found(1 + number.value, 1 + number.low, 1 + number.high)
+    return _ONE if number is None else _Found.of(number).plus(1.0)
 
 
 @dataclass
@@ -190,6 +203,9 @@ class _Corrections:
         new, low, high = (stated.written(each) for each in found)
         low, high, name = min(low, high), max(low, high), stated.name or name
         before, text = stated.written(stated.value), f"{new:.4g}"
+        if stated.power < 0 and stated.value:
+            # What the number is the reciprocal of is the other way round.
+            words = words.replace("{share}", _share(found.value / stated.value))
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
@@ -312,12 +328,16 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
+    whom = list(dict.fromkeys(whom))
     first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
-    in_turn = len(whom) > 2 and list(whom) == [f"M{first + place}" for place in range(len(whom))]
-    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(list(dict.fromkeys(whom)))
-    share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}" if change.before else "not 0"
+    in_turn = len(whom) > 2 and whom == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(whom)
+    more = _share(change.after / change.before) if change.before else "not 0"
     return replace(change, sentence=change.sentence.format(whom=names, share=more))
+
+
+def _share(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.3g} % {'more' if factor > 1 else 'less'}"
 
 
 def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
@@ -388,14 +408,7 @@ def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
         return False
     for number in each.numbers:
         own = stated[number.name]
-        made.replace(
-            own.name,
-            own,
-            _Found(number.value, number.low, number.high),
-            f"{find(each.name).title}: {{share}}",
-            "",
-            None,
-        )
+        made.replace(own.name, own, _Found.of(number), f"{find(each.name).title}: {{share}}", "", None)
     return True
 
 
@@ -503,23 +516,15 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    factors = {
-        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-        for index, axis in enumerate("xyz")
-        if f"inertia_{axis}" in numbers
-    }
-    _inertia(made, factors)
+    for index, axis in enumerate("xyz"):
+        if f"inertia_{axis}" in numbers:
+            factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+            _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
 
 
-def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
+def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
     """Change entries of the inertia of the heaviest link by what that of the vehicle is off."""
     whole, own = made.of.model.inertia, made.of.model.heaviest
-    known = symmetric(made.vehicle.inertia_kg_m2)
-    wanted = {entry: factor.times(float(known[INERTIA_ENTRIES[entry]])) for entry, factor in factors.items()}
-    wanted |= {
-        entry: _Found(*(float(known[INERTIA_ENTRIES[entry]]) + each for each in added))
-        for entry, added in (products or {}).items()
-    }
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
         if not own.entries or not _straight(own.turned):
@@ -529,8 +534,7 @@ def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mappin
                     f"kg m^2, and not {total:.4g}: {own.inertia_at} states it in other axes, or not; change it there"
                 )
             continue
-        rest = total - float(own.inertia[INERTIA_ENTRIES[entry]])
-        new = _Found(*(each - rest for each in found))
+        new = found.plus(float(own.inertia[INERTIA_ENTRIES[entry]]) - total)
         words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
         room = None if own.node is None else own.node.first("inertia")
@@ -542,8 +546,9 @@ def _straight(turned: Array) -> bool:
 
 
 def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    found = list(numbers.values())
-    _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
+    known = symmetric(made.vehicle.inertia_kg_m2)
+    added = dict(enumerate(list(numbers.values())[:3], start=3))
+    _inertia(made, {at: _Found.of(each).plus(float(known[INERTIA_ENTRIES[at]])) for at, each in added.items()})
     return True
 
 
@@ -555,7 +560,7 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         own = numbers.get(f"c_{name}")
         if own is None:
             continue
-        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        found = _Found.of(own).times(share).plus(place[axis])
         words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
         if not _straight(body.link):
             if found.contradicts(place[axis], made.wider):
@@ -586,23 +591,17 @@ def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         )
         return True
     for kind in ("lag_up", "lag_down"):
-        alike = [_Found(tau.value, tau.low, tau.high)] * len(made.rotors)
-        made.of_rotors(kind, alike, "time constant of {whom} is {share}")
+        made.of_rotors(kind, [_Found.of(tau)] * len(made.rotors), "time constant of {whom} is {share}")
     return True
 
 
 def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["k_d"]
-    return made.of_rotors(
-        "drag", [_Found(own.value, own.low, own.high)] * len(made.rotors), "drag of {whom} is {share}"
-    )
+    return made.of_rotors("drag", [_Found.of(numbers["k_d"])] * len(made.rotors), "drag of {whom} is {share}")
 
 
 def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["mu"]
-    signed = _Found(own.value, own.low, own.high)
-    alike = [signed.times(rotor.spin) for rotor in made.vehicle.rotors]
-    return made.of_rotors("rolling", alike, "rolling moment of {whom} is {share}")
+    signed = [_Found.of(numbers["mu"]).times(rotor.spin) for rotor in made.vehicle.rotors]
+    return made.of_rotors("rolling", signed, "rolling moment of {whom} is {share}")
 
 
 _RULES: dict[Quantity, Callable[[_Corrections, Mapping[str, Estimate]], bool]] = {

@@ -60,6 +60,8 @@ _INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 def _rotors(numbers: Numbers, name: str, weight: float) -> tuple[tuple[Rotor, ...], tuple[str, ...]]:
     count = numbers.count(name, "mixing_matrix", 0)
+    if not count or not weight > 0:
+        raise InputError(f"{numbers.file}: {name} has no mixing_matrix of rotors, or no mass above 0; write both")
     mixing = [numbers.row(name, "mixing_matrix", row, count=count) for row in range(3)]
     length = numbers.need(name, "L").value
     thrust, torque, dynamics = (

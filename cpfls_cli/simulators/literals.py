@@ -13,6 +13,7 @@ import math
 import operator
 import re
 import tomllib
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,6 +124,10 @@ class Expressions:
 
     def value(self, node: ast.expr) -> Any:
         """Evaluate what is a number, or an array of them."""
+        with np.errstate(all="raise", under="ignore"):
+            return self._value(node)
+
+    def _value(self, node: ast.expr) -> Any:
         match node:
             case ast.Constant(value=bool() | str() | None):
                 return node.value
@@ -216,9 +221,15 @@ def _short(node: ast.AST) -> str:
     return text if len(text) < 40 else f"{text[:37]}..."
 
 
+def _tree(text: str, mode: str) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)
+        return ast.parse(text, mode=mode)
+
+
 def _parsed(file: Path, text: str, mode: str, what: str) -> Any:
     try:
-        return ast.parse(text, mode=mode)
+        return _tree(text, mode)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         raise InputError(f"{file}{line}: is no {what} that can be read; correct it there") from None
@@ -228,9 +239,8 @@ def _collected(expressions: Expressions, parts: Iterator[tuple[Key, ast.expr]], 
     """Collect the numbers of named expressions; what none of them is said with its line."""
     numbers = Numbers(expressions.file)
     try:
-        with np.errstate(all="raise", under="ignore"):
-            for key, node in parts:
-                numbers.found.update(expressions.leaves(node, key))
+        for key, node in parts:
+            numbers.found.update(expressions.leaves(node, key))
     except _RefusedError as error:
         raise InputError(f"{expressions.file}, line {error.line}: {error}; {remedy}") from None
     except (ArithmeticError, ValueError, TypeError, RecursionError) as error:
@@ -370,7 +380,7 @@ def _define(numbers: Numbers, names: Expressions, defined: set[str], rest: str, 
         return
     names.start = lambda _line, column: place + found.start(2) + column
     try:
-        node = ast.increment_lineno(ast.parse(found[2], mode="eval"), line - 1).body
+        node = ast.increment_lineno(_tree(found[2], "eval"), line - 1).body
         names.values[found[1]] = names.value(node)
         numbers.found.update(names.leaves(node, (found[1],)))
     except (_RefusedError, SyntaxError, ArithmeticError, ValueError, TypeError, RecursionError, MemoryError):
@@ -387,7 +397,7 @@ def _holds(names: Expressions, defined: set[str], word: str, rest: str, line: in
     # What is not defined counts as 0.
     text = re.sub(r"\b[A-Za-z_]\w*", lambda own: own[0] if own[0] in {*names.values, "and", "or", "not"} else "0", text)
     try:
-        return bool(names.value(ast.parse(text.strip(), mode="eval").body))
+        return bool(names.value(_tree(text.strip(), "eval").body))
     except (_RefusedError, SyntaxError, ArithmeticError, ValueError, TypeError, RecursionError, MemoryError):
         raise InputError(f"{names.file}, line {line}: the condition {rest!r} is not understood; resolve it") from None
 

@@ -14,7 +14,7 @@ from cpfls_cli.simulators.study import of_log
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_artifacts import named_effect
 from tests.builders.gusty_flights import SMALL
-from tests.builders.simulator_files import sdf_of
+from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of
 
 URDF = """<robot name="cf2">
   <properties arm="0.046" kf="{kf}" km="1.3e-12" thrust2weight="3" drag_coeff_xy="1e-7"/>
@@ -345,6 +345,17 @@ def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], [1.26e-10, 1.2e-10, 1.14e-10, 1.2e-10])
 
 
+def test_a_filter_of_mjcf_is_the_lag(tmp_path):
+    path = tmp_path / "cf2.xml"
+    path.write_text(GEARS.replace("<general ", '<general dyntype="filterexact" dynprm="0.02 0" '))
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert replaced(path) == [("0.02", "0.04")] * 4
+    assert [change.sentence for change in said.changes] == ["time constant of M1 to M4 is 100 % more"]
+    path.write_text(GEARS)
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert said.elsewhere[0].startswith("motor lag: ")
+
+
 def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
     """A control in N says nothing of a thrust over squared speed: that is of the vehicle that was given."""
     path = tmp_path / "cf2.xml"
@@ -430,3 +441,83 @@ def test_files_of_one_name_are_numbered():
     assert list(corrected_names(files).values()) == [
         "model.sdf", "base-model.sdf", "base2-model.sdf", "c-base2-model.sdf"
     ]  # fmt: skip
+
+
+def lines_that_differ(path):
+    """Give the lines that were replaced and what stands there now, and the comment above."""
+    given, new = (file.read_text().splitlines() for file in (path, path.parent / "new" / path.name))
+    comment = [line for line in new if "Corrected by cpfls" in line or line.startswith("#   ")]
+    kept = [line for line in new if line not in comment]
+    return [pair for pair in zip(given, kept, strict=True) if pair[0] != pair[1]], comment
+
+
+def test_python_is_corrected_in_place(tmp_path):
+    """Literals in place, what is an expression as a whole; effects whose formula RotorPy has among them."""
+    path = tmp_path / "mine.py"
+    path.write_text(rotorpy_of(SMALL).replace("'Ixx': 3.7e-05", "'Ixx': 37e-6 * 1.0"))
+    said, new = correct(
+        path,
+        effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),
+        effect("inflow", k_z=(3e-7, 1e-8)),
+        effect("rotor_drag", k_d=(2e-7, 1e-8)),
+        effect("motor_lag", time_constant_s=(0.05, 0.002)),
+    )
+    changes = {change.element: change.after for change in said.changes}
+    assert changes == {
+        "quad_params.k_eta": 1.66e-8,
+        "quad_params.Ixx": float(f"{1.5 * 0.83 * 3.7e-5:.4g}"),
+        "quad_params.k_d": 2e-7,
+        "quad_params.tau_m": 0.05,
+    }
+    assert new.rotors[0].drag.value == 2e-7
+    # It has no k_z to replace.
+    (missing,) = [each for each in said.elsewhere if "k_z" in each]
+    assert missing == (
+        "quad_params.k_z = 3e-07 [2.9e-07, 3.1e-07]: mine.py: quad_params has no k_z, for which RotorPy takes 0; write "
+        "it there"
+    )
+    differ, comment = lines_that_differ(path)
+    assert len(differ) == 3
+    assert "'Ixx': 4.606e-05, 'Iyy'" in differ[0][1]
+    assert path.parent.joinpath("new", "mine.py").read_text().startswith("#!/usr/bin/env python3\n# Corrected by cpfls")
+    assert len(comment) == 5
+
+
+def test_a_curve_is_corrected_in_proportion(tmp_path):
+    path = tmp_path / "params.toml"
+    path.write_text(SECTION.format(name="a"))
+    before = read_model(path)
+    said, new = correct(
+        path,
+        effect("parameter_error", inertia_x=0.0, thrust_scale=-0.17),
+        effect("motor_lag", time_constant_s=(0.2, 0.002)),
+        effect("rotor_drag", k_d=(1e-6, 1e-8)),
+    )
+    changes = {change.element: (change.before, change.after) for change in said.changes}
+    assert changes["a.rpm2thrust[2]"] == (2.5e-10, 2.075e-10)
+    assert changes["a.rpm2thrust[1]"] == (-5.4e-7, -4.482e-7)
+    assert changes["a.rotor_dyn_coef[0]"] == (7.4, 5.0)
+    assert new.rotors[0].lag_up.value == pytest.approx(0.2, rel=1e-3)
+    (slower,) = [change.sentence for change in said.changes if change.element == "a.rotor_dyn_coef[0]"]
+    assert slower == "time constant of M1 to M4 is 48 % more"
+    assert new.rotors[0].lag_down.value == pytest.approx(0.2, rel=0.1)
+    assert changes["a.drag_matrix[0][0]"][1] == changes["a.drag_matrix[1][1]"][1]
+    assert new.rotors[0].drag.value == pytest.approx(1e-6, rel=0.1)
+    # At the same speed the new curve lifts 17 % less.
+    assert len(before.rotors) == len(new.rotors)
+    assert path.parent.joinpath("new", "params.toml").read_text().startswith("# Corrected by cpfls gap")
+
+
+@pytest.mark.parametrize("comments", [True, False])
+def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, comments):
+    path = tmp_path / "frame.json"
+    path.write_text(FRAME if comments else "\n".join(line.partition("#")[0].rstrip() for line in FRAME.splitlines()))
+    said, _ = correct(path, effect("parameter_error", inertia_x=0.0, thrust_scale=(-0.17, 0.01)))
+    (change,) = said.changes
+    assert (change.element, change.before, change.after) == ("hoverThrOut", 0.31, float(f"{0.31 / 0.83:.4g}"))
+    assert change.low < change.after < change.high
+    assert change.sentence == "thrust of M1 to M4 is 17 % less"
+    differ, comment = lines_that_differ(path)
+    assert len(differ) == 1
+    # JSON has no comments, unless it has some.
+    assert bool(comment) is comments

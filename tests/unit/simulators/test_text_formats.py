@@ -168,6 +168,7 @@ def test_a_section_of_toml(mine):
         ),
         ("params.toml:a", lambda text: text.replace("mass", "kg"), "has no section that states a mass"),
         ("params.toml:a", lambda text: text.replace("2.5e-10", "-2.5e-10"), "no speed lifts"),
+        ("params.toml:a", lambda text: text.replace("mixing_matrix", "mixing"), "no mixing_matrix of rotors"),
     ],
 )
 def test_toml_that_states_no_vehicle(mine, name, change, words):
@@ -204,6 +205,8 @@ def test_a_frame_of_more_motors_takes_the_rotors_of_the_log(mine):
         ("[1, 2]", "no object of JSON"),
         ('{"propExpo": }', "no valid JSON"),
         ('{"propExpo": "high", "diagonal_size": 0.4, "hoverThrOut": 2}', "write numbers of 0 to 1"),
+        ('{"hoverThrOut": 0.4, "num_motors": 4e50}', "is 4e.50; write a number of motors, at most 32"),
+        ('{"hoverThrOut": 0.4, "mass": 0}', "mass is 0; write a number above 0"),
         ('{"propExpo": 1e999, "hoverThrOut": 0.4}', "is inf"),
         ("[" * 5000, "no valid JSON"),
     ],
