@@ -294,8 +294,8 @@ def vehicle_of(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehi
     shares = {name: float(np.mean([own(rotor) for rotor in rotors])) for name, own in _FLOWN.items()}
     found = [(each.name, shares.get(str(each.quantity), 0.0)) for each in CATALOGUE.values()]
     effects = [ModelEffect(name, {}, np.array([share])) for name, share in found if share]
-    for name, stated_numbers in of.model.effects.items():
-        values = [stated_numbers[each.name].value for each in CATALOGUE[name].coefficients]
+    for name, numbers in of.model.effects.items():
+        values = [numbers[each.name].value if each.name in numbers else 0.0 for each in CATALOGUE[name].coefficients]
         effects += [ModelEffect(name, {}, np.array(values))] if any(values) else []
     lag = np.mean([rotor.lag_up.value for rotor in rotors if rotor.lag_up] or [0.0])
     return VehicleModel(

@@ -42,6 +42,17 @@ def test_a_file_of_gazebo_is_flown_by_the_equations_of_its_plugin(tmp_path, drag
     assert (np.abs(own - published).max(axis=(0, 1, 3)) < 0.02 * moved).all()
 
 
+def test_what_a_file_of_rotorpy_states_besides_flies_too(tmp_path):
+    whole = replace(model(), effects=truth().effects)
+    made = exported(sheet_of_vehicle(whole), "rotorpy", "v.py")
+    (tmp_path / "v.py").write_text(made.text)
+    of = of_log(read_model(tmp_path / "v.py"), None, None)
+    flies = {each.name: each.coefficients for each in vehicle_of(of, of, STATED).effects}
+    assert "rotor_drag" in flies
+    assert flies["rotor_drag"][0] == pytest.approx(made.held.numbers["k_d"], rel=1e-9)
+    assert set(flies) > {"rotor_drag"}
+
+
 def test_included_files_are_read_as_corrected(tmp_path):
     """Files stand beside each other as they did, and the user's own are left alone."""
     (tmp_path / "base").mkdir()
