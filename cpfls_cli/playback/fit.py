@@ -18,6 +18,7 @@ from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.player import still_runs
 from cpfls_cli.playback.windows import MOST_RUNS, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
 from cpfls_cli.rounding import smallest
 
@@ -76,18 +77,6 @@ class FitWindows:
         motion = self.flight.motion
         return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
 
-    @classmethod
-    def of(cls, flight: PlaybackFlight, horizon: int, interval: int) -> FitWindows:
-        """Take every n-th window of a flight.
-
-        Parameters
-        ----------
-        horizon, interval : int
-            Samples.
-        """
-        starts = flight.starts(horizon, interval)
-        return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
-
     def rotor_terms(self, at: VehicleAt, by: str = "") -> Array:
         """Average the terms of the rotors, or their derivatives by a number, over steps, shape (step, run, column).
 
@@ -138,34 +127,9 @@ def windows_of(
 
 
 def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int, every: int = 1) -> Array:
-    """Compute mean errors of "rate stays": the attitude turns with it, and velocity stays.
-
-    Parameters
-    ----------
-    horizon : int
-        Steps.
-    every : int
-        Samples of a step.
-
-    Returns
-    -------
-    array, shape (horizon, 4), m, m/s, rad, rad/s
-    """
-    from scipy.spatial.transform import Rotation
-
-    motion, errors = flight.motion, np.zeros((horizon, 4))
-    turned = Rotation.from_matrix(motion.rotation[starts])
-    for step in range(1, horizon + 1):
-        at, elapsed = starts + every * step, every * step * motion.period
-        moved = motion.position[starts] + elapsed * motion.velocity[starts] - motion.position[at]
-        turn = (turned * Rotation.from_rotvec(elapsed * motion.rate[starts])).inv()
-        away = (turn * Rotation.from_matrix(motion.rotation[at])).magnitude()
-        faster = motion.velocity[starts] - motion.velocity[at]
-        spun = motion.rate[starts] - motion.rate[at]
-        sizes = (np.linalg.norm(each, axis=1) for each in (moved, faster, spun))
-        position, velocity, rate = (float(size.mean()) for size in sizes)
-        errors[step - 1] = position, velocity, float(away.mean()), rate
-    return errors
+    """Compute mean errors of "rate stays" after steps of so many samples, shape (horizon, 4), m, m/s, rad, rad/s."""
+    errors = still_runs(flight, starts, horizon, moves=True, every=every).errors
+    return np.asarray(np.linalg.norm(errors, axis=3).mean(axis=0))
 
 
 def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
@@ -583,14 +547,7 @@ def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[
     return WindowSet(tuple(windows)).errors(fitted.free, fitted.values)
 
 
-def weighed(loss: Loss, errors: Array) -> Array:
-    """Weigh the errors of runs, shape (run, horizon, 4, 3), as the fit does, shape (run,)."""
-    root = np.sqrt(1.0 + (errors**2).sum(axis=3) / loss.delta**2)
-    return np.asarray((loss.weight * loss.delta**2 * (root - 1.0)).sum(axis=(1, 2)))
-
-
 def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
-    weight, delta = window.loss.weight, window.loss.delta
     size = rate_stays(window.flight, window.starts, window.horizon, window.every)
-    return float((weight * delta**2 * (np.sqrt(1.0 + (size / delta) ** 2) - 1.0)).sum())
+    return float(window.loss.of(size[:, :, None] ** 2).sum())
