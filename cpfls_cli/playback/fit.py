@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight, motion_at
@@ -32,9 +33,6 @@ _STILL = 1e-9
 _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
-
-PRIOR = 1e-5
-"""Weight of what is believed before the flights, so small that it decides only what they do not tell."""
 
 
 @dataclass(frozen=True)
@@ -185,19 +183,6 @@ class Fitted(FittedNumbers):
         return float(eigenvalues[-1] / max(eigenvalues[0], rounding.eps * eigenvalues[-1], rounding.tiny))
 
 
-class Believed(NamedTuple):
-    """What is believed of numbers before the flights: that they are at their starts, so far away in their scales.
-
-    Attributes
-    ----------
-    start, scale, spread : array, shape (number,)
-    """
-
-    start: Array
-    scale: Array
-    spread: Array
-
-
 @dataclass(frozen=True)
 class FitPoint:
     """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
@@ -209,17 +194,22 @@ class FitPoint:
     derivatives : callable
         Gives gradient and Hessian of the loss by the numbers. They cost ten times the loss, and a step that fails, or
         is the last one, needs none.
+    scales : array, shape (number,)
+    prior : Prior
+        What was believed before, in scales.
     """
 
     values: Array
     loss: float
     derivatives: Callable[[], tuple[Array, Array]]
-    believed: Believed
+    scales: Array
+    prior: Prior
 
     @cached_property
     def objective(self) -> float:
         """Loss, and what was believed before."""
-        return self.loss + 0.5 * float(self._belief @ self._away**2)
+        away = self.values / self.scales - self.prior.mean
+        return self.loss + 0.5 * float(self.prior.precision @ away**2)
 
     @property
     def gradient(self) -> Array:
@@ -231,19 +221,13 @@ class FitPoint:
         """Of the objective, in scales of the numbers."""
         return self._in_scales[1]
 
-    @property
-    def _belief(self) -> Array:
-        return np.asarray(PRIOR / self.believed.spread**2)
-
-    @property
-    def _away(self) -> Array:
-        return (self.values - self.believed.start) / self.believed.scale
-
     @cached_property
     def _in_scales(self) -> tuple[Array, Array]:
-        gradient, hessian = self.derivatives()
-        scale, belief = self.believed.scale, self._belief
-        return gradient * scale + belief * self._away, hessian * scale[:, None] * scale + np.diag(belief)
+        (gradient, hessian), scales, prior = self.derivatives(), self.scales, self.prior
+        return (
+            gradient * scales - prior.pull(self.values / scales),
+            hessian * scales[:, None] * scales + np.diag(prior.precision),
+        )
 
 
 def fit(
@@ -485,7 +469,7 @@ class WindowSums:
             return gradient, hessian
 
         loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
-        return FitPoint(self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads))
+        return FitPoint(self.values, loss, derivatives, self.free.scales, self.free.prior)
 
 
 @dataclass(frozen=True)
@@ -537,9 +521,8 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     without = fitted.hessian * count - hessian * scale[:, None] * scale
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
     covariance = jackknife_covariance(moved * scale)
-    belief = PRIOR / free.spreads**2
-    conditional = np.diag(fitted.hessian) - belief
-    return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
+    conditional = np.diag(fitted.hessian) - free.prior.precision
+    return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * free.prior.precision))
 
 
 def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[Array]:
