@@ -54,6 +54,8 @@ _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_u
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _OF_XML = ("sdf", "urdf", "mjcf")
 _ROUNDING, _SAME = 1e-9, 1e-6
+_LEAST_S = 5.0
+"""Length of a flight that shows single rotors."""
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
@@ -73,7 +75,13 @@ _TAGS = {
         "rolling": "rollingMomentCoefficient",
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
-    "mjcf": {"thrust": "gear z", "torque": "gear yaw", "ratio": "gear yaw"},
+    "mjcf": {
+        "thrust": "gear z",
+        "torque": "gear yaw",
+        "ratio": "gear yaw",
+        "lag_up": "dynprm",
+        "lag_down": "dynprm",
+    },
     "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
     "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
     "crazyflow": {
@@ -104,6 +112,15 @@ class _Found(NamedTuple):
     low: float
     high: float
 
+    @classmethod
+    def of(cls, number: Estimate) -> _Found:
+        """Take an estimate."""
+        return cls(number.value, number.low, number.high)
+
+    def plus(self, added: float) -> _Found:
+        """Add what is exact."""
+        return _Found(*(each + added for each in self))
+
     def times(self, factor: float) -> _Found:
         ends = factor * self.low, factor * self.high
         return _Found(factor * self.value, min(ends), max(ends))
@@ -133,13 +150,11 @@ _ONE = _Found(1.0, 1.0, 1.0)
 
 def _significant(factor: _Found, wider: float) -> _Found:
     """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0, wider) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+    return factor if factor.contradicts(1.0, wider) else factor.plus(1.0 - factor.value)
 
 
 def _part(number: Estimate | None, times: float) -> _Found:
-    return (
-        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
-    )
+    return _Found(0.0, 0.0, 0.0) if number is None else _Found.of(number).times(float(times))
 
 
 def _sum(*parts: _Found) -> _Found:
@@ -150,7 +165,7 @@ def _sum(*parts: _Found) -> _Found:
 
 
 def _factor(number: Estimate | None) -> _Found:
-    return _ONE if number is None else _Found(1 + number.value, 1 + number.low, 1 + number.high)
+    return _ONE if number is None else _Found.of(number).plus(1.0)
 
 
 @dataclass
@@ -331,7 +346,14 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
     """Turn rotors round that the log has turn the other way, where flights show each of them by itself."""
     if not made.of.turned:
         return
-    measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
+    measured = [
+        (each, speed)
+        for each in flights
+        if (speed := each.rotor_speed) is not None and speed.any() and len(each) * each.period > _LEAST_S
+    ]
+    if not measured:
+        made.unchanged.append(f"directions of rotors: no flight of more than {_LEAST_S:g} s has speeds of rotors")
+        return
     turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
     stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
     for place in made.of.turned:
@@ -395,14 +417,7 @@ def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
         return False
     for number in each.numbers:
         own = stated[number.name]
-        made.replace(
-            own.name,
-            own,
-            _Found(number.value, number.low, number.high),
-            f"{find(each.name).title}: {{share}}",
-            "",
-            None,
-        )
+        made.replace(own.name, own, _Found.of(number), f"{find(each.name).title}: {{share}}", "", None)
     return True
 
 
@@ -510,23 +525,15 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    factors = {
-        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-        for index, axis in enumerate("xyz")
-        if f"inertia_{axis}" in numbers
-    }
-    _inertia(made, factors)
+    for index, axis in enumerate("xyz"):
+        if f"inertia_{axis}" in numbers:
+            factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+            _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
 
 
-def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
+def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
     """Change entries of the inertia of the heaviest link by what that of the vehicle is off."""
     whole, own = made.of.model.inertia, made.of.model.heaviest
-    known = symmetric(made.vehicle.inertia_kg_m2)
-    wanted = {entry: factor.times(float(known[INERTIA_ENTRIES[entry]])) for entry, factor in factors.items()}
-    wanted |= {
-        entry: _Found(*(float(known[INERTIA_ENTRIES[entry]]) + each for each in added))
-        for entry, added in (products or {}).items()
-    }
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
         if not own.entries or not _straight(own.turned):
@@ -536,8 +543,7 @@ def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mappin
                     f"kg m^2, and not {total:.4g}: {own.inertia_at} states it in other axes, or not; change it there"
                 )
             continue
-        rest = total - float(own.inertia[INERTIA_ENTRIES[entry]])
-        new = _Found(*(each - rest for each in found))
+        new = found.plus(float(own.inertia[INERTIA_ENTRIES[entry]]) - total)
         words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
         room = None if own.node is None else own.node.first("inertia")
@@ -549,8 +555,9 @@ def _straight(turned: Array) -> bool:
 
 
 def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    found = list(numbers.values())
-    _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
+    known = symmetric(made.vehicle.inertia_kg_m2)
+    added = dict(enumerate(list(numbers.values())[:3], start=3))
+    _inertia(made, {at: _Found.of(each).plus(float(known[INERTIA_ENTRIES[at]])) for at, each in added.items()})
     return True
 
 
@@ -562,7 +569,7 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         own = numbers.get(f"c_{name}")
         if own is None:
             continue
-        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        found = _Found.of(own).times(share).plus(place[axis])
         words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
         if not _straight(body.link):
             if found.contradicts(place[axis], made.wider):
@@ -593,23 +600,17 @@ def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         )
         return True
     for kind in ("lag_up", "lag_down"):
-        alike = [_Found(tau.value, tau.low, tau.high)] * len(made.rotors)
-        made.of_rotors(kind, alike, "time constant of {whom} is {share}")
+        made.of_rotors(kind, [_Found.of(tau)] * len(made.rotors), "time constant of {whom} is {share}")
     return True
 
 
 def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["k_d"]
-    return made.of_rotors(
-        "drag", [_Found(own.value, own.low, own.high)] * len(made.rotors), "drag of {whom} is {share}"
-    )
+    return made.of_rotors("drag", [_Found.of(numbers["k_d"])] * len(made.rotors), "drag of {whom} is {share}")
 
 
 def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["mu"]
-    signed = _Found(own.value, own.low, own.high)
-    alike = [signed.times(rotor.spin) for rotor in made.vehicle.rotors]
-    return made.of_rotors("rolling", alike, "rolling moment of {whom} is {share}")
+    signed = [_Found.of(numbers["mu"]).times(rotor.spin) for rotor in made.vehicle.rotors]
+    return made.of_rotors("rolling", signed, "rolling moment of {whom} is {share}")
 
 
 _RULES: dict[Quantity, Callable[[_Corrections, Mapping[str, Estimate]], bool]] = {

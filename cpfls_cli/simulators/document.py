@@ -16,6 +16,8 @@ from cpfls_cli.errors import InputError
 
 _LARGEST = 20_000_000
 _DEEPEST = 100
+_HUGE = 1e30
+"""No number of a model is as large, and products of smaller ones are numbers."""
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
 _ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _WORD = re.compile(rb"\S+")
@@ -125,7 +127,7 @@ class Node:
             values = [float(word) for word in words]
         except ValueError:
             raise self._no_number(text, attribute) from None
-        if (count is not None and len(values) != count) or not all(abs(each) < 1e300 for each in values):
+        if (count is not None and len(values) != count) or not all(abs(each) < _HUGE for each in values):
             raise self._no_number(text, attribute, count or 1)
         where = self.where if attribute is None else f"{self.where}, {attribute}"
         known = spans if len(spans) == len(values) else [None] * len(values)

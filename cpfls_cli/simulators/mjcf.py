@@ -327,7 +327,9 @@ def _rotor(node: Node, own: Mapping[str, str], gear: list[Stated], gain: float, 
     words = f"{node.where}, gear and gain"
     lagging = None
     if own.get("dyntype") in ("filter", "filterexact"):
-        lagging = Stated(_floats(node, own, "dynprm", range(1, 11), "1")[0], f"{node.where}, dynprm")
+        lagging = _stated(node, own, "dynprm", range(1, 11), "1")[0]
+        if not lagging.value > 0:
+            raise node.error(f"dynprm is {lagging.value:g}; write a time constant above 0")
     thrust, torque = (replace(_sized(each, gain), where=words) for each in (force, turn))
     ratio = _sized(turn, 1 / force.value)
     turns = abs(ratio.value) > _SMALL

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
 from cpfls_cli.simulators.document import Stated
-from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
+from cpfls_cli.simulators.model import GRAVITY, SimulatorModel
 
 _PROGRAMS = {
     "sdf": "Gazebo",
@@ -133,18 +132,15 @@ class VehicleOf:
     @property
     def besides(self) -> list[str]:
         """What the file states of the first rotor and the vehicle of a study does not hold."""
-        if not self.model.rotors:
-            return []
-        return list(_besides(self.model.rotors[self.order[0]]))
-
-
-def _besides(rotor: Rotor) -> Iterator[str]:
-    for name, (words, unit) in _BESIDES.items():
-        stated: Stated | None = getattr(rotor, name)
-        if stated is None:
-            continue
-        down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
-        yield f"{words} {stated.value:g} {unit}{down} ({stated.where})"
+        found = []
+        for name, (words, unit) in _BESIDES.items() if self.model.rotors else ():
+            rotor = self.model.rotors[self.order[0]]
+            stated: Stated | None = getattr(rotor, name)
+            if stated is not None:
+                down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
+                found.append(f"{words} {stated.value:g} {unit}{down} ({stated.where})")
+        known = [own for numbers in self.model.effects.values() for own in numbers.values() if own.value != 0]
+        return [*found, *(f"{own.name.rpartition('.')[2]} {own.value:g} ({own.where})" for own in known)]
 
 
 def _short(values: list[float]) -> list[float]:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
@@ -112,3 +113,13 @@ def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
     assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")
     (differs,) = [pair for pair in zip(before[1:], after[3:], strict=True) if pair[0] != pair[1]]
     assert differs[1] == f"    'k_eta': {change['after']:.4g},  # from a data sheet"
+
+
+def test_turns_of_single_rotors_have_their_intervals():
+    """Thirty times three flights in gusts: each rotor by itself is one of four that are alike."""
+    asked = [Flight(TRUE, GUSTS, path=run, draw=run, reach=3.0, swing=0.3) for run in range(90)]
+    flown = [(each.motion.rate, each.speed, 1 / each.motion.period, False) for each in gusty_flights(asked, 30.0)]
+    turns, half = np.transpose([turns_by_rotors(flown[first : first + 3]) for first in range(0, 90, 3)], (1, 0, 2))
+    # The body turns against its rotors.
+    assert (-turns * SPINS > half).all()
+    assert 0.9 <= (np.abs(-turns * SPINS - 1) < half).mean() <= 0.98

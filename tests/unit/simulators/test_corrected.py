@@ -1,6 +1,7 @@
 """A simulator's file corrected: what flights contradict is replaced, and not one byte besides."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -345,6 +346,17 @@ def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], [1.26e-10, 1.2e-10, 1.14e-10, 1.2e-10])
 
 
+def test_a_filter_of_mjcf_is_the_lag(tmp_path):
+    path = tmp_path / "cf2.xml"
+    path.write_text(GEARS.replace("<general ", '<general dyntype="filterexact" dynprm="0.02 0" '))
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert replaced(path) == [("0.02", "0.04")] * 4
+    assert [change.sentence for change in said.changes] == ["time constant of M1 to M4 is 100 % more"]
+    path.write_text(GEARS)
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert said.elsewhere[0].startswith("motor lag: ")
+
+
 def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
     """A control in N says nothing of a thrust over squared speed: that is of the vehicle that was given."""
     path = tmp_path / "cf2.xml"
@@ -510,3 +522,13 @@ def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, c
     assert len(differ) == 1
     # JSON has no comments, unless it has some.
     assert bool(comment) is comments
+
+
+def test_a_direction_that_no_flight_shows_stays(mine):
+    """The log states another one, and its flight has no speeds of rotors."""
+    of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
+    found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
+    flight = SimpleNamespace(name="one.csv", signals=SimpleNamespace(rotor_speed=None))
+    said, files = corrected(of, SMALL.vehicle, found, [flight])
+    assert files["mine.sdf"] == mine.read_bytes()
+    assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")

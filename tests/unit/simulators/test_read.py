@@ -314,6 +314,10 @@ BAD = {
     "other": ("<html/>", "begins with <html>, which is no model known here"),
     "negative": (GOOD.replace("<mass>1e-05</mass>", "<mass>-1</mass>", 1), "a mass of -1 kg; write one above 0"),
     "no number": (GOOD.replace("<izz>5", "<izz>five", 1).replace("<izz>6", "<izz>six", 1), "is not a number"),
+    "huge": (
+        GOOD.replace("<maxRotVelocity>6000", "<maxRotVelocity>1e200", 1),
+        "'1e200' is not a number; write a number",
+    ),
     "template": (GOOD.replace("<pose>0 0 0 0 0 0</pose>", "<pose>${x} 0 0 0 0 0</pose>", 1), "render it first"),
     "include": (
         GOOD.replace('<link name="base_link">', '<include><uri>model://away</uri></include><link name="base_link">'),
