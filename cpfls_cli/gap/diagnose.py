@@ -51,7 +51,7 @@ from cpfls_cli.gap.naming.results import (
 )
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -103,17 +103,15 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, only = None, named.judgement.found.floor, -1
+    gusts, quiet = None, named.judgement.found.floor
     if unexplained_channels(named.judgement.found, rng):
         given = known_motion(training)
-        gusts = _gusts(named, given, settings, rng)
-        # With what is named then, more channels may turn out to be nothing but gusts.
-        while gusts is not None and gusts.split.any() and gusts.gusts_only.sum() > only:
-            only, quiet = int(gusts.gusts_only.sum()), np.minimum(quiet, gusts.noise(windows))
-            axes = unidentified_axes(named.judgement.found, given)
-            flights = flights.in_air(gusts, axes)
+        gusts = _gusts(named, given, settings)
+        if gusts is not None and gusts.split.any():
+            quiet = np.minimum(quiet, gusts.noise(windows))
+            flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
-            gusts = _gusts(named, given, settings, rng)
+            gusts = _gusts(named, given, settings)
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
@@ -214,10 +212,10 @@ def _named(
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
-def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
+def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | None:
     """Find gusts in the residual of the training flights."""
     found = named.judgement.found
-    return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
+    return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
@@ -233,20 +231,14 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
-        # A gap above the gusts is none of them: what it takes to explain it stays.
-        if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
-            break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
             refusals.append(Refusal(effect.name, f"by instruments {what} may be 0"))
-        fit = fewer
+        fit = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
     loose = tuple(effect.name for effect in unidentified(fit, found))
     lags = decided_by_instruments(found, named.effects, given)
-    judgement, without = judge.judge(lags.found), judge.judge(lags.without)
-    after, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
-    if not lags.chances or np.nanmax(more**2 - after**2) < VISIBLE**2:
-        lags, judgement = lags._replace(chances={}, alike=()), without
+    judgement = judge.judge(lags.found)
+    if not lags.chances:
         refusals += [
             Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
             for each in found.hypothesis.chosen
@@ -347,10 +339,8 @@ def _concluded(
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
-        # Faults and wrong numbers alone: of all the gap, where one is left, or numbers in still air are not most of it.
-        removed = held_out.shares(as_given=True)
-        by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
-        removed = removed if effects and (remainder or by_numbers) else {}
+        # Faults and wrong numbers alone: of all the gap, where one is left.
+        removed = held_out.shares(as_given=True) if effects and remainder else {}
     share = min(removed.values(), default=1.0)
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}

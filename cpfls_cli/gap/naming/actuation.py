@@ -24,10 +24,9 @@ _Names = tuple[str, ...]
 
 
 class ActuationFit(NamedTuple):
-    """Lags between command and rotors: fits with the set that leaves the least residual, and with none."""
+    """Lags between command and rotors: the fit with the set that leaves the least residual."""
 
     found: NamedFit
-    without: NamedFit
     chances: dict[str, float]  # P-value of each effect of the set.
     alike: tuple[Alternative, ...]  # Sets that leave as little.
 
@@ -46,7 +45,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     shifted = {each.effect.name for each in found.hypothesis.chosen}
     tried = {each.name: each for each in lags if each.actuation or each.name in shifted}
     if not tried:
-        return ActuationFit(found, found, {}, ())
+        return ActuationFit(found, {}, ())
     sets = _Sets(found, tried, given)
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.is_lag)
@@ -67,7 +66,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     # One number is judged by its own size, several by how much less they leave.
     less = chance_of_ranks(more_residual(sets.predictable[()], sets.predictable[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
-    return ActuationFit(sets.fits[best], sets.fits[()], chances, tuple(alike))
+    return ActuationFit(sets.fits[best], chances, tuple(alike))
 
 
 @dataclass
@@ -158,19 +157,8 @@ class _Sets:
         return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
 
     def _needed(self, names: _Names, rate: float) -> set[str]:
-        """Name the effects whose only number is significant at a rate, and within its bounds.
-
-        Jointly with others it is enough of the usual effect that it is not less than anybody has.
-        """
-        needed, usual = set(), next(iter(self.effects)) if len(names) > 1 else ""
-        for name, (number, *_) in self.numbers(names).items():
-            if name == usual:
-                significant = number.value >= self.effects[name].shapes[0].grid[0]
-            else:
-                significant = self.chance_of(number) <= rate
-            if significant and number.value < number.plausible[1]:
-                needed.add(name)
-        return needed
+        """Name the effects whose only number is significant at a rate."""
+        return {name for name, (number, *_) in self.numbers(names).items() if self.chance_of(number) <= rate}
 
     def chance_of(self, number: Estimate) -> float:
         """Compute the p-value of a time by its interval and the error of the log's clock.
