@@ -45,8 +45,7 @@ from cpfls_cli.gap.naming.results import (
     GapVerdict,
     NamedEffect,
     TorqueAlone,
-    gap_stays,
-    matters,
+    gap_remains,
     verdict_of,
 )
 from cpfls_cli.gap.naming.search import forward_selection
@@ -345,13 +344,11 @@ def _concluded(
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
-    gap = held_out.size(held_out.before).floors
-    least = settings.named_share
-    known = [each for each in remainder if matters(each, gap, least)] if effects else remainder
-    stays = gap_stays(
-        held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
-    )
-    verdict = verdict_of(effects, rivals, known, tuple(removed.values()) or (1.0,), stays, excited, settings)
+    before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
+    remains = bool(remainder)
+    if effects:
+        remains = gap_remains(before, after, remainder, settings.named_share, len(named))
+    verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
     wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
     if not (wrong or differ) and verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL):
@@ -374,7 +371,7 @@ def _concluded(
         alternatives=rivals,
         # In gusts fits of lags see the loop, and do not compare.
         sets=() if lags and not still else likely_sets(judged),
-        unexplained=tuple(known) if verdict is GapVerdict.NAMED else remainder,
+        unexplained=() if verdict is GapVerdict.NAMED else remainder,
         not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         vehicle_numbers=all_numbers(estimates),
         gap=GapChange.of(held_out.size(held_out.before), held_out.size(held_out.after), held_out.floor),
