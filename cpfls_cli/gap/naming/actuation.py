@@ -55,14 +55,15 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
             rivals += sets.fit(untried)
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
     alike = []
-    larger = [each for each in sets.fits if set(best) < set(each) and sets.count(each) == len(each)]
-    for names in [*rivals, *larger]:
-        if sets.count(names) > sets.count(best) and not sets.lacks(best, names):
+    lacking = bool(best) and sets.is_predictable(best)
+    for names in rivals:
+        # More numbers are a rival where they leave nothing and the named ones something.
+        if sets.count(names) > sets.count(best) and not (lacking and not sets.is_predictable(names)):
             continue
         gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
-        if best and new and not sets.surely_more(names, best):
-            *jointly, last = new if gone else names
-            alike.append(alternative(tried[(gone or best)[0]], tried[last], 1.0, *jointly))
+        if gone and new and not sets.surely_more(names, best):
+            *jointly, last = new
+            alike.append(alternative(tried[gone[0]], tried[last], 1.0, *jointly))
     # One number is judged by its own size, several by how much less they leave.
     less = chance_of_ranks(more_residual(sets.predictable[()], sets.predictable[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
@@ -127,12 +128,6 @@ class _Sets:
     def is_predictable(self, names: _Names) -> bool:
         """Check whether the past predicts the residual of a set, which makes an answer more careful."""
         return self._more(self.predictable[names], CHANCE)
-
-    def lacks(self, best: _Names, names: _Names) -> bool:
-        """Check whether a set may lack what one with more numbers has: a number jointly, or what the past predicts."""
-        if set(best) < set(names):
-            return self._needed(names, CHANCE) == set(names)
-        return self.is_predictable(best) and not self.is_predictable(names)
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance."""

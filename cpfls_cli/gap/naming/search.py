@@ -82,14 +82,11 @@ def grown_elsewhere(
 ) -> list[Scored]:
     """List sets that grew from others than the best one and leave less residual with no more numbers.
 
-    Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
+    Where the best one leaves nothing, nothing is looked for.
     """
-    if not sets:
+    if not sets or step.above_floor <= step.least_gain():
         return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
-    two = _lags(chosen[-1:]) and not _lags(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
-    if not (two or step.above_floor > step.least_gain()):
-        return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
         lags = _lags(other)
@@ -97,16 +94,9 @@ def grown_elsewhere(
         there = rank_effects(flights, other, like, settings, None, floor=step.floor)
         for scored in there.ranking[: _BEAM if lags else 1]:
             grown = scored.chosen
-            if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen) + two:
+            if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen):
                 found.append(_moved(grown, step) if lags else _rescored(system(flights, grown), step))
-    return [scored for scored in found if _is_better(scored, own, step)]
-
-
-def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
-    """Check whether a set leaves less than another one; with more numbers it has to beat that one."""
-    if free_numbers(scored.chosen) > free_numbers(own.chosen):
-        return not unbeaten(scored, [own], step.above_floor)
-    return bool(less(0.0, scored.gain - own.gain, step.above_floor))
+    return [scored for scored in found if less(0.0, scored.gain - own.gain, step.above_floor)]
 
 
 def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
@@ -126,7 +116,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     """Score an effect, and behind it all that could take its place, given the look at the others and it.
 
     What lies between command and rotors is scored with shapes moved, and two of these can replace one with two
-    shapes; more numbers than it has need a gain.
+    shapes; more numbers than it has are tried where it leaves a gap.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != candidate.effect.name)
     if not _lags([candidate]):
@@ -139,8 +129,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
     numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
     moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
-    fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
-    return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
+    return [own, *moved, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
 
 def _lags(chosen: Sequence[Candidate]) -> bool:

@@ -127,15 +127,14 @@ def air(
     bound = gusts_in(flown.sides, given, "none")
     if bound is None:
         return None
-    found, (only, sized, refuted) = None, np.zeros((3, 6), dtype=bool)
+    found, (only, sized) = None, np.zeros((2, 6), dtype=bool)
     ends = {name: getattr(bound, name).copy() for name in (*RANGES, "noise")}
     for witness in _WITNESSES[given.kind]:
         own = gusts_in(flown.sides, given, witness)
         if own is None:
             continue
         own, like = flown.judged(own, only)
-        like &= known & ~only & ~refuted
-        refuted |= own.foretold - ERRORS * own.foretold_error > _PREDICTED[witness]
+        like &= known & ~only
         # What is not repeatable is no effect's; what setpoints do not predict may be one's.
         size = ~sized & (like | (np.isfinite(own.size) & (witness == "repeats")))
         for name, values in ends.items():

@@ -88,13 +88,6 @@ def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
 
 
-def test_a_delay_beside_the_lag_that_is_likely_not_0_is_a_rival_of_the_lag_alone(monkeypatch):
-    left = {(): 90.0, LAG: LITTLE, DELAY: 9.0, BOTH: LITTLE}
-    # One in forty that it is 0, and one in five.
-    for half, rivals in ((0.0137, {("command_delay", "motor_lag", "motor_lag")}), (0.025, set())):
-        assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.016, half)]})[:2] == (LAG, rivals)
-
-
 def test_less_than_nothing_is_nothing(monkeypatch):
     left = {(): 90.0, LAG: -2.0, DELAY: LITTLE, BOTH: LITTLE}
     names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
