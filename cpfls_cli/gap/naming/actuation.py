@@ -152,8 +152,14 @@ class _Sets:
         return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
 
     def _needed(self, names: _Names, rate: float) -> set[str]:
-        """Name the effects whose only number is significant at a rate."""
-        return {name for name, (number, *_) in self.numbers(names).items() if self.chance_of(number) <= rate}
+        """Name the effects whose only number is significant at a rate.
+
+        Jointly with others it is enough of the usual effect that it is not less than anybody has.
+        """
+        usual = next(iter(self.effects)) if len(names) > 1 else ""
+        own = {name: number for name, (number, *_) in self.numbers(names).items()}
+        least = {name: self.effects[name].shapes[0].grid[0] for name in own}
+        return {n for n, one in own.items() if (one.value >= least[n] if n == usual else self.chance_of(one) <= rate)}
 
     def chance_of(self, number: Estimate) -> float:
         """Compute the p-value of a time by its interval and the error of the log's clock.

@@ -82,11 +82,14 @@ def grown_elsewhere(
 ) -> list[Scored]:
     """List sets that grew from others than the best one and leave less residual with no more numbers.
 
-    Where the best one leaves nothing, nothing is looked for.
+    Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
     """
-    if not sets or step.above_floor <= step.least_gain():
+    if not sets:
         return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
+    two = _lags(chosen[-1:]) and not _lags(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
+    if not (two or step.above_floor > step.least_gain()):
+        return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
         lags = _lags(other)
@@ -94,9 +97,16 @@ def grown_elsewhere(
         there = rank_effects(flights, other, like, settings, None, floor=step.floor)
         for scored in there.ranking[: _BEAM if lags else 1]:
             grown = scored.chosen
-            if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen):
+            if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen) + two:
                 found.append(_moved(grown, step) if lags else _rescored(system(flights, grown), step))
-    return [scored for scored in found if less(0.0, scored.gain - own.gain, step.above_floor)]
+    return [scored for scored in found if _is_better(scored, own, step)]
+
+
+def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
+    """Check whether a set leaves less than another one; with more numbers it has to beat that one."""
+    if free_numbers(scored.chosen) > free_numbers(own.chosen):
+        return not unbeaten(scored, [own], step.above_floor)
+    return bool(less(0.0, scored.gain - own.gain, step.above_floor))
 
 
 def of_motion(gain: float, step: RankedStep, with_it: System) -> float:

@@ -17,7 +17,7 @@ LATE = ("motor_lag", "command_delay", "low_pass_filter", "notch_filter")
 LAG, DELAY, BOTH = ("motor_lag",), ("command_delay",), ("motor_lag", "command_delay")
 BLOCKS = 12
 LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
-SURE, ABSENT = (0.03, 0.001), (0.001, 0.002)
+SURE, ABSENT, OPEN = (0.03, 0.001), (0.001, 0.002), (0.03, 0.04)
 GIVEN = SimpleNamespace(flown=[SimpleNamespace(motion=SimpleNamespace(period=0.01))])
 
 
@@ -77,6 +77,16 @@ def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, togeth
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
+
+
+@pytest.mark.parametrize(
+    ("together", "names"),
+    [([OPEN, SURE], BOTH), ([ABSENT, SURE], DELAY)],
+    ids=["a lag that nothing excludes", "no lag that anybody has"],
+)
+def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
+    assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
 
 
 def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_tells(monkeypatch):
