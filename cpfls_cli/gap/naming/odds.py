@@ -126,4 +126,8 @@ def simplest(ranking: Sequence[Scored], above_floor: float, number: float) -> Sc
         if best.gain - other.gain < max(off, number * fewer):
             alike.append(other)
     fewest = min(free_numbers(each.chosen) for each in alike)
-    return next(each for each in alike if free_numbers(each.chosen) == fewest)
+    few = [each for each in alike if free_numbers(each.chosen) == fewest]
+    most = max(each.gain for each in few)
+    # What no number separates is decided by what is usual: rotors always lag.
+    usual = [each for each in few if most - each.gain < number]
+    return min(usual, key=lambda scored: sorted(each.effect.order for each in scored.chosen))

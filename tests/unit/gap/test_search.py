@@ -125,5 +125,15 @@ def test_a_number_more_has_to_explain_something(less, wins):
     assert simplest([two, one], 100.0, 8.0).candidate.effect.name == wins
 
 
+@pytest.mark.parametrize(("less", "wins"), [(0.5, "usual"), (1.0, "best")])
+def test_what_no_number_tells_apart_is_what_is_usual(less, wins):
+    to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
+    best = with_errors("best", 1e4, OWN.block_error)
+    effect = replace(hand_made("usual", (1.3, 0)), order=SPECIAL.order - 1)
+    gain, errors = 1e4 - BLOCKS * less, OWN.block_error + to_and_fro + less
+    usual = Scored((Candidate(effect, {}),), gain, errors, np.ones(1))
+    assert simplest([best, usual], 1e4, 8.0).candidate.effect.name == wins
+
+
 def test_systems_without_flights_of_the_signal_have_no_columns():
     assert system([weak(fly(1))]).columns(Candidate(CATALOGUE["battery_sag"], {"exponent": 1.0})).shape[2] == 0
