@@ -126,7 +126,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     """Score an effect, and behind it all that could take its place, given the look at the others and it.
 
     What lies between command and rotors is scored with shapes moved, and two of these can replace one with two
-    shapes; more numbers than it has are tried where it leaves a gap.
+    shapes; more numbers than it has need a gain.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != candidate.effect.name)
     if not _lags([candidate]):
@@ -139,7 +139,8 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
     numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
     moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
-    return [own, *moved, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
+    fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
+    return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
 
 def _lags(chosen: Sequence[Candidate]) -> bool:
