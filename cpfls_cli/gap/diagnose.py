@@ -50,7 +50,7 @@ from cpfls_cli.gap.naming.results import (
 )
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import NOISE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -230,10 +230,14 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
+        fewer = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
+        # A gap above the gusts is none of them: what it takes to explain it stays.
+        if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
+            break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
             refusals.append(Refusal(effect.name, f"by instruments {what} may be 0"))
-        fit = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
+        fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
     lags = decided_by_instruments(found, named.effects, given)
     judgement = judge.judge(lags.found)

@@ -64,6 +64,11 @@ class NamedFit(NamedTuple):
         """Block of each window, shape (window,)."""
         return block_index(self.hypothesis, self.settings)
 
+    @property
+    def rms_floors(self) -> Array:
+        """Root mean square of the residual of each channel, shape (6,), floors."""
+        return size_in_floors(self.hypothesis.residual_at(self.estimates.linear), self.floor)
+
     def without(self, names: Collection[str]) -> NamedFit:
         """Leave effects out and refit the others."""
         kept = [each for each in self.hypothesis.chosen if each.effect.name not in names]
