@@ -66,11 +66,14 @@ def minimised(
     steps : int
         At most.
     tolerance : float
-        Relative decrease of the objective below which it has come to its end.
+        Relative decrease of the objective, by a step or expected of an undamped one, below which it has come to its
+        end.
     damping : float
         Share of the diagonal at first: as it is, nearly a Gauss-Newton step.
     """
     for _ in range(steps):
+        if tolerance and _expected_decrease(point, scales, bounds) < tolerance * point.objective:
+            break
         following, damping = _better(evaluate, point, damping, scales, bounds)
         if following is None:
             break
@@ -78,6 +81,13 @@ def minimised(
         if decrease < tolerance * point.objective:
             break
     return point
+
+
+def _expected_decrease(point: Point, scales: Array, bounds: tuple[Array, Array]) -> float:
+    """Compute by how much the quadratic model falls with a step that is hardly damped."""
+    hessian, gradient = point.hessian, point.gradient
+    step = damped_step(hessian, gradient, _LEAST_DAMPING, *((bound - point.values) / scales for bound in bounds))
+    return float(-step @ (gradient + 0.5 * hessian @ step))
 
 
 def _better(

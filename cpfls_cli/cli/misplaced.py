@@ -56,6 +56,8 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
         Its option ``-o``.
     """
     kind = _kind(given[0])
+    if command == "gap" and kind == "artifact" and _format(given[0]) == "cpfls/vehicle":
+        return
     if kind not in ("log", "artifact"):
         if kind is None and command != "gap" and given[0].is_file():
             _refuse_simulator_file(given[0])

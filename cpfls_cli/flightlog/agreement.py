@@ -103,6 +103,13 @@ def _all_move(vectors: Array) -> bool:
     return bool(spread.min() > _STILL * spread.max())
 
 
+def correlations(first: Array, second: Array) -> Array:
+    """Correlate columns with columns, shape (time, column) both; 0 where one of the two does not move."""
+    first, second = first - first.mean(axis=0), second - second.mean(axis=0)
+    size = np.sqrt((first**2).sum(axis=0) * (second**2).sum(axis=0))
+    return np.asarray((first * second).sum(axis=0) / np.where(size > 0, size, np.inf))
+
+
 def slow(values: Array, rate_hz: float, cutoff_hz: float = SLOW_HZ) -> Array:
     """Low-pass both ways, and leave the ends out."""
     filtered = low_pass(values, rate_hz, min(cutoff_hz, rate_hz / 5), _FILTER_ORDER)
@@ -183,10 +190,9 @@ def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | N
             shares[(order, (first, second))] = max(together, 0.0) ** 2 / (power * total) if moves else 0.0
     rises = 0.0
     if lift is not None:
-        other = slow((lift * np.abs(axis[:, 2]))[:, None], rate_hz)[:, 0]
-        if moving.vertical.std() != 0 and other.std() != 0:
-            together = float(np.corrcoef(moving.vertical, other)[0, 1])
-            rises = float(np.sign(together)) if abs(together) > _RISES else 0.0
+        lifted = slow((lift * np.abs(axis[:, 2]))[:, None], rate_hz)
+        together = float(correlations(moving.vertical[:, None], lifted)[0])
+        rises = float(np.sign(together)) if abs(together) > _RISES else 0.0
     return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))
 
 

@@ -1,6 +1,6 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations, product
@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import BLOCK_S, FEWEST_BLOCKS, half_width, jackknife_error
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.layouts import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
@@ -203,13 +204,8 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     plus; the one that explains most is taken. Where that is not clear, slow gusts and the answer to them may hide it:
     then what is fast alone may say it, as a guess. None for another number of rotors, or where nothing is explained.
 
-    Parameters
-    ----------
-    body_rate : array, shape (time, 3), rad/s, body frame FLU
-    speed : array, shape (time, 4)
-        In any unit that is a share of the speed.
-    is_command : bool
-        Whether the motors follow later.
+    Body rates are of shape (time, 3), rad/s, FLU; speeds of shape (time, 4), in any unit that is a share of the speed;
+    motors follow commands later.
     """
     if speed.shape[1] != 4 or len(speed) < 5 * rate_hz or not speed.any():
         return None
@@ -264,6 +260,37 @@ def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_comma
         total = (wanted**2).sum(axis=0)
         shares.append(float(np.mean(1 - np.divide((left**2).sum(axis=0), total, out=np.ones(3), where=total > 0))))
     return max(shares)
+
+
+def turns_by_rotors(flights: Iterable[tuple[Array, Array, float, bool]]) -> tuple[Array, Array]:
+    """Find which way each rotor by itself turns the body about z, by least squares with its squared speed.
+
+    Parameters
+    ----------
+    flights : iterable of (body rate, speed, rate, whether speeds are commands)
+        As in `airframe_from_motion`, of any number of rotors.
+
+    Returns
+    -------
+    turns, half : array, shape (rotor,)
+        Above 0 counter-clockwise, as parts of what rotors do on the mean, with halves of 95 % intervals by jackknife.
+    """
+    squares, products = [], []
+    for body_rate, speed, rate_hz, is_command in flights:
+        tried = [(rotors, wanted[:, 2]) for wanted, rotors in _driven(body_rate, speed, rate_hz, is_command)]
+        rotors, wanted = largest(tried, lambda each: float(np.linalg.norm(np.linalg.qr(each[0])[0].T @ each[1])))
+        for block in np.array_split(np.arange(len(wanted)), max(FEWEST_BLOCKS, round(len(wanted) / rate_hz / BLOCK_S))):
+            squares.append(rotors[block].T @ rotors[block])
+            products.append(rotors[block].T @ wanted[block])
+    own, together = np.sum(squares, axis=0), np.sum(products, axis=0)
+    turns = np.linalg.lstsq(own, together, rcond=None)[0]
+    size = np.abs(turns).mean()
+    without = [
+        np.linalg.lstsq(own - square, together - product, rcond=None)[0]
+        for square, product in zip(squares, products, strict=True)
+    ]
+    half = half_width(jackknife_error(np.array(without)), len(without))
+    return np.asarray(turns / size), np.asarray(half / size)
 
 
 def _driven(

@@ -21,7 +21,7 @@ from cpfls_cli.flightlog.agreement import AS_NAMED, AxisFit, Ground, LeanFit, Or
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
-from cpfls_cli.flightlog.vocabulary import ANGLES, SENSED, Row
+from cpfls_cli.flightlog.vocabulary import Row, sizes
 from cpfls_cli.units import UnitName, known_unit
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ NEAR_GRAVITY = 1.3  # Ratio to gravity of what is gravity in some unit, since a 
 _AS_GOOD_RATES, _AS_GOOD_LEAN, _AS_LEVEL = 0.02, 0.1, 0.2
 _ODD_ENOUGH = 2  # Price from which the columns of a quaternion are tried in every order and with every sign.
 _DEGREES = 180 / np.pi
+_ANGLES, SENSED = sizes("attitude"), sizes("sensed")
 # Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn.
 _LARGEST_ANGLE, _LARGEST_TILT = 6.6, 1.7
 _NEAR: Final = 0.2  # Part of a turn, rad, that an angle moves between two samples where it jumps by a full turn.
@@ -243,7 +244,7 @@ def _place_axes(lean: LeanFit, up: float, level: float) -> tuple[Order, Sign, fl
 
 def nearest(size: float, rows: Sequence[Row]) -> Row:
     """Give the row of the nearest size."""
-    return min(rows, key=lambda row: abs(np.log(size / row[0])))
+    return min(rows, key=lambda row: abs(np.log(size / row.size)))
 
 
 def read_attitude(seen: Seen) -> TakenReading | None:
@@ -269,7 +270,7 @@ def _witnesses(seen: Seen) -> Witnesses:
         size, vertical = float(np.median(sizes)), float(np.median(values[:, 2]))
         if not sensed and abs(vertical) > GOOD * size:
             sensed = float(np.sign(vertical))
-        if lift is None and any(1 / NEAR_GRAVITY < size / level < NEAR_GRAVITY for level, _, _ in SENSED):
+        if lift is None and any(1 / NEAR_GRAVITY < size / level < NEAR_GRAVITY for level, *_ in SENSED):
             lift = sizes
     bodies = {BODY_OF[str(named.frame)] for found in seen.candidates.values() for named in found[:1] if named.frame}
     moving = None
@@ -299,7 +300,7 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
         best = verdict.best
         if best.lean is None:
             break
-        _, decided, _ = nearest(best.lean.gain * (1 if unit == "rad" else 1 / _DEGREES), ANGLES)
+        _, decided, _ = nearest(best.lean.gain * (1 if unit == "rad" else 1 / _DEGREES), _ANGLES)
         if rivals:
             # Gravity and the lean make the acceleration.
             reason, sure, rivals = f"{reason}; in {decided} the lean explains the acceleration", "data", ()

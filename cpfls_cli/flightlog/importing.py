@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -43,16 +43,8 @@ def import_log(
 ) -> ImportedFlight:
     """Turn the columns of a log into a flight.
 
-    Parameters
-    ----------
-    columns : mapping from str to array, shape (sample,)
-    rotor_torque : callable, optional
-        Body torque, array of shape (time, 3), N m, FLU, from the signals of the rotors; called where
-        `torque_source` names the rotors.
-    delay_share : float
-        Leading share of the flight that an estimate of the delay may look at.
-    stamped_hz : mapping from str to float, optional
-        See `slow_signals`.
+    Where `torque_source` names the rotors, `rotor_torque` gives the body torque, shape (time, 3), N m, FLU, from their
+    signals. An estimate of the delay looks at the leading `delay_share` of it. `stamped_hz`: see `slow_signals`.
     """
     signals = apply_rotor_lag(read_signals(columns, settings, stamped_hz), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
@@ -143,25 +135,23 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
 
 def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
     """Lay a clock over stamps, and say where its rate is none of a log."""
-    period = float(np.median(np.diff(time)))
-    if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
+    period, span = float(np.median(np.diff(time))), float(time[-1] - time[0])
+    if period < _SHORTEST_PERIOD_S or span / period > _LARGEST_REFINEMENT * len(time):
         raise InputError(
-            f"import.time_column: the median step is {period:.3g} s in {time[-1] - time[0]:.3g} s of {len(time)} rows,"
-            " which no log has; check import.time_unit and import.time_column"
+            f"import.time_column: the median step is {period:.3g} s in {span:.3g} s of {len(time)} rows, which no log"
+            " has; check import.time_unit and import.time_column"
         )
     # A whole number of periods that rounding made a little short must not lose its last sample.
-    samples, rate_hz = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
+    samples, rate_hz = int(span / period * (1 + 1e-9) + 1e-6) + 1, 1 / period
     words = f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"
     return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
-    """Filter all signals alike and derive rates, accelerations and torques.
+    """Filter all signals alike, derive rates, accelerations and torques, and interpolate to `rate_hz` last.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
-    between the raw ones. The result is interpolated to `rate_hz` last. Setpoints stay as they were asked for.
-
-    The signals are aligned and have the body torque (section 1 of the method's description).
+    between the raw ones (section 1 of the method's description). Setpoints stay as they were asked for.
     """
     filtered: dict[str, Any] = {
         name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
@@ -197,10 +187,8 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
 
 
 def _derived(signals: LogSignals) -> dict[str, Array]:
-    derived: dict[str, Array] = {}
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
-    if body_rate is not None:
-        derived["body_rate"] = body_rate
+    derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
         return derived
     steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > _STEEPEST_PITCH)
@@ -222,9 +210,8 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
     """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
 
-    Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
-
-    The signals are not yet filtered, and an estimate looks at a leading share of their samples.
+    Measured rotor speeds are motion and stay, unless the torque is computed from them. The signals are not yet
+    filtered, and an estimate looks at a leading share of their samples.
     """
     estimate = None
     if settings.delay_s == "estimate":
@@ -241,10 +228,11 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
-    odd = "at the estimated delay, a moment of inertia is negative; check signs and axes"
-    last = "the estimated delay is the longest one tried; raise import.delay_max_s"
-    negative = bool((estimate.inertia[:3] < 0).any())
-    holds = {last: estimate.at_bound, poor: estimate.pooled_r2 < _POOR_R2, odd: negative}
+    holds = {
+        "the estimated delay is the longest one tried; raise import.delay_max_s": estimate.at_bound,
+        poor: estimate.pooled_r2 < _POOR_R2,
+        "at the estimated delay, a moment of inertia is negative; check signs and axes": estimate.inertia[:3].min() < 0,
+    }
     return tuple(sentence for sentence, so in holds.items() if so)
 
 
@@ -269,31 +257,6 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
 
 
-class _Fit(NamedTuple):
-    """Regression of the shifted torque on the columns of a rigid body."""
-
-    window: slice
-    period: float
-    torque: Array
-    scale: Array
-    regressor: Array
-    basis: Array
-
-    def scaled_torque(self, delay: float) -> Array:
-        moved = delayed(self.torque, delay / self.period)[self.window] / self.scale
-        return np.asarray(moved - moved.mean(axis=0))
-
-    def r2(self, delay: float) -> tuple[float, Array]:
-        torque = self.scaled_torque(delay)
-        fitted = (self.basis @ (self.basis.T @ torque.ravel())).reshape(torque.shape)
-        residual, total = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
-        acting = total > 0
-        unexplained = residual[acting] / total[acting]
-        r2 = np.ones(3)
-        r2[acting] = 1 - unexplained
-        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
-
-
 def estimate_delay(
     time: Array,
     body_rate: Array,
@@ -312,49 +275,56 @@ def estimate_delay(
     axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
     sample is refined between its neighbours (section 8 of the method's description).
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Uniform.
-    body_rate, body_torque : array, shape (time, 3), rad/s and N m, body frame
-        The torque as commanded, or as computed from the rotors.
-    delay_max_s : float
-        Longest delay tried, s.
-    share : float
-        Leading share of the samples that is looked at, so that data held out for a test stay unseen.
+    On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
+    Only the leading `share` of the samples is looked at, so that data held out for a test stay unseen.
     """
+    from scipy.linalg import orth
     from scipy.optimize import minimize_scalar
 
-    used = slice(0, round(share * len(time)))
-    fit = _prepare(time[used], body_rate[used], body_torque[used], delay_max_s, lowpass_hz, lowpass_order)
-    delays = np.append(np.arange(0.0, delay_max_s, time[1] - time[0]), delay_max_s)
-    curve = np.array([fit.r2(delay)[0] for delay in delays])
+    time, *pair = (own[: round(share * len(own))] for own in (time, body_rate, body_torque))
+    if len(time) < 2:
+        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
+    period = time[1] - time[0]
+    rate, torque = (low_pass(own, 1 / period, lowpass_hz, lowpass_order) for own in pair)
+    window = _window(time, delay_max_s, lowpass_hz)
+    scale = torque[window].std(axis=0)
+    if not scale.any():
+        raise ComputationError("the delay cannot be estimated: the torque is constant")
+    scale[scale == 0] = np.inf
+    columns = body_torque_columns(rate, derivative(time, rate))[window] / scale[:, None]
+    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
+    # Of columns of one length, so that a weakly excited one is not lost.
+    lengths = np.linalg.norm(regressor, axis=0)
+    basis = orth(regressor / np.where(lengths > 0, lengths, 1.0), rcond=1e-10)
+
+    def moved(delay: float) -> Array:
+        own = delayed(torque, delay / period)[window] / scale
+        return np.asarray(own - own.mean(axis=0))
+
+    def explained(delay: float) -> tuple[float, Array]:
+        own, r2 = moved(delay), np.ones(3)
+        residual = own - (basis @ (basis.T @ own.ravel())).reshape(own.shape)
+        acting = own.any(axis=0)
+        unexplained = (residual**2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
+        r2[acting] = 1 - unexplained
+        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
+
+    delays = np.append(np.arange(0.0, delay_max_s, period), delay_max_s)
+    curve = np.array([explained(delay)[0] for delay in delays])
     best = int(np.argmin(levelled(-curve)))
     bounds = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
-    refined = float(minimize_scalar(lambda own: -fit.r2(float(own))[0], bounds=bounds, method="bounded").x)
-    delay = refined if less(fit.r2(float(delays[best]))[0], fit.r2(refined)[0]) else float(delays[best])
-    pooled, r2 = fit.r2(delay)
-    inertia = np.linalg.lstsq(fit.regressor, fit.scaled_torque(delay).ravel(), rcond=None)[0]
+    refined = float(minimize_scalar(lambda own: -explained(float(own))[0], bounds=bounds, method="bounded").x)
+    delay = refined if less(curve[best], explained(refined)[0]) else float(delays[best])
+    pooled, r2 = explained(delay)
+    inertia = np.asarray(np.linalg.lstsq(regressor, moved(delay).ravel(), rcond=None)[0], dtype=float)
+    last = bool(delay > delays[-2])
     return DelayEstimate(
-        delay_s=delay,
-        r2=r2,
-        pooled_r2=pooled,
-        inertia=np.asarray(inertia, dtype=float),
-        delays=delays,
-        curve=curve,
-        at_bound=bool(delay > delays[-2]),
+        delay_s=delay, r2=r2, pooled_r2=pooled, inertia=inertia, delays=delays, curve=curve, at_bound=last
     )
 
 
-def _prepare(
-    time: Array, body_rate: Array, body_torque: Array, delay_max_s: float, lowpass_hz: float | None, order: int
-) -> _Fit:
-    if len(time) < 2:
-        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
-    rate_hz = 1 / (time[1] - time[0])
-    smooth_rate = low_pass(body_rate, rate_hz, lowpass_hz, order)
-    smooth_torque = low_pass(body_torque, rate_hz, lowpass_hz, order)
-    # Without the filter's transients and, at the start, the longest delay.
+def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
+    """Leave out the filter's transients and, at the start, the longest delay."""
     edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
     first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge]).tolist()
     if last - first < _SMALLEST_WINDOW:
@@ -363,17 +333,7 @@ def _prepare(
             f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
             f" remain, and at least {_SMALLEST_WINDOW} are needed",
         )
-    window = slice(first, last)
-    scale = smooth_torque[window].std(axis=0)
-    if not scale.any():
-        raise ComputationError("the delay cannot be estimated: the torque is constant")
-    scale[scale == 0] = np.inf
-    columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
-    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
-    # Of columns of one length, so that a weakly excited one is not lost.
-    lengths = np.linalg.norm(regressor, axis=0)
-    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
-    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, directions[:, sizes > 1e-10 * sizes[0]])
+    return slice(first, last)
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:

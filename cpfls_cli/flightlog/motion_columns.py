@@ -1,7 +1,5 @@
 """What the columns of motion are: gyroscope, position, velocity and accelerometer, each held against all others."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from cpfls_cli.flightlog.agreement import (
@@ -14,10 +12,10 @@ from cpfls_cli.flightlog.agreement import (
     slow,
 )
 from cpfls_cli.flightlog.airframe import explained_by_rotors
-from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, Reading, nearest
+from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENSED, Reading, nearest
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure, called
-from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
+from cpfls_cli.flightlog.vocabulary import Row, sizes
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
@@ -25,8 +23,6 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 _TOLERANCE, _TEN = 1.4, 10.0
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
-# Sizes of an acceleration that holds no gravity, over that over ground in m/s^2.
-_OVER_GROUND: Sequence[Row] = ((1.0, "m/s^2", 1.0), (1 / STANDARD_GRAVITY, "g", 1.0), (1000.0, "m/s^2", 1e-3))
 # Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
 _BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
@@ -89,7 +85,7 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
         return
     fit, stated = None if reading is None else reading.rates, named.unit
     if fit is not None and fit.explained > CLEAR:
-        size, unit, scale = nearest(fit.gain, RATES)
+        size, unit, scale = nearest(fit.gain, sizes("body_rate"))
         agrees = bool(abs(np.log(fit.gain / size)) < np.log(_TOLERANCE))
         if stated is not None and known_unit(stated).factor != known_unit(unit).factor * scale:
             if agrees:
@@ -253,9 +249,9 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     carried = _carried(seen, reading)
     near = _BY_NAME if named.known and stated else NEAR_GRAVITY
     fitting, at_hover = (
-        [row for row in SENSED if 1 / near < abs(vertical) / (weight * row[0]) < near] for weight in (carried, 1.0)
+        [row for row in SENSED if 1 / near < abs(vertical) / (weight * row.size) < near] for weight in (carried, 1.0)
     )
-    sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
+    sensed = next((row for row in fitting if row.unit == (stated or row.unit)), fitting[0] if fitting else None)
     place, derived = seen.guesses.get("velocity"), first_derivative
     if place is None:
         place, derived = seen.guesses.get("position"), second_derivative
@@ -269,7 +265,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
     follows = along_world is not None and along_world.as_named > GOOD and named.frame not in ("FLU", "FRD")
     if sensed is not None and follows and along_world is not None:
-        size = known_unit(sensed[1]).factor * sensed[2] * along_world.gain
+        size = known_unit(sensed.unit).factor * sensed.scale * along_world.gain
         if 0.5 < size < _TEN:
             _leave_gravity_out(seen, named, along_world)
             return False
@@ -278,7 +274,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     if sensed is not None:
         _take_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
-            other = at_hover[0][1]
+            other = at_hover[0].unit
             seen.doubt(
                 "acceleration", Rival(f"unit: {other}", f"at hover it would be {other}; is import.time_unit right?")
             )
@@ -289,7 +285,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
             " over ground does not explain it"
         )
         return False
-    size, unit, scale = nearest(along_world.gain, _OVER_GROUND)
+    size, unit, scale = nearest(along_world.gain, sizes("over_ground"))
     if abs(vertical) > GOOD * size * STANDARD_GRAVITY:
         _leave_gravity_out(seen, named, along_world)
         return False

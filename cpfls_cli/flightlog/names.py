@@ -14,7 +14,17 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog import agreement, vocabulary
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
-from cpfls_cli.flightlog.vocabulary import CRAZYFLIE, KIN, MEANINGS, NOT_MEASURED, PX4, WISHED, Meaning
+from cpfls_cli.flightlog.vocabulary import (
+    CRAZYFLIE,
+    KIN,
+    MEANINGS,
+    NOT_MEASURED,
+    PX4,
+    RATE_WORDS,
+    WISHED,
+    WRITTEN,
+    Meaning,
+)
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName
 
@@ -22,12 +32,6 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 _MEASURED: Final = tuple(own for own in vocabulary.KNOWN if own.signal in UNITS_OF_SIGNAL.keys() - SETPOINTS.keys())
-_WRITTEN: Final = {
-    text: (unit, scale)
-    for unit, own in vocabulary.SPELLINGS.items()
-    for scale, written in own.items()
-    for text in written.split()
-}
 Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 
@@ -45,13 +49,13 @@ class ColumnGroup:
         before, star, after = self.pattern.partition("*")
         bracket = re.search(r"[\[(]([^\[\]()*]*[A-Za-z%][^\[\]()*]*)[\])]$", after if star else before)
         if bracket:
-            return bracket[0] if _symbols(bracket[1]) in _WRITTEN else ""
+            return bracket[0] if _symbols(bracket[1]) in WRITTEN else ""
         name = after if any(letter.isalnum() for letter in after) else before.rstrip("[(")
         # The axis stands before what follows the star, and a letter that stands before the star may be a name.
         starts = [found.start() for found in re.finditer(r"[_ ]|(?<=[a-z])(?=[A-Z])|^", name)]
         for start in starts if name is after else starts[1:]:
             text = name[start:].strip("_ ")
-            if _symbols(text) in _WRITTEN and (name is after or len(text) > 1):
+            if _symbols(text) in WRITTEN and (name is after or len(text) > 1):
                 return name[start:]
         return ""
 
@@ -186,7 +190,7 @@ def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
 def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
     count = len(group.columns)
     enough = count >= meaning.number if meaning.signal in ROTORS else count == meaning.number
-    return enough and group.kind in meaning.kinds.split()
+    return enough and group.kind in meaning.kinds
 
 
 def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
@@ -219,20 +223,19 @@ _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
 }
 
 
-def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
+def wished_signals(groups: tuple[ColumnGroup, ...]) -> list[Named]:
     """List what groups of columns may be a setpoint of: a word says that it is one, the others what of."""
     # Three components of a quaternion follow an attitude too, at half of its size.
     of_quaternions = {column for group in groups if group.kind == "wxyz" for column in group.columns}
     own = (group for group in groups if group.kind == "wxyz" or not of_quaternions & {*group.columns})
-    found = (named for group in own for named in _by_words(group, wished=True))
-    return tuple(sorted(found, key=lambda named: named.rank))
+    return sorted((named for group in own for named in _by_words(group, wished=True)), key=lambda named: named.rank)
 
 
 def _stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:
     """Give the unit that a name states for a signal, at its end or as a word, and the factor that makes it."""
     words = (_symbols(word) for word in group.words if word in vocabulary.A_WORD)
     for text in (_symbols(group.ending), *words):
-        for own in (_WRITTEN.get(text), _WRITTEN.get(f"{text}/s")):
+        for own in (WRITTEN.get(text), WRITTEN.get(f"{text}/s")):
             # Of a rate "deg" is deg/s.
             if own is not None and KNOWN_UNITS[own[0]].si in UNITS_OF_SIGNAL[signal]:
                 return own
@@ -243,9 +246,9 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     """Tell whether words mean a signal; positions, rotors and angles have ways of their own."""
     own, signal = {*words}, meaning.signal
     # A name that ends in the unit of a rate or of a speed is one.
-    ending = _WRITTEN.get(_symbols(group.ending))
+    ending = WRITTEN.get(_symbols(group.ending))
     ends_in_speed = ending is not None and KNOWN_UNITS[ending[0]].si == "rad/s"
-    if own & set(meaning.never.split()):
+    if own & meaning.never:
         return False
     if signal in ROTORS:
         asked = own & vocabulary.ASKED
@@ -258,9 +261,9 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"
-        turns = pqr or ends_in_speed or bool(own & {*vocabulary.RATE_WORDS.split(), "speed"})
+        turns = pqr or ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
-    return bool({*words[-meaning.last :]} & set(meaning.words.split()))
+    return bool({*words[-meaning.last :]} & meaning.words)
 
 
 # Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.
@@ -306,17 +309,16 @@ def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, 
     accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
     are rotors. Without an attitude nothing is found.
     """
-    names = _of_matrix(columns)
-    every = max(1, round(1 / (_RATE_HZ * float(np.median(np.diff(time)))))) if len(time) > 2 else 1
+    names, step = _of_matrix(columns), float(np.median(np.diff(time))) if len(time) > 2 else 1.0
+    every = max(1, round(1 / (_RATE_HZ * step)))
     table = np.column_stack([np.asarray(columns[name], dtype=float)[::every] for name in names]) if names else None
     if table is None or not np.isfinite(table).all():
         return ()
-    grid = np.arange(time[0], time[-1], every * float(np.median(np.diff(time))))[: len(table)]
+    grid = np.arange(time[0], time[-1], every * step)[: len(table)]
+    table, rate_hz = table[: len(grid)], 1 / float(grid[1] - grid[0])
     taken: dict[int, Named] = {}
-    rate_hz = 1 / float(grid[1] - grid[0])
-    table = table[: len(grid)]
 
-    def runs(length: int) -> list[tuple[int, Array]]:
+    def runs(length: int) -> _Runs:
         """List the runs of neighbours of which none is taken and each changes."""
         firsts = range(table.shape[1] - length + 1)
         free = [first for first in firsts if not taken.keys() & {*range(first, first + length)}]
@@ -334,22 +336,19 @@ def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, 
     first, rotation, rates = attitude
     take("quaternion", first, 4)
     take("body_rate", rates, 3)
-    places = _matrix_places(runs(3), rotation, rate_hz)
     carried: tuple[float, ...] = (STANDARD_GRAVITY,)
-    if places is not None:
-        place, speed = places
+    if (places := _matrix_places(runs(3), rotation, rate_hz)) is not None:
         # The usual size of what carries the vehicle, z of the position upward and downward.
-        moving = agreement.second_derivative(table[:, place : place + 3], rate_hz)
+        moving = agreement.second_derivative(table[:, places[0] : places[0] + 3], rate_hz)
         forces = (moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]) for up in (1.0, -1.0))
         carried = tuple(float(np.median(np.linalg.norm(force, axis=1))) for force in forces)
-        take("position", place, 3)
-        take("velocity", speed, 3)
+        take("position", places[0], 3)
+        take("velocity", places[1], 3)
     sensed = []
     for first, values in runs(3):
         # Of the size of what carries the vehicle, nearly all of it in the third.
         middle, size = np.median(np.abs(values), axis=0), float(np.median(np.linalg.norm(values, axis=1)))
-        if middle[:2].max() < 0.3 * middle[2]:
-            sensed.append((min(abs(size / own - 1) for own in carried), first))
+        sensed += [(min(abs(size / own - 1) for own in carried), first)] if middle[:2].max() < 0.3 * middle[2] else []
     if sensed and min(sensed)[0] < _SIZE:
         take("acceleration", min(sensed)[1], 3)
     for first, values in runs(4):
@@ -369,16 +368,15 @@ def _matrix_attitude(
     """Find the quaternion whose derivative explains three other columns best."""
     found = []
     rates = [(first, agreement.slow(values, rate_hz)) for first, values in runs(3)]
-    for first, values in runs(4):
+    for (first, values), order, inverse in product(runs(4), ("xyzw", "wxyz"), (False, True)):
         if float(np.quantile(np.abs(np.linalg.norm(values, axis=1) - 1), 0.95)) > _UNIT_LENGTH:
             continue
-        for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
-            rotation = agreement.on_clock(agreement.rotations_of(values, *key), time, grid)
-            turning = agreement.turning_of(rotation, rate_hz)
-            for other, measured in rates if turning is not None else ():
-                if turning is not None and (other + 3 <= first or other >= first + 4):
-                    share = agreement.fit_axes(turning, measured).as_named
-                    found += [(share, first, rotation, other)] if share > _FOLLOWS else []
+        rotation = agreement.on_clock(agreement.rotations_of(values, order, inverse), time, grid)
+        turning = agreement.turning_of(rotation, rate_hz)
+        for other, measured in rates:
+            if turning is not None and (other + 3 <= first or other >= first + 4):
+                share = agreement.fit_axes(turning, measured).as_named
+                found += [(share, first, rotation, other)] if share > _FOLLOWS else []
     return largest(found, lambda own: own[0])[1:] if found else None
 
 
@@ -390,8 +388,7 @@ def _matrix_places(runs: _Runs, rotation: Rotation, rate_hz: float) -> tuple[int
         derived = agreement.first_derivative(values, rate_hz)
         references = [agreement.slow(own, rate_hz) for own in (derived, rotation.inv().apply(derived))]
         for (speed, own), reference in product(measured, references):
-            if abs(speed - place) >= 3:
-                fit = agreement.fit_axes(reference, own)
-                near = 1 / _NEAR < fit.gain < _NEAR and fit.as_named > _FOLLOWS
-                found += [(fit.as_named, place, speed)] if near else []
+            fit = agreement.fit_axes(reference, own) if abs(speed - place) >= 3 else None
+            if fit is not None and 1 / _NEAR < fit.gain < _NEAR and fit.as_named > _FOLLOWS:
+                found.append((fit.as_named, place, speed))
     return largest(found, lambda own: own[0])[1:] if found else None

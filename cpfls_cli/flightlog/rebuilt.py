@@ -120,18 +120,10 @@ class _Mixed(NamedTuple):
 
 
 def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebuilt | None:
-    """Rebuild the commands of the rotors of a log of PX4, ArduPilot or Betaflight.
+    """Rebuild the commands of the rotors of a log; of `SOURCES` what it holds is enough.
 
-    Parameters
-    ----------
-    topics : mapping from topic to mapping from field to array, shape (sample,)
-        As a reader gives them; of `SOURCES` what the log holds is enough.
-
-    Returns
-    -------
-    Rebuilt or None
-        None where the log holds nothing to rebuild from, or no commands to compare with; `refused` says what
-        speaks against the others.
+    None where the log holds nothing to rebuild from, or no commands to compare with; `refused` says what speaks against
+    the others.
     """
     held = {topic: {name: own for name, own in fields.items() if len(own)} for topic, fields in topics.items()}
     try:

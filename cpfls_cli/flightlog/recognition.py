@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog import motion_columns, recognised
-from cpfls_cli.flightlog.agreement import first_derivative, slow
+from cpfls_cli.flightlog.agreement import correlations, first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
@@ -59,23 +59,10 @@ _UP: Final = {"FLU": "up", "FRD": "down"}
 
 
 def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
-    """Propose what the columns of a log are.
+    """Propose what the columns of a log are; refuse one in which nothing is recognised or flies, or no multirotor.
 
-    Parameters
-    ----------
-    topics : mapping from topic to mapping from field to array, shape (sample,)
-        As a reader gives them: stamps of topics in s, a flat log as one topic without a name.
-    units : mapping from column to str
-        That the log states.
-    parameters : mapping
-        Of the autopilot, or of a header.
-    system : str
-        What wrote the log; empty where that is not known.
-
-    Raises
-    ------
-    InputError
-        If nothing in the log is recognised, nothing in it flies, or what flies is no multirotor.
+    The arguments are as a reader gives them (`logs.formats.LogContents`): stamps of topics in s, a flat log as one
+    topic without a name.
     """
     kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)
@@ -155,33 +142,30 @@ def _live_part(
     """Leave out where sources of a flat log have ended and their columns go on in straight lines; say so."""
     if not log.flat:
         return log, candidates, ""
-    fields = log.topics[""]
+    fields, clock = log.topics[""], log.clock("")
     leading = {
-        name: np.column_stack([np.asarray(fields[column], dtype=float) for column in found[0].group.columns])
+        str(name): np.column_stack([np.asarray(fields[column], dtype=float) for column in found[0].group.columns])
         for name, found in candidates.items()
     }
-    clock = log.clock("")
-    live, ended = live_rows(SignalTable(clock, {str(name): own for name, own in leading.items()}), float(clock[0]))
-    if not ended:
-        return log, candidates, ""
-    part = LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
-    part.origin = log.origin
-    return part, recognised.holding_values(part, [named for found in candidates.values() for named in found]), ended
+    live, ended = live_rows(SignalTable(clock, leading), float(clock[0]))
+    if ended:
+        origin, log = log.origin, LogTable({"": {name: values[live] for name, values in fields.items()}}, log.units)
+        log.origin = origin
+        candidates = recognised.holding_values(log, [named for found in candidates.values() for named in found])
+    return log, candidates, ended
 
 
 def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
     """Gather what shows flight by the names of columns, before axes and frames are known."""
-    first = {name: found[0] for name, found in candidates.items() if found}
-    values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
-    height = rate = None
-    if "position" in values:
-        named = first["position"]
-        up = -1.0 if named.frame == "NED" else 1.0
-        height = up * values["position"][:, 2] / (1000 if named.unit == "mm" else 1)
-    if "body_rate" in values:
-        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(values["body_rate"]), 0.99)) > _FASTEST_RAD_S
-        rate = values["body_rate"] / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
-    angles = values.get("attitude")
+    first = {name: found[0] for name, found in candidates.items() if found and name in _SIGNS}
+    values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items()}
+    height, rate, angles = values.get("position"), values.get("body_rate"), values.get("attitude")
+    if height is not None:
+        up = -1.0 if first["position"].frame == "NED" else 1.0
+        height = up * height[:, 2] / (1000 if first["position"].unit == "mm" else 1)
+    if rate is not None:
+        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
+        rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
     if angles is not None and float(np.abs(angles[:, :2]).max()) > np.pi:
         angles = angles / _DEGREES
     ordered = "quaternion" in first and (first["quaternion"].group.kind == "wxyz" or first["quaternion"].known)
@@ -257,19 +241,16 @@ def _take_wrench(seen: Seen) -> None:
     turning = first_derivative(seen.log.on_grid(rate.columns.columns)[seen.part], seen.rate_hz)
     shares = []
     for steps in (round(late * seen.rate_hz) for late in _LATE_S):
-        # Of roll and pitch, some time after the torque.
+        # Some time after the torque.
         pair = (turning[steps:], seen.grid(torque)[: len(turning) - steps])
-        own, other = (slow(each, seen.rate_hz, _TORQUE_HZ) for each in pair)
-        moves = own.std(axis=0) * other.std(axis=0) != 0
-        both = [float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) if moves[axis] else 0.0 for axis in range(2)]
-        shares.append(both)
-    share = largest(shares, min)
-    if not min(share) > _FOLLOWS:
+        shares.append(correlations(*(slow(each, seen.rate_hz, _TORQUE_HZ) for each in pair))[:2].tolist())
+    roll, pitch = largest(shares, min)
+    if not min(roll, pitch) > _FOLLOWS:
         seen.left_out.append(f"{torque.group.pattern}: looks like a torque, but the motion does not follow it")
         return
     reason = (
-        f"{called(torque)}; the angular acceleration follows it (correlation {share[0]:.2f} about roll,"
-        f" {share[1]:.2f} about pitch); a commanded torque is only what a controller asked for"
+        f"{called(torque)}; the angular acceleration follows it (correlation {roll:.2f} about roll, {pitch:.2f} about"
+        " pitch); a commanded torque is only what a controller asked for"
     )
     scale = () if torque.unit else (Rival("unit: N mm", "the scale follows from the inertia, which no log states"),)
     seen.take(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
@@ -281,21 +262,17 @@ def _take_wrench(seen: Seen) -> None:
 def _take_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
     seen.left_out += rotors.left_out
     seen.warnings += rotors.warnings
-    speeds = None
-    for found in (rotors.command, rotors.speed):
-        if found is not None:
-            seen.guesses[found.signal] = found
-            speeds = seen.mapped(found)
-            if found is rotors.command and rotors.command_is is not None and rotors.command_is.value == "thrust":
-                speeds = np.sqrt(np.maximum(speeds, 0.0))
+    speeds, rate = None, seen.guesses.get("body_rate")
+    for found in filter(None, (rotors.command, rotors.speed)):
+        seen.guesses[found.signal] = found
+        speeds = seen.mapped(found)
+        if found is rotors.command and rotors.command_is is not None and rotors.command_is.value == "thrust":
+            speeds = np.sqrt(np.maximum(speeds, 0.0))
     if rotors.command_is is not None:
         seen.choices[rotors.command_is.key] = rotors.command_is
-    rate = seen.guesses.get("body_rate")
     if speeds is None or rate is None:
         return speeds, None
-    body = seen.mapped(rate)
-    if seen.choices["body_frame"].value == "FRD":
-        body = body * np.array([1.0, -1.0, -1.0])
+    body = seen.mapped(rate) * ((1.0, -1.0, -1.0) if seen.choices["body_frame"].value == "FRD" else 1.0)
     moved = airframe_from_motion(body, speeds, seen.rate_hz, rotors.speed is None)
     if moved is not None and ("guess" in (rate.sure, seen.choices["body_frame"].sure) or seen.open_rotors):
         # Whose axes are not known says left for right.
@@ -324,9 +301,10 @@ def _doubt_columns(seen: Seen) -> None:
     for name, guess in tuple(seen.guesses.items()):
         values = dict(zip(guess.columns.columns, seen.log.values(guess.columns.columns)[1].T, strict=True))
         still = [column for column, own in values.items() if len(values) > 1 and not np.ptp(own) > 0]
-        pairs = [(one, two) for one, two in combinations(values, 2) if np.array_equal(values[one], values[two])]
         odd = [f"{column} never changes" for column in still]
-        odd += [f"{one} and {two} have the same values" for one, two in pairs if one not in still]
+        for one, two in combinations(values, 2):
+            same = one not in still and np.array_equal(values[one], values[two])
+            odd += [f"{one} and {two} have the same values"] if same else []
         if odd:
             seen.warnings.append(f"{name}: {'; '.join(odd)}")
             seen.doubt(name)
@@ -353,19 +331,16 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
     # An accelerometer is often logged faster than all that matters more.
     clocked = [guess for guess in signals if guess.signal not in ("voltage", "acceleration")] or list(signals)
     base = largest(clocked, lambda guess: rates[guess.signal])
-    time_column, unit = log.time_column, log.time_unit
-    begin = log.origin
+    time_column, unit, begin = log.time_column, log.time_unit, log.origin
     if not log.flat:
         topic = log.parts(base.columns.columns[0])[0]
-        time_column, unit = f"{topic}.{STAMP}", "us"
-        begin = float(log.clock(topic)[0])
+        time_column, unit, begin = f"{topic}.{STAMP}", "us", float(log.clock(topic)[0])
     if flown.span_s is not None:
         # import.crop_s counts from the first stamp of the clock.
-        off = float(log.grid[0]) - float(begin)
-        first, last = (round(own + off, 2) for own in flown.span_s)
+        first, last = (round(own + (float(log.grid[0]) - begin), 2) for own in flown.span_s)
         flown = replace(flown, span_s=(max(0.0, first), last))
     used = {time_column, *(column for guess in (*signals, *asked) for column in guess.columns.columns)}
-    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
+    used |= set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
     return Recognition(
         time_column=time_column,
         time_unit=unit,
@@ -380,6 +355,6 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         speeds=speeds,
         load=None if speeds is None or seen.open_rotors else _load(seen, speeds),
         warnings=tuple(seen.warnings),
-        unused=tuple(name for name in log.names if name not in used | stamps),
+        unused=tuple(name for name in log.names if name not in used),
         counted_from_s=float(log.grid[0]) - log.origin,
     )

@@ -143,16 +143,8 @@ def _behind(time: Array) -> BoolArray:
 def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> tuple[slice, int, int]:
     """Find the longest stretch in which no column lacks values for longer than `gap_s`, as `gap_rule` has it.
 
-    Parameters
-    ----------
-    present : array of bool, shape (sample, column)
-        Where each column has a value.
-
-    Returns
-    -------
-    rows : slice
-    incomplete_ends, beyond_gap : int
-        Rows left out as a column has no value yet or any more, and beyond a gap.
+    `present`, shape (sample, column), is where each column has a value. Given back are the rows, how many are left out
+    as a column has no value yet or any more, and how many beyond a gap.
     """
     if (present.sum(axis=0) < 2).any():
         raise InputError("a mapped column has fewer than two values in the part of the log that is read")

@@ -365,7 +365,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     if own is None:
         return None
     clear = own.clear == "always" or (own.clear == "of commands" and bool(words & ASKED))
-    others = [Rival(*rival) for rival in own.rivals]
+    others = [Rival(*own.rival)] if own.rival else []
     if not (clear or named.unit == "us" or "pwm" in words):
         others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
     sure = "data" if clear else "guess"

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.flightlog.agreement import slow
+from cpfls_cli.flightlog.agreement import correlations, slow
 from cpfls_cli.flightlog.conversion import as_mapped, attitude_from_quaternion
 from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.names import column_groups, is_of, lists_all, wished_signals
@@ -255,7 +255,7 @@ def _follow(measured: Array, asked: Array, rate_hz: float, factors: tuple[float,
     smooth = slow(measured, rate_hz, _MOTION_HZ)
     edge = (len(asked) - len(smooth)) // 2
     within = asked[edge : edge + len(smooth)]
-    tried = [_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S]
+    tried = (_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S)
     return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
 
 
@@ -266,8 +266,7 @@ def _at_delay(measured: Array, asked: Array, steps: int, factors: tuple[float, .
         return _Following()
     late, earlier = (own[known] - own[known].mean(axis=0) for own in (late, earlier))
     spread, flown, shared = ((a * b).mean(axis=0) for a, b in ((earlier, earlier), (late, late), (late, earlier)))
-    size = np.sqrt(spread * flown)
-    along = np.where(size > 0, shared / np.where(size > 0, size, 1.0), 0.0)
+    along = correlations(late, earlier)
     best = int(np.argmax(along))
     if not along[best] > 0:
         return _Following(moves=np.asarray(spread > 0, dtype=bool))

@@ -13,13 +13,10 @@ _PADDED_PERIODS = 3
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int) -> Array:
-    """Apply a Butterworth low-pass filter of that order forward and backward, without phase shift.
+    """Apply a Butterworth low-pass filter of that order forward and backward, without phase shift, to columns.
 
-    Parameters
-    ----------
-    values : array, shape (time, column)
-    cutoff_hz : float or None
-        Where the two passes together halve the amplitude (-6 dB), Hz, below half of the rate; None: nothing is changed.
+    The two passes together halve the amplitude at the cut-off (-6 dB), which is below half of the rate; None: nothing
+    is changed.
     """
     if cutoff_hz is None:
         return values

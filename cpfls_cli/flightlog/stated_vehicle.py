@@ -11,62 +11,19 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.layouts import Parameters, numbered, whole
+from cpfls_cli.flightlog.layouts import TABLE, Parameters, numbered, spans, whole
 from cpfls_cli.flightlog.topics import STAMP, Topics, previous_rows
 from cpfls_cli.words import joined
 
 AIRPLANE, GROUND, HELICOPTER, VTOL = "an airplane", "a ground vehicle", "a helicopter", "a VTOL"
-_FIRMWARE: Final = {
-    "ArduPlane": AIRPLANE,
-    **dict.fromkeys(("ArduRover", "ArduAPMrover2"), f"{GROUND} or a boat"),
-    "ArduSub": "a submarine",
-    "ArduAntennaTracker": "an antenna tracker",
-    "ArduBlimp": "a blimp",
-    **dict.fromkeys(("ArduHeli", "Rotorflight"), HELICOPTER),
-}
+
 _HELICOPTER_PARAMETERS: Final = ("H_RSC_MODE", "H_COL_MIN", "H_SWASH_TYPE", "H_SV_MAN", "H_SW_TYPE", "H_SWASH_PLATE")
 VTOL_TYPES: Final = range(20, 26)  # MAV_TYPE of vehicles that hover on three rotors or more.
-# Numbers of parameters that stand for no multirotor.
-_NUMBERS: Final = {
-    "FRAME_CLASS": numbered(
-        "6: a helicopter; 8: a single copter with flaps; 9: a coaxial copter with flaps; 10: a bicopter or tail-sitter,"
-        " whose two rotors tilt; 11: a helicopter with two rotors; 13: a helicopter with four rotors"
-    ),
-    "CA_AIRFRAME": numbered(
-        "1: an airplane; 2: a VTOL; 3: a VTOL; 4: a VTOL; 5: a ground vehicle; 6: a ground vehicle; 10: a helicopter;"
-        " 11: a helicopter; 12: a coaxial helicopter; 13: a ground vehicle; 14: a spacecraft; 15: a spacecraft"
-    ),
-    "MAV_TYPE": numbered(
-        "1: an airplane; 3: a coaxial helicopter; 4: a helicopter; 5: an antenna tracker; 7: a blimp; 8: a balloon;"
-        " 9: a rocket; 10: a ground vehicle; 11: a boat; 12: a submarine; 16: a flapping wing; 17: a kite;"
-        " 19: a tail-sitter with two rotors"
-    )
-    | dict.fromkeys(VTOL_TYPES, VTOL),
-}
-_AUTOSTART: Final = (
-    # First and last SYS_AUTOSTART of PX4's airframes of a kind.
-    *((1002, 1002, VTOL), (1003, 1003, AIRPLANE), (1101, 1101, AIRPLANE), (1102, 1103, VTOL), (2000, 2499, AIRPLANE)),
-    *((2500, 2599, "a blimp"), (3000, 3999, AIRPLANE), (13000, 13999, VTOL), (15000, 15999, "a coaxial helicopter")),
-    *((16000, 16999, HELICOPTER), (17000, 17999, "an autogyro"), (18000, 18999, "a balloon")),
-    *((50000, 59999, GROUND), (60000, 60999, "a submarine")),
-)
-# Mixers of Betaflight and its kin, of which 3 to 6 motors alone have any other; platforms of INAV; and their words.
-_MIXERS: Final = numbered("8: an airplane; 14: an airplane; 15: a helicopter; 16: a helicopter; 24: an airplane")
-_PLATFORMS: Final = numbered("1: an airplane; 2: a helicopter; 4: a ground vehicle; 5: a boat")
-_WORDS: Final = {"AIRPLANE": AIRPLANE, "WING": AIRPLANE, "HELI": HELICOPTER, "ROVER": GROUND, "BOAT": "a boat"}
+# Numbers of parameters that stand for no multirotor, and those of headers.
+_NUMBERS, _HEADERS = ({key: numbered(own) for key, own in TABLE[name].items()} for name in ("numbers", "headers"))
 # SERVOn_FUNCTION of ArduPilot, what it drives, and of what vehicle.
 _FUNCTIONS: Final = {
-    number: (word, what)
-    for what, words in (
-        (
-            AIRPLANE,
-            "4: aileron; 16: aileron; 19: elevator; 21: rudder; 24: flaperon; 25: flaperon; 77: elevon; 78: elevon;"
-            " 79: V-tail; 80: V-tail",
-        ),
-        (GROUND, "26: ground steering; 73: left throttle of a rover; 74: right throttle of a rover"),
-        (HELICOPTER, "31: rotor head of a helicopter; 32: tail of a helicopter"),
-    )
-    for number, word in numbered(words).items()
+    number: (word, what) for what, words in TABLE["outputs"].items() for number, word in numbered(words).items()
 }
 MOTORS: Final = (*range(33, 41), *range(82, 86))  # SERVOn_FUNCTION of ArduPilot that are its motors 1 to 12.
 _FEWEST_MOTORS, _FEWEST_SURFACES, _OUTPUTS = 3, 2, 32
@@ -106,8 +63,8 @@ def _evidence(topics: Topics, parameters: Parameters, system: str) -> Iterator[V
     lifted = next((own for own in ("Q_ENABLE", "Q_TAILSIT_ENABLE") if whole(parameters, own)), None)
     if lifted is not None:
         yield VehicleKind(VTOL, f"{lifted} = {whole(parameters, lifted)}")
-    if name in _FIRMWARE:
-        yield VehicleKind(_FIRMWARE[name], f"written by {system}")
+    if name in TABLE["firmware"]:
+        yield VehicleKind(TABLE["firmware"][name], f"written by {system}")
     heads = [own for own in _HELICOPTER_PARAMETERS if own in parameters]
     if heads and not name.startswith("ArduPlane"):
         yield VehicleKind(HELICOPTER, f"it has the parameter {heads[0]}")
@@ -116,7 +73,11 @@ def _evidence(topics: Topics, parameters: Parameters, system: str) -> Iterator[V
         if number in kinds:
             yield VehicleKind(kinds[number], f"{key} = {number}")
     start = whole(parameters, "SYS_AUTOSTART") or 0
-    yield from (VehicleKind(what, f"SYS_AUTOSTART = {start}") for low, high, what in _AUTOSTART if low <= start <= high)
+    yield from (
+        VehicleKind(what, f"SYS_AUTOSTART = {start}")
+        for low, high, what in spans("other_airframes")
+        if low <= start <= high
+    )
     yield from _by_status(topics)
     yield from _by_outputs(parameters)
     yield from _by_header(topics, parameters)
@@ -152,9 +113,9 @@ def _by_outputs(parameters: Parameters) -> Iterator[VehicleKind]:
 
 def _by_header(topics: Topics, parameters: Parameters) -> Iterator[VehicleKind]:
     """Look at the header and the columns of a blackbox log."""
-    for key, kinds in (("platform_type", _PLATFORMS), ("mixer", _MIXERS), ("mixer_mode", _MIXERS)):
+    for key, kinds in _HEADERS.items():
         said, number = str(parameters.get(key, "")).upper(), whole(parameters, key)
-        by_word = next((what for word, what in _WORDS.items() if word in said), None)
+        by_word = next((what for word, what in TABLE["header_words"].items() if word in said), None)
         what = by_word or kinds.get(-1 if number is None else number)
         if what is not None:
             yield VehicleKind(what, f"{key} = {said.lower() if number is None else number} in its header")
@@ -240,19 +201,6 @@ FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 5
 # Below which they are logged too slowly for cause and effect to be distinguished: two samples in the 50 ms
 # within which they follow, and a half.
 SLOW_HZ = 25.0
-_DEVICE = "and blackbox_device = SDCARD or SPIFLASH"
-# By the beginning of what a log names as its writer: from which version on what is to be set, the newest first.
-_SETTINGS: Final[Mapping[str, tuple[tuple[tuple[int, int], str], ...]]] = {
-    "PX4": (((0, 0), "SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate), then restart"),),
-    "Betaflight": (
-        ((4, 3), f"blackbox_sample_rate = 1/4 {_DEVICE}"),
-        ((3, 2), f"blackbox_p_ratio = 32 {_DEVICE}"),
-        ((0, 0), f"blackbox_rate_num = 1, blackbox_rate_denom = 4 {_DEVICE}"),
-    ),
-    "INAV": (((0, 0), "blackbox_rate_num = 1 and blackbox_rate_denom = 4"),),
-    "ArduPlane": (((0, 0), "LOG_BITMASK with bit 0 (fast attitude)"),),
-    "Crazyflie": (((0, 0), "period_in_ms = 10 of the LogConfig, or a frequency of 100 or more on the card"),),
-}
 _COPTER = ("ArduCopter", "ArduPilot")
 _FAST_IMU, _WITH_FAST_IMU = 18, (3, 3)
 _WITH_DSHOT = (4, 0)
@@ -269,9 +217,9 @@ def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters
     """
     asked = f"log {what} at {least_hz:g} Hz or more"
     known = dict.fromkeys(
-        f"{begin}: {next(cure for since, cure in cures if version is None or version >= since)}"
+        f"{begin}: {next(cure for since, cure in cures if version is None or version >= tuple(since))}"
         for system, version in ((own, _version(own)) for own in systems)
-        for begin, cures in _SETTINGS.items()
+        for begin, cures in TABLE["log_faster"].items()
         if system.startswith(begin)
     )
     said = [f"{asked} ({joined(known)})"] if known else []

@@ -48,20 +48,9 @@ def on_one_clock(
     interpolated linearly, quaternions with one sign and roll and yaw without full turns. Inside a pause of a topic
     longer than `gap_s` the values are absent. A setpoint is held as `hold_asked` does.
 
-    Parameters
-    ----------
-    topics : mapping from topic to mapping from field to array, shape (sample,)
-        Stamps in s from one origin; of a flat log, one topic with an empty name.
-    units : mapping from column to str
-        Units that the log states; stamps that have one are in s.
-
-    Returns
-    -------
-    columns : dict from str to array, shape (row,)
-        The mapped columns that exist, stamps in `time_unit`; the others by name only, as empty arrays.
-    settings : ImportSettings
-        With the columns that the log has, of those that stand in for each other, and the name of the clock.
-    warnings : tuple of str
+    Topics have stamps in s from one origin; units are those that the log states, and stamps that have one are in s.
+    Given back are the mapped columns that exist, stamps in `time_unit`, the others by name only, as empty arrays; the
+    settings with the columns that the log has and the name of the clock; and warnings.
     """
     if "" in topics:
         columns, time = topics[""], settings.time_column
@@ -212,16 +201,10 @@ def _step(time: Array) -> float:
 
 
 def interpolate(time: Array, values: Array, target: Array, longest_s: float, *, hold: bool = False) -> Array:
-    """Interpolate linearly, or hold the previous value, between samples that are near enough.
+    """Interpolate linearly, or hold the previous value, between samples of finite value that are near enough.
 
-    Parameters
-    ----------
-    time, values : array, shape (sample,)
-        Stamps, s, and values; those that are not finite are absent.
-    target : array, shape (row,), s
-        When values are wanted; NaN is given before the first sample, after the last and in longer steps.
-    longest_s : float
-        Longest step between samples that is bridged, s.
+    NaN before the first sample, after the last, and in steps longer than `longest_s`, s. All arrays have one axis,
+    stamps and targets are in s.
     """
     time, values = _present(time, values)
     if not len(time):

@@ -13,7 +13,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, SLOW, Fields, decode
+from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, ROLLOVER, Constants, Field, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
 from cpfls_cli.logs.records import bytes_of, date
 
@@ -112,40 +112,32 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, IntArray, int]:
     fields, names = _fields(header), header["Field I name"].split(",")
     throttle = header.get("minthrottle", "1150")
     stated = (throttle, header.get("motorOutput", throttle), header.get("vbatref", "4095"))
-    least = [int(own.partition(",")[0]) for own in stated]
-    constants = np.array([*least, names.index("motor[0]") if "motor[0]" in names else -1])
-    data = np.frombuffer(content, dtype=np.uint8)
-    # How many frames there are is known only once they were read.
-    widths = (fields.counts[MAIN], 1 + fields.counts[SLOW])
-    lengths: tuple[int, ...] = (0, 0)
-    for _ in range(2):
-        rows, slow = (np.empty(shape, dtype=np.int64) for shape in zip(lengths, widths, strict=True))
-        number, broken, changes = decode(data, begin, fields, constants, rows, slow)
-        lengths = (number, changes)
-    return header, rows, slow, broken
+    least, motor, battery = (int(own.partition(",")[0]) for own in stated)
+    constants = Constants(least, motor, battery, names.index("motor[0]") if "motor[0]" in names else -1)
+    return header, *decode(content, begin, fields, constants)
 
 
-def _integers(header: Mapping[str, str], key: str) -> list[int]:
-    return [int(word) for word in header[key].split(",")]
+def _integers(header: Mapping[str, str], key: str, count: int) -> list[int]:
+    numbers = [int(word) for word in header[key].split(",")]
+    if len(numbers) not in (1, count):
+        raise ValueError(f"{key} has {len(numbers)} numbers for {count} fields")
+    return numbers * (count // len(numbers))
 
 
-def _fields(header: Mapping[str, str]) -> Fields:
+def _fields(header: Mapping[str, str]) -> dict[str, list[Field]]:
     """Read how the fields of each kind of frame are written; frames of kind P have the fields of those of kind I."""
     if header["Field I name"].split(",")[1:2] != ["time"]:
         raise ValueError("the second field is not time")
-    width = max(len(header.get(f"Field {kind} name", "").split(",")) for kind in KINDS)
-    fields = Fields(np.zeros(len(KINDS), dtype=np.int64), *np.zeros((3, len(KINDS), width), dtype=np.int64))
-    for number, kind in enumerate(KINDS):
-        if kind != "I" and f"Field {kind} encoding" not in header:
-            continue
-        named = "I" if kind == "P" else kind
-        count = fields.counts[number] = len(header[f"Field {named} name"].split(","))
-        fields.encoding[number, :count] = _integers(header, f"Field {kind} encoding")
-        fields.predictor[number, :count] = _integers(header, f"Field {kind} predictor")
-        fields.is_signed[number, :count] = _integers(header, f"Field {named} signed")
-        unknown = set(fields.encoding[number, :count].tolist()) - set(ENCODINGS)
+    fields: dict[str, list[Field]] = {}
+    for kind in KINDS:
+        known, named = kind == "I" or f"Field {kind} encoding" in header, "I" if kind == "P" else kind
+        ways = (f"Field {kind} encoding", f"Field {kind} predictor", f"Field {named} signed") if known else ()
+        count = len(header[f"Field {named} name"].split(",")) if known else 0
+        columns = [_integers(header, key, count) for key in ways]
+        fields[kind] = [Field(*own) for own in zip(*columns, strict=True)]
+        unknown = {field.encoding for field in fields[kind]} - {*ENCODINGS}
         if unknown:
-            raise ValueError(f"fields of kind {kind} in the encoding {sorted(unknown)[0]}")
+            raise ValueError(f"fields of kind {kind} in the encoding {min(unknown)}")
     return fields
 
 

@@ -1,321 +1,253 @@
-"""Compiled loops that read the frames of a blackbox log.
+"""The frames of a blackbox log.
 
 A frame holds for each field the difference to a prediction, packed by one of few encodings; the header says which. A
 frame of kind I stands by itself, one of kind P builds on the two before it. Frames of GPS, events and slow fields are
-stepped over.
+stepped over. What reads the frames of a kind is written for each header as plain Python, field by field: a log is read
+in less time than a compiler takes to start.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.compiling import compiled, part
 
-Bytes = np.ndarray
 KINDS = "IPGHS"  # Kinds of frames with fields: main, those between, GPS, home, slow.
-MAIN = 0
-SLOW = KINDS.index("S")
 ROLLOVER = 1 << 32  # Stamps have 32 bits, microseconds.
 _SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE = 0, 1, 3, 6, 7, 8, 9, 10
 ENCODINGS = (_SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE)
-_PREVIOUS, _STRAIGHT, _AVERAGE, _MINIMUM, _FIRST_MOTOR, _MIDDLE, _BATTERY, _MOTOR_MINIMUM = 1, 2, 3, 4, 5, 8, 9, 11
 _INCREMENT = 6
 _TIME = 1
-_BETWEEN = 1
-_MARKERS = np.frombuffer(KINDS.encode(), dtype=np.uint8)
-_EVENT = ord("E")
-_LONGEST_FRAME = 256
-_LONGEST_STEP_US = 10_000_000
-_END = np.frombuffer(b"End of log", dtype=np.uint8)
+_LONGEST_FRAME, _LONGEST_STEP_US = 256, 10_000_000
+_TOGETHER = 4096  # Rows that are made an array at a time.
+_END: Final = b"End of log"
 _LOG_END, _RESUMED, _ADJUSTED = 255, 14, 13
-# Numbers of variable length, or bytes, that follow the kind of an event.
-_VARIABLE_EVENTS = ((0, 1), (_RESUMED, 2), (15, 1), (30, 2), (40, 1))
-_FIXED_EVENTS = ((10, 5), (11, 4), (12, 8))
+# Of events by their kind, how many numbers of variable length and then bytes follow it.
+_EVENTS: Final = {0: (1, 0), 14: (2, 0), 15: (1, 0), 30: (2, 0), 40: (1, 0), 10: (0, 5), 11: (0, 4), 12: (0, 8)}
+# Shift and number of bits of three numbers in three bytes, by the tag in their first two bits; of wide ones.
+_NARROW_BITS: Final = (((20, 2), (18, 2), (16, 2)), ((16, 4), (12, 4), (8, 4)), ((16, 6), (8, 6), (0, 6)))
+_WIDE_BITS: Final = (_NARROW_BITS[0], ((17, 5), (12, 5), (8, 4)), ((14, 8), (7, 7), (0, 7)))
+# The same as shift, mask and highest bit.
+_NARROW, _WIDE = (
+    tuple(tuple((shift, (1 << size) - 1, 1 << (size - 1)) for shift, size in tag) for tag in packed)
+    for packed in (_NARROW_BITS, _WIDE_BITS)
+)
+# What is read of a frame: where the next one begins, and the values. It is given the data, where the frame begins, and
+# the values of the frame before and of the one before that.
+Reader = Callable[[bytes, int, Sequence[int], Sequence[int]], tuple[int, tuple[int, ...]]]
 
 
-class Fields(NamedTuple):
-    """How the fields of each kind of frame are written."""
+class Field(NamedTuple):
+    """How a field of a kind of frame is written."""
 
-    counts: IntArray  # Shape (kind,); kinds in the order of `KINDS`.
-    encoding: IntArray  # Shape (kind, field)
-    predictor: IntArray
-    is_signed: IntArray
-
-
-@part
-def _byte(data: Bytes, place: int) -> Any:
-    return np.int64(data[place]) if place < len(data) else np.int64(0)
+    encoding: int
+    predictor: int
+    is_signed: int
 
 
-@part
-def _extended(value: Any, bits: Any) -> Any:
+class Constants(NamedTuple):
+    """What predictions take from the header: least throttle and motor output, the battery, the first motor's field."""
+
+    throttle: int
+    motor: int
+    battery: int
+    first_motor: int
+
+
+def _extended(value: int, bits: int) -> int:
     """Extend the sign of a number of few bits."""
-    top = np.int64(1) << (bits - 1)
+    top = 1 << (bits - 1)
     return ((value & (2 * top - 1)) ^ top) - top
 
 
-@part
-def _unsigned(data: Bytes, place: int) -> tuple[Any, int]:
-    value = np.int64(0)
-    for number in range(5):
-        byte = _byte(data, place)
-        place += 1
-        value |= (byte & 127) << (7 * number)
-        if byte < 128:
-            break
+def _unsigned(data: bytes, value: int, place: int) -> tuple[int, int]:
+    """Read a number of variable length from its first byte on, seven bits a byte, the least first."""
+    if value > 127:
+        value &= 127
+        for shift in (7, 14, 21, 28):
+            byte = data[place]
+            place += 1
+            value |= (byte & 127) << shift
+            if byte < 128:
+                break
     return value & 0xFFFFFFFF, place
 
 
-@part
-def _signed(data: Bytes, place: int) -> tuple[Any, int]:
-    value, place = _unsigned(data, place)
-    return (value >> 1) ^ -(value & 1), place
-
-
-@part
-def _whole_bytes(data: Bytes, place: int, tag: int, values: IntArray) -> int:
-    """Read three numbers of one to four bytes, the least first."""
-    for number in range(3):
-        size = 1 + ((tag >> (2 * number)) & 3)
-        value = np.int64(0)
-        for own in range(size):
-            value |= _byte(data, place) << (8 * own)
-            place += 1
-        values[number] = _extended(value, 8 * size)
-    return place
-
-
-@part
-def _three(data: Bytes, place: int, values: IntArray, wide: bool) -> Any:
-    """Read three numbers of 2, of 4 or 6 (wide: 5, 5, 4 or 8, 7, 7) bits, or of whole bytes."""
-    first, second, third = _byte(data, place), _byte(data, place + 1), _byte(data, place + 2)
-    kind = first >> 6
-    if kind == 0:
-        for number in range(3):
-            values[number] = _extended(first >> (4 - 2 * number), 2)
-        return place + 1
-    if kind == 3:
-        return _whole_bytes(data, place + 1, first, values)
-    if wide:
-        bits = (first << 16) | (second << 8) | third
-        shifts = ((17, 5), (12, 5), (8, 4)) if kind == 1 else ((14, 8), (7, 7), (0, 7))
-        for number in range(3):
-            values[number] = _extended(bits >> shifts[number][0], shifts[number][1])
-        return place + 1 + kind
-    if kind == 1:
-        values[0], values[1], values[2] = _extended(first, 4), _extended(second >> 4, 4), _extended(second, 4)
-    else:
-        values[0], values[1], values[2] = _extended(first, 6), _extended(second, 6), _extended(third, 6)
-    return place + 1 + kind
-
-
-@part
-def _four(data: Bytes, place: int, values: IntArray) -> int:
-    """Read four numbers of 0, 4, 8 or 16 bits, one close behind the other."""
-    tag = _byte(data, place)
-    begin = 2 * (place + 1)
-    for number in range(4):
-        size = (tag >> (2 * number)) & 3
-        nibbles = 4 if size == 3 else size
-        value = np.int64(0)
-        for nibble in range(begin, begin + nibbles):
-            byte = _byte(data, nibble // 2)
-            value = (value << 4) | ((byte & 15) if nibble % 2 else (byte >> 4))
-        values[number] = _extended(value, 4 * nibbles) if nibbles else 0
-        begin += nibbles
-    return (begin + 1) // 2
-
-
-@part
-def _group(data: Bytes, place: int, kind: int, first: int, fields: Fields, values: IntArray) -> tuple[int, int]:
-    """Read the fields that are packed together from one on; how many they are, and where the next one begins."""
-    how = fields.encoding[kind, first]
-    if how in (_THREE, _THREE_WIDE):
-        return 3, _three(data, place, values, how == _THREE_WIDE)
-    if how == _FOUR:
-        return 4, _four(data, place, values)
-    if how == _EIGHT:
-        size = 1
-        while size < 8 and first + size < fields.counts[kind] and fields.encoding[kind, first + size] == _EIGHT:
-            size += 1
-        present: Any = np.int64(1)
-        if size > 1:
-            present = _byte(data, place)
-            place += 1
-        for number in range(size):
-            values[number] = 0
-            if (present >> number) & 1:
-                values[number], place = _signed(data, place)
-        return size, place
-    values[0] = 0
-    if how == _SIGNED:
-        values[0], place = _signed(data, place)
-    elif how == _UNSIGNED:
-        values[0], place = _unsigned(data, place)
-    elif how == _NEGATIVE:
-        value, place = _unsigned(data, place)
-        values[0] = -_extended(value, 14)
-    return 1, place
-
-
-@part
-def _predicted(how: int, field: int, row: IntArray, before: IntArray, constants: IntArray) -> Any:
-    """Predict a field from the two frames before and what the header states; 0 where nothing is predicted."""
-    if how == _PREVIOUS:
-        return before[0, field]
-    if how == _STRAIGHT:
-        return 2 * before[0, field] - before[1, field]
-    if how == _AVERAGE:
-        total = before[0, field] + before[1, field]
-        # Halves are cut off towards zero.
-        return (total + (total < 0)) >> 1
-    if how == _MINIMUM:
-        return constants[0]
-    if how == _MOTOR_MINIMUM:
-        return constants[1]
-    if how == _BATTERY:
-        return constants[2]
-    if how == _FIRST_MOTOR:
-        return row[constants[3]]
-    return 1500 if how == _MIDDLE else 0
-
-
-@part
-def _frame(
-    data: Bytes,
-    place: int,
-    kind: int,
-    fields: Fields,
-    before: IntArray,
-    constants: IntArray,
-    row: IntArray,
-    values: IntArray,
-) -> int:
-    """Read the fields of a frame into a row; where the next frame begins."""
-    count = fields.counts[kind]
-    # Of one type from the start: with another, numba compiles what is called with it twice.
-    field: Any = np.int64(0)
-    while field < count:
-        if fields.predictor[kind, field] == _INCREMENT:
-            row[field] = before[0, field] + 1
-            field += 1
-            continue
-        size, place = _group(data, place, kind, field, fields, values)
-        for number in range(min(size, count - field)):
-            value = values[number] + _predicted(fields.predictor[kind, field], field, row, before, constants)
-            value &= 0xFFFFFFFF
-            row[field] = _extended(value, 32) if fields.is_signed[kind, field] else value
-            field += 1
-    return place
-
-
-@part
-def _event(data: Bytes, place: int) -> tuple[int, int]:
-    """Step over an event; its kind, -1 for none that is known, and where the next frame begins."""
-    kind = _byte(data, place)
+def _three(data: bytes, place: int, packed: tuple[tuple[tuple[int, int, int], ...], ...]) -> tuple[int, int, int, int]:
+    """Read three numbers of few bits, as the tag in front of them says, or of one to four bytes, the least first."""
+    sizes = data[place]
+    tag = sizes >> 6
+    if tag < 3:
+        bits = sizes << 16 | data[place + 1] << 8 | data[place + 2]
+        (by, mask, top), (by_2, mask_2, top_2), (by_3, mask_3, top_3) = packed[tag]
+        first, second, third = (
+            (bits >> by & mask) ^ top,
+            (bits >> by_2 & mask_2) ^ top_2,
+            (bits >> by_3 & mask_3) ^ top_3,
+        )
+        return first - top, second - top_2, third - top_3, place + 1 + tag
+    found = []
     place += 1
+    for number in range(3):
+        size = 1 + ((sizes >> (2 * number)) & 3)
+        found.append(int.from_bytes(data[place : place + size], "little", signed=True))
+        place += size
+    return found[0], found[1], found[2], place
+
+
+def _four(data: bytes, place: int) -> tuple[int, int, int, int, int]:
+    """Read four numbers of 0, 4, 8 or 16 bits, one close behind the other."""
+    sizes = [(0, 4, 8, 16)[(data[place] >> (2 * number)) & 3] for number in range(4)]
+    length = (sum(sizes) + 7) // 8
+    bits, left = int.from_bytes(data[place + 1 : place + 1 + length], "big"), 8 * length
+    found = []
+    for size in sizes:
+        left -= size
+        found.append(_extended(bits >> left, size) if size else 0)
+    return found[0], found[1], found[2], found[3], place + 1 + length
+
+
+_READ: Final = ("b = data[p]", "p += 1", "if b > 127: b, p = unsigned(data, b, p)")
+_VALUES: Final = {
+    _SIGNED: "(b >> 1) ^ -(b & 1)",
+    _EIGHT: "(b >> 1) ^ -(b & 1)",
+    _UNSIGNED: "b",
+    _NEGATIVE: "-extended(b, 14)",
+}
+# Several numbers that are packed together: how many, and what reads them.
+_PACKED: Final = {
+    _THREE: (3, "v0, v1, v2, p = three(data, p, narrow)"),
+    _THREE_WIDE: (3, "v0, v1, v2, p = three(data, p, wide)"),
+    _FOUR: (4, "v0, v1, v2, v3, p = four(data, p)"),
+    _NONE: (1, "v0 = 0"),
+}
+_KNOWN: Final = {
+    "unsigned": _unsigned, "extended": _extended, "three": _three, "four": _four, "narrow": _NARROW, "wide": _WIDE
+}  # fmt: skip
+
+
+def reader(fields: Sequence[Field], constants: Constants) -> Reader:
+    """Write what reads the frames of a kind: every field on a line of its own, as its encoding and prediction say."""
+    lines, first = ["def read(data, p, before, earlier):"], 0
+    while first < len(fields):
+        how, predictor, _ = fields[first]
+        if predictor == _INCREMENT:
+            lines.append(f" r{first} = before[{first}] + 1")
+            first += 1
+            continue
+        if how in _PACKED:
+            size, line = _PACKED[how]
+            lines.append(f" {line}")
+        else:
+            together = (number for number, own in enumerate(fields[first:]) if own.encoding != _EIGHT)
+            size = min(8, next(together, len(fields) - first)) if how == _EIGHT else 1
+            lines += [" h = data[p]", " p += 1"] if size > 1 else []
+            for number in range(size):
+                read = (*_READ, f"v{number} = {_VALUES[how]}")
+                held = [f" v{number} = 0", f" if h & {1 << number}:"] if size > 1 else []
+                lines += [*held, *(f"{'  ' if held else ' '}{line}" for line in read)]
+        for at, (_, way, is_signed) in enumerate(fields[first : first + size], start=first):
+            value, half, add = f"v{at - first}", ROLLOVER // 2 * bool(is_signed), _predicted(way, at, constants)
+            # What is written with a sign, and nothing is added to, has 32 bits as it is.
+            free = is_signed and add == "0" and how != _UNSIGNED
+            lines.append(f" r{at} = {value if free else f'({value} + {add} + {half} & {ROLLOVER - 1}) - {half}'}")
+        first += size
+    lines.append(f" return p, ({''.join(f'r{number}, ' for number in range(len(fields)))})")
+    space: dict[str, Any] = dict(_KNOWN)
+    exec("\n".join(lines), space)
+    read_frame: Reader = space["read"]
+    return read_frame
+
+
+def _predicted(how: int, field: int, constants: Constants) -> str:
+    """Write the prediction of a field; 0 where nothing is predicted."""
+    both = f"before[{field}] + earlier[{field}]"
+    ways = {
+        1: f"before[{field}]",
+        2: f"2 * before[{field}] - earlier[{field}]",
+        # Halves are cut off towards zero.
+        3: f"({both} + ({both} < 0) >> 1)",
+        4: str(constants.throttle),
+        5: f"r{constants.first_motor}" if 0 <= constants.first_motor < field else "0",
+        8: "1500",
+        9: str(constants.battery),
+        11: str(constants.motor),
+    }
+    return ways.get(how, "0")
+
+
+def _event(data: bytes, place: int) -> tuple[int, int]:
+    """Step over an event; its kind, -1 for none that is known, and where the next frame begins."""
+    kind, place = data[place], place + 1
     if kind == _LOG_END:
-        for number in range(len(_END)):
-            if _byte(data, place + number) != _END[number]:
-                return -1, place
-        return kind, place + len(_END)
+        ends = data.startswith(_END, place)
+        return (kind, place + len(_END)) if ends else (-1, place)
     if kind == _ADJUSTED:
-        if _byte(data, place) >= 128:
-            return kind, place + 5
-        _, place = _unsigned(data, place + 1)
-        return kind, place
-    for known, count in _VARIABLE_EVENTS:
-        if kind == known:
-            for _ in range(count):
-                _, place = _unsigned(data, place)
-            return kind, place
-    for known, count in _FIXED_EVENTS:
-        if kind == known:
-            return kind, place + count
-    return -1, place
-
-
-@part
-def _kind(marker: int) -> int:
-    """Give the number of the kind of frame that a byte announces, len(KINDS) for an event, -1 for none."""
-    for number in range(len(_MARKERS)):
-        if marker == _MARKERS[number]:
-            return number
-    return len(_MARKERS) if marker == _EVENT else -1
+        return kind, place + 5 if data[place] >= 128 else _unsigned(data, data[place + 1], place + 2)[1]
+    if kind not in _EVENTS:
+        return -1, place
+    count, size = _EVENTS[kind]
+    for _ in range(count):
+        _, place = _unsigned(data, data[place], place + 1)
+    return kind, place + size
 
 
 def decode(
-    data: Bytes, place: int, fields: Fields, constants: IntArray, rows: IntArray, slow: IntArray
-) -> tuple[int, int, int]:
-    """Count main frames, broken ones (that are none, or jump in time) and slow ones from where the header ends.
+    content: bytes, place: int, fields: Mapping[str, Sequence[Field]], constants: Constants
+) -> tuple[IntArray, IntArray, int]:
+    """Read frames from where the header ends.
 
-    Parameters
-    ----------
-    constants : array of int, shape (4,)
-        Least throttle, least motor output, reference of the battery, and the field of the first motor.
-    rows, slow : array of int, shape (frame, field) and (frame, 1 + field)
-        Filled as far as they go; empty ones are counted alone. What changes slowly is behind the number of the main
-        frame that comes next.
+    Main frames, shape (frame, field); slow ones, shape (frame, 1 + field), behind the number of the main frame that
+    comes next; and how many are broken, that are none, or jump in time.
     """
-    # Arrays are made here and copied by element: numba would compile the words of errors of shapes for two seconds.
-    width = fields.encoding.shape[1]
-    row, before, values = (np.zeros(shape, dtype=np.int64) for shape in (width, (2, width), 8))
-    return _decoded(data, place, fields, constants, rows, slow, row, before, values)
-
-
-@compiled
-def _decoded(
-    data: Bytes,
-    place: int,
-    fields: Fields,
-    constants: IntArray,
-    rows: IntArray,
-    slow: IntArray,
-    row: IntArray,
-    before: IntArray,
-    values: IntArray,
-) -> tuple[int, int, int]:
-    number, broken, changes, last, in_step, resumed = 0, 0, 0, np.int64(0), False, True
-    while place < len(data):
-        kind = _kind(data[place])
-        event = -1
-        if kind == len(_MARKERS):
+    length, width = len(content), max(map(len, fields.values()))
+    # Beyond its end a frame that is cut is read as 0.
+    data = content + bytes(8 * width + _LONGEST_FRAME)
+    readers = {ord(kind): reader(own, constants) for kind, own in fields.items()}
+    markers, main, between, slow, event_marker = {*map(ord, KINDS), ord("E")}, *map(ord, "IPSE")
+    rows: list[tuple[int, ...]] = []
+    changes: list[tuple[int, ...]] = []
+    # Tuples of numbers take several times as much as arrays do.
+    parts: list[IntArray] = []
+    before = earlier = row = (0,) * width
+    broken, last, in_step, resumed = 0, 0, False, True
+    while place < length:
+        kind, event = data[place], -1
+        whole = kind in markers
+        if kind == event_marker:
             event, end = _event(data, place + 1)
-        elif kind >= 0:
-            end = _frame(data, place + 1, kind, fields, before, constants, row, values)
+            whole = event >= 0
+        elif whole:
+            end, row = readers[kind](data, place + 1, before, earlier)
         if event == _LOG_END:
             break
-        whole = kind >= 0 and (kind < len(_MARKERS) or event >= 0) and end - place <= _LONGEST_FRAME
-        if not whole or end > len(data) or (end < len(data) and _kind(data[end]) < 0):
+        if not whole or end - place > _LONGEST_FRAME or end > length or (end < length and data[end] not in markers):
             # A cut end is no fault; what follows a fault is searched for the next frame.
-            broken += 0 if end > len(data) or not in_step else 1
+            broken += in_step and not (kind in markers and end > length)
             in_step = False
             place += 1
             continue
         place = end
         resumed = resumed or event == _RESUMED
-        if kind == SLOW:
-            if changes < len(slow):
-                slow[changes, 0] = number
-                for field in range(slow.shape[1] - 1):
-                    slow[changes, 1 + field] = row[field]
-            changes += 1
-        if kind != MAIN and (kind != _BETWEEN or not in_step):
+        if kind == slow:
+            changes.append((len(parts) * _TOGETHER + len(rows), *row))
+        if kind != main and (kind != between or not in_step):
             continue
-        step = (row[_TIME] - last) & (ROLLOVER - 1)
-        if kind == MAIN or step <= _LONGEST_STEP_US:
+        step = (row[_TIME] - last) % ROLLOVER
+        if kind == main or step <= _LONGEST_STEP_US:
             last = row[_TIME]
         if step > _LONGEST_STEP_US and not resumed:
-            broken += 1 if in_step else 0
+            broken += in_step
             in_step = False
             continue
         in_step, resumed = True, False
-        for field in range(len(row)):
-            before[1, field] = row[field] if kind == MAIN else before[0, field]
-            before[0, field] = row[field]
-        if number < len(rows):
-            for field in range(rows.shape[1]):
-                rows[number, field] = row[field]
-        number += 1
-    return number, broken, changes
+        row += (0,) * (width - len(row))
+        before, earlier = row, row if kind == main else before
+        rows.append(row)
+        if len(rows) == _TOGETHER:
+            parts.append(np.array(rows, dtype=np.int64))
+            rows.clear()
+    found = np.concatenate([*parts, np.array(rows, dtype=np.int64).reshape(len(rows), width)])
+    held = np.array(changes, dtype=np.int64).reshape(len(changes), 1 + len(fields["S"]))
+    return found[:, : len(fields["I"])], held, broken

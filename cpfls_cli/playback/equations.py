@@ -15,7 +15,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.parameters import DRAG, LOG_MASS, SLOW, THRUST
+from cpfls_cli.playback.parameters import DRAG, LEARNED, LOG_MASS, SLOW, THRUST
 from cpfls_cli.playback.rotors import TimeOfResponse
 from cpfls_cli.playback.windows import Rotors
 from cpfls_cli.vehicle.values import (
@@ -90,7 +90,9 @@ class Equations:
     def hold(self, other: Equations) -> bool:
         """Check whether those of another vehicle follow: its rotors respond alike, and it has no other numbers."""
         own, free = self.at.free, other.at.free
-        alike = own.vehicle == free.vehicle and self.at.response == other.at.response
+        # Numbers of a remainder mean something else with other rules; those of no remainder have none.
+        rules = own.key[2:] == free.key[2:] or LEARNED.keys().isdisjoint(free.blocks)
+        alike = own.vehicle == free.vehicle and rules and self.at.response == other.at.response
         # Only what is not 0 is differentiated by times of the response.
         return alike and {*free.index} <= {*own.index} and (not other.at.times or other._in_use <= self._in_use)
 

@@ -238,9 +238,7 @@ class VehicleAt:
     @cached_property
     def flown(self) -> Flown:
         """The vehicle as runs fly it."""
-        airflow = self.free.airflow
-        key = (self.free.vehicle, self.free.chosen, tuple(airflow.breakpoints.tolist()), airflow.order)
-        function = traced_wrench(*key)(tuple(self.values.tolist()))
+        function = traced_wrench(*self.free.key)(tuple(self.values.tolist()))
         return replace(
             self._flown(self._acting_number, np.zeros((0, 3, 3))),
             traced=lambda air, rate, *rotors: function(air, rate, rotors),

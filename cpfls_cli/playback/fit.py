@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +25,9 @@ _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
 """Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
 rate's, so that each says less that is new."""
 
+_STILL = 1e-9
+"""Speed of a rotor that stands, rad/s."""
+
 _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
@@ -42,11 +45,14 @@ class FitWindows:
     starts : array of int, shape (window,)
     loss : Loss
         In errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
+    every : int
+        Samples of a step of the runs.
     """
 
     flight: PlaybackFlight
     starts: IntArray
     loss: Loss
+    every: int = 1
 
     @property
     def horizon(self) -> int:
@@ -57,37 +63,53 @@ class FitWindows:
     def together(self) -> tuple[str, int, float, bool]:
         """What windows have in common that are flown side by side."""
         flight = self.flight
-        return flight.group, self.horizon, flight.motion.period, flight.translates
+        return flight.group, self.horizon, self.every * flight.motion.period, flight.translates
 
     @cached_property
     def samples(self) -> IntArray:
-        """Samples of the flight in the windows, window by window: only there the weights are needed."""
-        return np.asarray((self.starts[:, None] + np.arange(self.horizon + 1)).ravel())
+        """Samples of the flight between steps, window by window: only there the weights are needed."""
+        return np.asarray((self.starts[:, None] + self.every * np.arange(self.horizon + 1)).ravel())
 
     @cached_property
     def motion(self) -> MeasuredMotion:
         """Motion at these samples."""
-        return motion_at(self.flight.motion, self.samples)
-
-    @cached_property
-    def places(self) -> IntArray:
-        """Where the windows start in `samples`."""
-        return np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
+        motion = self.flight.motion
+        return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
 
     @classmethod
-    def of(cls, flight: PlaybackFlight, horizon: int, every: int) -> FitWindows:
+    def of(cls, flight: PlaybackFlight, horizon: int, interval: int) -> FitWindows:
         """Take every n-th window of a flight.
 
         Parameters
         ----------
-        horizon, every : int
+        horizon, interval : int
             Samples.
         """
-        starts = flight.starts(horizon, every)
+        starts = flight.starts(horizon, interval)
         return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
 
+    def rotor_terms(self, at: VehicleAt, by: str = "") -> Array:
+        """Average the terms of the rotors, or their derivatives by a number, over steps, shape (step, run, column).
 
-def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float) -> list[FitWindows]:
+        The speed of several samples is the root of their mean square, which gives the mean thrust.
+        """
+        steps = self.starts + np.arange(self.every * self.horizon)[:, None]
+        terms = at.rotor_terms(self.flight, steps, by)
+        if self.every == 1:
+            return terms
+        means = np.asarray(terms.reshape(self.horizon, self.every, *terms.shape[1:]).mean(axis=1))
+        rotors = terms.shape[-1] // 4
+        speed, square = (slice(1 + n * rotors, 1 + (n + 1) * rotors) for n in range(2))
+        if by:
+            means[..., speed] = 0.5 * means[..., square] / np.maximum(self.rotor_terms(at)[..., speed], _STILL)
+        else:
+            means[..., speed] = np.sqrt(means[..., square])
+        return means
+
+
+def windows_of(
+    flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float, step_s: float = 0.0
+) -> list[FitWindows]:
     """Take windows of flights, errors weighed so that a lively flight counts more, by the square root.
 
     A model misses more of a lively flight, but not in proportion: the noise of rotor speeds is there in hover as well.
@@ -96,24 +118,34 @@ def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: 
     Parameters
     ----------
     horizon_s, interval_s : float, s
+    step_s : float, s
+        Longest step of runs; one sample at least.
     """
     periods = [flight.motion.period for flight in flights]
-    horizons = [max(1, round(horizon_s / period)) for period in periods]
+    every = [max(1, int(min(step_s, horizon_s) / period + 1e-9)) for period in periods]
+    horizons = [max(1, round(horizon_s / (own * period))) for own, period in zip(every, periods, strict=True)]
     starts = [
-        flight.starts(horizon, max(1, round(interval_s / period)))
-        for flight, horizon, period in zip(flights, horizons, periods, strict=True)
+        flight.starts(own * horizon, max(1, round(interval_s / period)))
+        for flight, own, horizon, period in zip(flights, every, horizons, periods, strict=True)
     ]
-    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, strict=True)]
+    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, every, strict=True)]
     lively = np.array([scale.mean(axis=0) for scale in scales])
     weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
     return [
-        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)))
-        for flight, start, scale, own in zip(flights, starts, scales, weight, strict=True)
+        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)), step)
+        for flight, start, scale, own, step in zip(flights, starts, scales, weight, every, strict=True)
     ]
 
 
-def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
+def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int, every: int = 1) -> Array:
     """Compute mean errors of "rate stays": the attitude turns with it, and velocity stays.
+
+    Parameters
+    ----------
+    horizon : int
+        Steps.
+    every : int
+        Samples of a step.
 
     Returns
     -------
@@ -124,7 +156,7 @@ def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
     motion, errors = flight.motion, np.zeros((horizon, 4))
     turned = Rotation.from_matrix(motion.rotation[starts])
     for step in range(1, horizon + 1):
-        at, elapsed = starts + step, step * motion.period
+        at, elapsed = starts + every * step, every * step * motion.period
         moved = motion.position[starts] + elapsed * motion.velocity[starts] - motion.position[at]
         turn = (turned * Rotation.from_rotvec(elapsed * motion.rate[starts])).inv()
         away = (turn * Rotation.from_matrix(motion.rotation[at])).magnitude()
@@ -301,26 +333,29 @@ def fit_parts(
     place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     bounds = free.lows, free.highs
 
-    def best(kept: BoolArray, point: FitPoint, steps: int) -> FitPoint:
+    @cache
+    def at(values: tuple[float, ...]) -> WindowSums:
+        return WindowSums(free, windows, np.array(values))
+
+    def best(kept: BoolArray, point: FitPoint, steps: int, tolerance: float) -> FitPoint:
         def evaluated(values: Array) -> FitPoint:
-            return WindowSums(free, windows, values).mean(kept=kept)
+            return at(tuple(values.tolist())).mean(kept)
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
+    every = place >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
-    begun = [WindowSums(free, windows, np.array(each)).mean() for each in values]
+    begun = [at(each).mean(every) for each in values]
     finite = [each for each in begun if np.isfinite(each.objective)]
     if not finite:
         raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")
-    start = smallest(finite, lambda each: each.objective)
-    sums = WindowSums(free, windows, best(place >= 0, start, steps).values)
-    losses = sums.losses()
-    whole = sums.mean(losses)
+    whole = best(every, smallest(finite, lambda each: each.objective), steps, tolerance)
+    sums = at(tuple(whole.values.tolist()))
 
     def without(part: int) -> HeldOut:
         kept = place != part
-        point = best(kept, sums.mean(losses, kept), 1)
-        errors = windows.errors(free, point.values)
+        point = best(kept, sums.mean(kept), 1, 0.0)
+        errors = at(tuple(point.values.tolist())).errors
         return HeldOut(
             FittedNumbers(free, point.values, point.loss),
             [own for own, other in zip(errors, kept, strict=True) if not other],
@@ -331,7 +366,7 @@ def fit_parts(
 
 
 @dataclass(frozen=True)
-class _SideBySide:
+class SideBySide:
     """Windows of several flights of one configuration that are flown at once.
 
     Attributes
@@ -349,10 +384,12 @@ class _SideBySide:
 
     @cached_property
     def owner(self) -> IntArray:
+        """Flight of each run."""
         return np.repeat(np.arange(len(self.windows)), [len(each.starts) for each in self.windows])
 
     @cached_property
     def runs(self) -> Runs:
+        """All runs."""
         motions = [each.motion for each in self.windows]
         parts = zip(*(each[:4] for each in motions), strict=True)
         position, velocity, rotation, rate = (np.concatenate(each) for each in parts)
@@ -365,17 +402,18 @@ class _SideBySide:
 
     @cached_property
     def loss(self) -> Loss:
+        """How their errors are weighed."""
         return Loss(
             *(np.stack(each, axis=2)[:, :, self.owner] for each in zip(*(w.loss for w in self.windows), strict=True))
         )
 
     def steps(self, at: VehicleAt, numbers: Iterable[str] = ()) -> Steps:
         """Give the rotors over all steps, with derivatives by numbers of their response."""
-        return Steps(self._terms(at), terms_by={at.free.index[name]: self._terms(at, name) for name in numbers})
+        by = {at.free.index[name]: self._terms(at, name) for name in numbers}
+        return Steps(self._terms(at), terms_by=by)
 
     def _terms(self, at: VehicleAt, by: str = "") -> Array:
-        terms = np.concatenate([at.rotor_terms(each.flight, each.samples, by) for each in self.windows])
-        return terms.reshape(len(self.owner), -1, terms.shape[1])[:, :-1].swapaxes(0, 1)
+        return np.concatenate([each.rotor_terms(at, by) for each in self.windows], axis=1)
 
     def losses(self, at: VehicleAt) -> Array:
         """Weigh the errors of each run."""
@@ -390,11 +428,19 @@ class _SideBySide:
         flown = legs(at.flown, self.runs, self.steps(at))
         if len(self.owner) > MOST_RUNS:
             return flown
-        key = (at.free.chosen, at.values.tobytes())
+        key = (at.free.key, at.values.tobytes())
         if self._last.get("key") != key:
             self._last.update(key=key, legs=list(flown))
         found: list[Leg] = self._last["legs"]
         return found
+
+
+def side_by_side(windows: Sequence[FitWindows]) -> list[SideBySide]:
+    """Put together what is flown at once."""
+    alike: dict[tuple[str, int, float, bool], list[int]] = {}
+    for place, each in enumerate(windows):
+        alike.setdefault(each.together, []).append(place)
+    return [SideBySide(np.array(own), tuple(windows[place] for place in own)) for own in alike.values()]
 
 
 @dataclass(frozen=True)
@@ -404,18 +450,15 @@ class WindowSet:
     windows: tuple[FitWindows, ...]
 
     @cached_property
-    def _together(self) -> list[_SideBySide]:
-        alike: dict[tuple[str, int, float, bool], list[int]] = {}
-        for place, each in enumerate(self.windows):
-            alike.setdefault(each.together, []).append(place)
-        return [_SideBySide(np.array(own), tuple(self.windows[place] for place in own)) for own in alike.values()]
+    def _together(self) -> list[SideBySide]:
+        return side_by_side(self.windows)
 
     @cached_property
     def counts(self) -> IntArray:
         """Runs of each flight."""
         return np.array([len(each.starts) for each in self.windows])
 
-    def _of_group(self, free: JointNumbers, values: Array, each: _SideBySide) -> tuple[VehicleAt, IntArray]:
+    def _of_group(self, free: JointNumbers, values: Array, each: SideBySide) -> tuple[VehicleAt, IntArray]:
         own, places = free.of_flight(each.windows[0].flight)
         return VehicleAt(own, values[places]), places
 
@@ -427,10 +470,6 @@ class WindowSet:
             for own, place in enumerate(each.places.tolist()):
                 found[place] = losses[each.owner == own]
         return found
-
-    def losses(self, free: JointNumbers, values: Array) -> Array:
-        """Sum the loss along each flight, shape (flight,)."""
-        return np.array([each.sum() for each in self.errors(free, values)])
 
     def derivatives(self, free: JointNumbers, values: Array, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
         """Sum gradient and Hessian by all numbers along each flight, the first axis that of the groups.
@@ -468,21 +507,21 @@ class WindowSums:
         gradient, hessian = zip(*self.windows.derivatives(self.free, self.values, none), strict=True)
         return np.concatenate(gradient), np.concatenate(hessian)
 
-    def losses(self) -> Array:
-        """Sum the loss along each, shape (flight,)."""
-        return self.windows.losses(self.free, self.values)
+    @cached_property
+    def errors(self) -> list[Array]:
+        """Errors of each run, flight by flight, shapes (run,)."""
+        return self.windows.errors(self.free, self.values)
 
-    def mean(self, losses: Array | None = None, kept: BoolArray | slice = slice(None)) -> FitPoint:
-        """Take the means over the runs of some of the flights; their losses, where they are known."""
+    def mean(self, kept: BoolArray | slice = slice(None)) -> FitPoint:
+        """Take the means over the runs of some of the flights."""
         count = self.windows.counts[kept].sum()
 
         def derivatives() -> tuple[Array, Array]:
             gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_flight)
             return gradient, hessian
 
-        found = self.losses() if losses is None else losses
-        believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
-        return FitPoint(self.values, float(found[kept].sum() / count), derivatives, believed)
+        loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
+        return FitPoint(self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads))
 
 
 @dataclass(frozen=True)
@@ -553,5 +592,5 @@ def weighed(loss: Loss, errors: Array) -> Array:
 def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
     weight, delta = window.loss.weight, window.loss.delta
-    size = rate_stays(window.flight, window.starts, window.horizon)
+    size = rate_stays(window.flight, window.starts, window.horizon, window.every)
     return float((weight * delta**2 * (np.sqrt(1.0 + (size / delta) ** 2) - 1.0)).sum())

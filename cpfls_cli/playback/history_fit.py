@@ -6,8 +6,7 @@ derivatives of that enter the compiled sums over runs as those of further weight
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -19,13 +18,22 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import VehicleAt
-from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, windows_of
+from cpfls_cli.playback.fit import (
+    Believed,
+    FitPoint,
+    Fitted,
+    FittedNumbers,
+    FitWindows,
+    SideBySide,
+    side_by_side,
+    windows_of,
+)
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
-from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs, legs, losses_of, sums_of
+from cpfls_cli.playback.windows import Leg, Runs, Steps, errors_of_runs, legs, losses_of, sums_of
 
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""
@@ -42,9 +50,6 @@ _SPREAD = 2.0
 
 _STEP = 1e-4
 """Of forward differences by them."""
-
-_CHUNK = 250
-"""Windows at a time, each with weights of its own."""
 
 _STEPS, _TOLERANCE, _DAMPING = 25, 1e-4, 10.0
 """Of the fit: it begins with short steps."""
@@ -64,15 +69,12 @@ def find_history(
     flights : sequence of PlaybackFlight
         Those that train, of the configuration of the config.
     """
-    parts = parts_of(flights, settings)
-
-    def errors(part: int) -> list[Array]:
-        training = [windows for other, kept in enumerate(parts) if other != part for windows in kept]
-        observer = fit_observer(chosen.without[part], training, settings.history_s)
-        return [errors_with_past(chosen.without[part], observer, windows) for windows in parts[part]]
-
-    with ThreadPoolExecutor(2) as threads:
-        found = block_errors([each for kept in threads.map(errors, range(len(parts))) for each in kept])
+    parts, errors = parts_of(flights, settings), []
+    for place, (part, without) in enumerate(zip(parts, chosen.without, strict=True)):
+        training = [windows for other, kept in enumerate(parts) if other != place for windows in kept]
+        observer = fit_observer(without, training, settings.history_s)
+        errors += [errors_with_past(without, observer, windows) for windows in part]
+    found = block_errors(errors)
     better = chosen.by_block - found
     if better.mean() <= mean_error(better):
         return None
@@ -93,7 +95,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
         How much of the past is used.
     """
     at = _vehicle(fitted)
-    begun = [_Begun.of(at, each, past_s) for each in _chunks([_between(each) for each in windows])]
+    begun = [_Begun.of(at, each, past_s) for each in side_by_side([_between(each) for each in windows])]
     ends = tuple(np.broadcast_to(end, _FIRST.shape).ravel() for end in _BOUNDS)
     point = partial(_point, at, begun, past_s)
     looked_at = (np.tile(np.log(pair), len(_FIRST)) for pair in product(_RATES, _MEMORIES))
@@ -105,11 +107,9 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
 
 def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
     """Weigh the errors of windows as the fit does; see `window_errors`."""
-    at, found = _vehicle(fitted), []
-    for each in _chunks([windows]):
-        begun = _Begun.of(at, each, observer.past_s)
-        found.append(losses_of(legs(at.flown, begun.runs, begun.steps(begun.pushed(observer))), each.loss))
-    return np.concatenate(found)
+    at = _vehicle(fitted)
+    (begun,) = (_Begun.of(at, each, observer.past_s) for each in side_by_side([windows]))
+    return losses_of(begun.flown(at, begun.pushed(observer)), begun.windows.loss)
 
 
 def _observer(values: Array, past_s: float) -> Observer:
@@ -121,14 +121,8 @@ def _between(windows: FitWindows) -> FitWindows:
     """Take windows that begin in the middle between two that follow each other; those there are of a single one."""
     middle = windows.starts[:-1] + np.diff(windows.starts) // 2
     # Not across a pause.
-    known = middle[np.isin(middle, windows.flight.starts(windows.horizon, 1))]
-    return FitWindows(windows.flight, known if len(known) else windows.starts, windows.loss)
-
-
-def _chunks(windows: Sequence[FitWindows]) -> Iterator[FitWindows]:
-    for window in windows:
-        for first in range(0, len(window.starts), _CHUNK):
-            yield FitWindows(window.flight, window.starts[first : first + _CHUNK], window.loss)
+    known = middle[np.isin(middle, windows.flight.starts(windows.every * windows.horizon, 1))]
+    return replace(windows, starts=known if len(known) else windows.starts)
 
 
 def _vehicle(fitted: FittedNumbers) -> VehicleAt:
@@ -137,7 +131,7 @@ def _vehicle(fitted: FittedNumbers) -> VehicleAt:
 
 
 class _Begun(NamedTuple):
-    """Windows, and what is missed before them.
+    """Windows side by side, and what is missed before them.
 
     Attributes
     ----------
@@ -147,36 +141,38 @@ class _Begun(NamedTuple):
         By the model, of each step of the past; 0 where there is none.
     """
 
-    window: FitWindows
+    windows: SideBySide
     terms: Array
     missed: Array
 
     @classmethod
-    def of(cls, at: VehicleAt, window: FitWindows, past_s: float) -> _Begun:
+    def of(cls, at: VehicleAt, windows: SideBySide, past_s: float) -> _Begun:
         """Run a model along the measured samples before windows."""
-        flight = window.flight
-        steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
-        samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
-        terms = at.rotor_terms(flight, samples)
-        errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
-        missed = np.zeros((len(samples) + 1, 6))
-        missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
-        own = at.rotor_terms(flight, window.starts + np.arange(window.horizon)[:, None])
-        return cls(window, own, missed[steps - samples[0]] * known[:, :, None])
-
-    @property
-    def runs(self) -> Runs:
-        return Runs(self.window.flight.motion, self.window.starts, self.window.flight.translates)
+        missed = [_missed(at, each, past_s) for each in windows.windows]
+        return cls(windows, windows.steps(at).terms, np.concatenate(missed))
 
     def pushed(self, observer: Observer) -> Array:
         """Give what pushes the runs, shape (step, run, 6)."""
-        period = self.window.flight.motion.period
+        window, *_ = self.windows.windows
+        period, steps = window.flight.motion.period, (window.horizon, window.every)
         begun = np.einsum("rsa,sa->ra", self.missed, observer.weights(period))
-        return np.asarray(begun * observer.fading(period, self.window.horizon)[:, None])
+        fading = observer.fading(period, window.every * window.horizon).reshape(*steps, 1, -1)
+        return np.asarray(begun * fading.mean(axis=1))
 
-    def steps(self, pushed: Array, by: Mapping[int, Array] | None = None) -> Steps:
-        """Give what drives the runs, with derivatives of what pushes them."""
-        return Steps(self.terms, pushed, push_by=by or {})
+    def flown(self, at: VehicleAt, pushed: Array) -> Iterator[Leg]:
+        """Fly all runs, pushed on top of what the model gives."""
+        return legs(at.flown, self.windows.runs, Steps(self.terms, pushed))
+
+
+def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
+    flight = window.flight
+    steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
+    samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
+    terms = at.rotor_terms(flight, samples)
+    errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
+    missed = np.zeros((len(samples) + 1, 6))
+    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
+    return np.asarray(missed[steps - samples[0]] * known[:, :, None])
 
 
 def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:
@@ -184,17 +180,17 @@ def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array)
     count = len(values)
     moved = [_observer(values + step, past_s) for step in _STEP * np.eye(count)]
     pushed = [each.pushed(_observer(values, past_s)) for each in begun]
-    flights = [[*legs(at.flown, each.runs, each.steps(push))] for each, push in zip(begun, pushed, strict=True)]
-    total = sum(len(each.window.starts) for each in begun)
-    loss = sum(losses_of(own, each.window.loss).sum() for own, each in zip(flights, begun, strict=True))
+    flown = [[*each.flown(at, push)] for each, push in zip(begun, pushed, strict=True)]
+    total = sum(len(each.missed) for each in begun)
+    loss = sum(losses_of(own, each.windows.loss).sum() for own, each in zip(flown, begun, strict=True))
 
     def derivatives() -> tuple[Array, Array]:
         gradient, hessian = np.zeros(count), np.zeros((count, count))
-        flown = replace(at.flown, inertia_by=np.zeros((count, 3, 3)), traced=None)
-        for each, own, push in zip(begun, flights, pushed, strict=True):
+        vehicle = replace(at.flown, inertia_by=np.zeros((count, 3, 3)), traced=None)
+        for each, own, push in zip(begun, flown, pushed, strict=True):
             by = {place: (each.pushed(observer) - push) / _STEP for place, observer in enumerate(moved)}
-            group = np.zeros(len(each.window.starts), dtype=np.int64)
-            sums = sums_of(own, flown, each.steps(push, by), each.window.loss, group)
+            group = np.zeros(len(each.missed), dtype=np.int64)
+            sums = sums_of(own, vehicle, Steps(each.terms, push, push_by=by), each.windows.loss, group)
             gradient, hessian = gradient + sums[0][0], hessian + sums[1][0]
         return gradient / total, hessian / total
 

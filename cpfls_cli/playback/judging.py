@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import InputError
 from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.fit import PRIOR, FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
 from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.words import joined
 
 _FEWEST_BLOCKS = 8
 """Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
+
+_STEP_S = 0.01
+"""Longest step of the runs that structures are compared by; what is kept is fitted at all samples."""
 
 _QUICK = 100
 """Windows of a quick search at most."""
@@ -36,26 +41,44 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
     predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
     an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
+
+    Raises
+    ------
+    InputError
+        If a flight shows nothing that a model predicts, or all are too short to keep a part aside.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     most = min(settings.search_windows, _QUICK) if settings.quick else settings.search_windows
     interval = max(settings.window_interval_s, flown / most)
-    windows = windows_of(flights, settings.horizon_s, interval)
+    windows = windows_of(flights, settings.horizon_s, interval, _STEP_S)
+    for each in windows:
+        if not each.loss.weight.any():
+            raise InputError(
+                f"{each.flight.name}: no body rate changes, and no attitude was measured, so that no prediction of a "
+                "model can be judged; log body rates or attitude"
+            )
     count = min(settings.folds, len(windows))
     ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
     together = [windows[start:end] for start, end in pairwise(ends)]
     if count > 1 and not _lacks_an_axis(together):
         return together
     cut = [_pieces(each, settings.folds) for each in windows]
-    return [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
+    parts = [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
+    if len(parts) < 2:
+        raise InputError(
+            f"{joined(flight.name for flight in flights)}: too short for a horizon of {settings.horizon_s:g} s to be "
+            "judged; give longer flights, or set a shorter playback.horizon_s"
+        )
+    return parts
 
 
 def _pieces(windows: FitWindows, count: int) -> list[FitWindows]:
     """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
     pieces = np.array_split(windows.starts, count)
     ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
-    kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
-    return [FitWindows(windows.flight, piece, windows.loss) for piece in kept]
+    samples = windows.every * windows.horizon
+    kept = [piece[piece + samples < end] for piece, end in zip(pieces, ends, strict=True)]
+    return [replace(windows, starts=piece) for piece in kept]
 
 
 def _lacks_an_axis(parts: Sequence[Sequence[FitWindows]]) -> bool:
@@ -131,13 +154,18 @@ class Outlook:
             np.repeat(place, [len(own) for own in loss]),
         )
 
+    @property
+    def blocks(self) -> set[str]:
+        """Blocks of the models that are predicted."""
+        return {number.block for number in self.free.numbers}
+
     def errors(self, blocks: Collection[str]) -> Array:
         """Predict the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
         own, errors = self._own(blocks), np.empty(len(self.loss))
         for part, mean in enumerate(self._without):
             step, aside = self._step(mean, own), self.part == part
-            square = 0.5 * np.einsum("i,pij,j->p", step, self.hessian[aside], step, optimize=True)
-            errors[aside] = (self.loss[aside] + self.gradient[aside] @ step + square) / self.count[aside]
+            slope = self.gradient[aside] + 0.5 * self.hessian[aside] @ step
+            errors[aside] = (self.loss[aside] + slope @ step) / self.count[aside]
         return errors
 
     def start(self, blocks: Collection[str]) -> dict[str, float]:

@@ -188,6 +188,11 @@ class FreeNumbers:
     airflow: Airflow
 
     @cached_property
+    def key(self) -> tuple[VehicleSettings, tuple[str, ...], tuple[float, ...], int]:
+        """What makes the numbers what they are, to be remembered by."""
+        return self.vehicle, self.chosen, tuple(self.airflow.breakpoints.tolist()), self.airflow.order
+
+    @cached_property
     def blocks(self) -> tuple[str, ...]:
         """All blocks."""
         return (*sorted(set(self.vehicle.unknown) - set(self.chosen)), *self.chosen)

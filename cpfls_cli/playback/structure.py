@@ -35,9 +35,9 @@ from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
-"""Of the fits that structures are compared by: a tenth of what is worth a name is close enough."""
+"""Of the fits that structures are compared by: a twentieth of what is worth a name is close enough."""
 
-_STEPS, _TOLERANCE = 60, 3e-5
+_STEPS, _TOLERANCE = 60, 3e-6
 """Of the fit that is kept."""
 
 _VISIBLE = 0.02
@@ -239,6 +239,7 @@ class _Bench:
     expected: int
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
+    _outlooks: dict[Structure, Outlook] = field(default_factory=dict)
 
     @cached_property
     def stays(self) -> float:
@@ -288,11 +289,14 @@ class _Bench:
     def outlook(self, near: Judged, blocks: Iterable[str]) -> Outlook:
         """Evaluate what predicts the errors of structures of some blocks and its own, from the fit of one."""
         own = near.structure
-        union = Structure(tuple(dict.fromkeys((*own.blocks, *blocks))), own.rules).free(self.vehicle)
-        known = near.fit.free.named(near.fit.values)
-        return Outlook.of(
-            union, union.values({number.name: number.absent for number in union.numbers} | known), self.parts
-        )
+        asked = tuple(dict.fromkeys((*own.blocks, *blocks)))
+        found = self._outlooks.get(own)
+        if found is None or not found.blocks.issuperset(asked):
+            union = Structure(asked, own.rules).free(self.vehicle)
+            absent = {number.name: number.absent for number in union.numbers}
+            values = union.values(absent | near.fit.free.named(near.fit.values))
+            self._outlooks[own] = found = Outlook.of(union, values, self.parts)
+        return found
 
 
 def _judged(structure: Structure, whole: Fitted, held: tuple[HeldOut, ...]) -> Judged:
@@ -334,7 +338,7 @@ def choose(
         As stated.
     flights : sequence of PlaybackFlight
         Training flights alone.
-    kept : mapping of Structure to sequence of Solution
+    kept : mapping of Structure to Solution
         Of the same search, stopped before; it goes on to the same end.
     """
     blocks = tried_blocks(vehicle, flights, settings)

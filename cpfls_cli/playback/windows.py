@@ -275,30 +275,25 @@ class _Path(NamedTuple):
         return _Path(position, velocity, rotation, rate, stages, self.diverged[part])
 
 
-def exponential(turn: Array, *, rotation_alone: bool = False) -> tuple[Array, Array]:
-    """Compute rotations ``exp [a]_x`` and their right Jacobians, ``exp [a + d]_x = exp [a]_x exp [J d]_x``.
+def exponential(turn: Array) -> Array:
+    """Compute rotations ``exp [a]_x``, shape (3, 3, ...), of turns a, shape (3, ...), rad."""
+    square = (turn * turn).sum(axis=0)
+    half = 0.5 * np.sqrt(np.maximum(square, _TINY**2))
+    # By half the angle nothing cancels where it is small.
+    ratio = np.sin(half) / half
+    pairs = 0.5 * ratio * ratio
+    return _turn(turn, pairs, 1.0 - pairs * square, ratio * np.cos(half))
 
-    Parameters
-    ----------
-    turn : array, shape (3, ...), rad
-    rotation_alone : bool
-        Give the rotations twice, for who needs no Jacobians.
 
-    Returns
-    -------
-    rotation, right : array, shape (3, 3, ...)
-    """
+def right_jacobian(turn: Array) -> Array:
+    """Compute J of ``exp [a + d]_x = exp [a]_x exp [J d]_x``, shape (3, 3, ...), of turns a, shape (3, ...), rad."""
     square = (turn * turn).sum(axis=0)
     small = square < 1e-8
     safe = np.where(small, 1.0, square)
     angle = np.sqrt(safe)
-    first = np.where(small, 1.0 - square / 6.0, np.sin(angle) / angle)
-    second = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(angle)) / safe)
-    rotation = _turn(turn, second, 1.0 - second * square, first)
-    if rotation_alone:
-        return rotation, rotation
-    third = np.where(small, 1.0 / 6.0 - square / 120.0, (1.0 - first) / safe)
-    return rotation, _turn(turn, third, 1.0 - third * square, -second)
+    skew = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(angle)) / safe)
+    pairs = np.where(small, 1.0 / 6.0 - square / 120.0, (1.0 - np.sin(angle) / angle) / safe)
+    return _turn(turn, pairs, 1.0 - pairs * square, -skew)
 
 
 def _turn(turn: Array, pairs: Array, diagonal: Array, skew: Array) -> Array:
@@ -362,7 +357,7 @@ def _moved(
     torque, force = flown.wrench(tuple(_back(here.rotation, here.velocity)), tuple(turned.rate), rotors)
     count = turned.rate.shape[1]
     momentum = start.momentum + interval * (_filled(torque, count) - turned.direct)
-    rotation = _product(start.rotation, exponential(interval * turned.rate, rotation_alone=True)[0])
+    rotation = _product(start.rotation, exponential(interval * turned.rate))
     if not translates:
         return _State(start.position, start.velocity, rotation, momentum)
     acceleration = _applied(here.rotation, _filled(force, count)) / flown.body.mass
@@ -660,9 +655,9 @@ def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates
             np.multiply(half, own[:, rows, :STATES], out=into_state[:, components])
             np.multiply(half, own[:, rows, STATES:], out=into_number[:, components])
     for stage, interval, by_turn, by_rate in ((0, 0.5 * period, first, first), (1, period, rest, second)):
-        turn, right = exponential(interval * rates[:, stage])
-        by_turn[:, 3:6, 3:6] = turn.transpose(2, 1, 0)
-        by_rate[:, 3:6, 6:9] = interval * right.transpose(2, 0, 1)
+        turn = interval * rates[:, stage]
+        by_turn[:, 3:6, 3:6] = exponential(turn).transpose(2, 1, 0)
+        by_rate[:, 3:6, 6:9] = interval * right_jacobian(turn).transpose(2, 0, 1)
     for component in diagonal:
         first[:, component, component] += 1.0
         rest[:, component, component] = 1.0

@@ -4,10 +4,12 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 
 - ``parameter_error``: thrust of all rotors is ``1 + thrust_scale`` times the stated one. Torque and inertia show only
   as their ratio, so a moment of inertia is ``(1 + inertia) (1 + thrust_scale)`` times the stated one; about z only
-  where the yaw torque follows the thrust, as it does where the file states their ratio.
-- ``rotor_mismatch``: thrust of single rotors, by the pattern that was found; what clockwise rotors drag more than they
-  lift is their ratio of torque to thrust. ``drag_factor_error``: that ratio of all.
-- ``com_offset``: the centre of the first link moves so that that of the vehicle does.
+  where the yaw torque follows the thrust, as it does where the file states their ratio. What flights were compared with
+  and the file does not state, such as the thrust of a vehicle that was given, is listed.
+- ``rotor_mismatch``: thrust of single rotors, by the pattern that was found, and their yaw torque with it; what
+  clockwise rotors drag more than they lift is their ratio of torque to thrust. ``drag_factor_error``: that of all.
+  Where the file has one number for rotors that differ, only what is common to all is put into it.
+- ``com_offset``: the centre of the heaviest link moves so that that of the vehicle does.
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
 
@@ -18,8 +20,9 @@ of four that are right one would else be moved in every sixth file.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 from pathlib import Path
@@ -27,27 +30,38 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Quantity
 from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import visible
+from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
-from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
+from cpfls_cli.simulators.literals import with_comment
 from cpfls_cli.simulators.model import ENTRIES, Rotor
 from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.vehicle.rotors import gain_modes
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import joined
 
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+_OF_XML = ("sdf", "urdf", "mjcf")
+_ROUNDING, _SAME = 1e-9, 1e-6
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
     "mjcf": "data.xfrc_applied of the body at each step",
+    "rotorpy": "a class of your own under Multirotor, whose compute_body_wrench adds it",
+    "ardupilot": "lines of your own in SIM_Frame.cpp",
+    "crazyflow": "dist_f and dist_t at each step",
+    "crazyflie": "nothing: the firmware has no model of it",
 }
 _TAGS = {
     "sdf": {
@@ -59,9 +73,34 @@ _TAGS = {
         "rolling": "rollingMomentCoefficient",
     },
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
-    "mjcf": {},
+    "mjcf": {
+        "thrust": "gear z",
+        "torque": "gear yaw",
+        "ratio": "gear yaw",
+        "lag_up": "dynprm",
+        "lag_down": "dynprm",
+    },
+    "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
+    "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
+    "crazyflow": {
+        "thrust": "rpm2thrust",
+        "torque": "rpm2torque",
+        "lag_up": "rotor_dyn_coef",
+        "lag_down": "rotor_dyn_coef",
+        "drag": "drag_matrix",
+    },
+    "crazyflie": {"ratio": "THRUST2TORQUE"},
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
+_NOT_STATED = {
+    "sdf": "it has no place in the motor plugin",
+    "urdf": "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
+    "forces and torques that you apply",
+    "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
+    "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
+    "crazyflie": "thrust follows the volts of a motor; scale VMOTOR2THRUST0 to VMOTOR2THRUST3 by it",
+}
+"""Why thrust or yaw torque of rotors is not put in, and what would do it."""
 
 
 class _Found(NamedTuple):
@@ -70,6 +109,15 @@ class _Found(NamedTuple):
     value: float
     low: float
     high: float
+
+    @classmethod
+    def of(cls, number: Estimate) -> _Found:
+        """Take an estimate."""
+        return cls(number.value, number.low, number.high)
+
+    def plus(self, added: float) -> _Found:
+        """Add what is exact."""
+        return _Found(*(each + added for each in self))
 
     def times(self, factor: float) -> _Found:
         ends = factor * self.low, factor * self.high
@@ -91,7 +139,8 @@ class _Found(NamedTuple):
     def contradicts(self, stated: float, wider: float = 1.0) -> bool:
         """Tell whether a number lies outside the interval, made wider by a factor."""
         below, above = (self.value + wider * (end - self.value) for end in (self.low, self.high))
-        return stated < below or stated > above
+        rounding = _ROUNDING * abs(stated)
+        return stated < below - rounding or stated > above + rounding
 
 
 _ONE = _Found(1.0, 1.0, 1.0)
@@ -99,13 +148,11 @@ _ONE = _Found(1.0, 1.0, 1.0)
 
 def _significant(factor: _Found, wider: float) -> _Found:
     """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0, wider) else _Found(1.0, *(1.0 + end - factor.value for end in factor[1:]))
+    return factor if factor.contradicts(1.0, wider) else factor.plus(1.0 - factor.value)
 
 
 def _part(number: Estimate | None, times: float) -> _Found:
-    return (
-        _Found(0.0, 0.0, 0.0) if number is None else _Found(number.value, number.low, number.high).times(float(times))
-    )
+    return _Found(0.0, 0.0, 0.0) if number is None else _Found.of(number).times(float(times))
 
 
 def _sum(*parts: _Found) -> _Found:
@@ -116,7 +163,7 @@ def _sum(*parts: _Found) -> _Found:
 
 
 def _factor(number: Estimate | None) -> _Found:
-    return _ONE if number is None else _Found(1 + number.value, 1 + number.low, 1 + number.high)
+    return _ONE if number is None else _Found.of(number).plus(1.0)
 
 
 @dataclass
@@ -128,14 +175,15 @@ class _Corrections:
     numbers: int
     edits: dict[Span, bytes] = field(default_factory=dict)
     put_in: dict[Span, bytes] = field(default_factory=dict)
-    changes: dict[tuple[str, float, float], tuple[Change, list[str]]] = field(default_factory=dict)
+    changes: dict[tuple[str, str, float, float], tuple[Change, list[str]]] = field(default_factory=dict)
     unchanged: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
+    turned: list[int] = field(default_factory=list)
 
-    @property
+    @cached_property
     def names(self) -> dict[Path, str]:
         """Of the corrected files, by those that were given."""
-        return _names(self.of.model.files)
+        return corrected_names(self.of.model.files)
 
     @cached_property
     def wider(self) -> float:
@@ -146,22 +194,30 @@ class _Corrections:
 
     @property
     def rotors(self) -> list[Rotor]:
-        """In the order of the study."""
-        return [self.of.model.rotors[index] for index in self.of.order]
+        """In the order of the study; the sign of a yaw torque is that of the turn as corrected."""
+        found = [self.of.model.rotors[index] for index in self.of.order]
+        return [_turned_round(rotor) if place in self.turned else rotor for place, rotor in enumerate(found)]
 
     def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
         """Put a number in the place of the stated one, where that is outside the interval."""
-        new, low, high = (stated.scale * each for each in found)
-        before, text = stated.scale * stated.value, f"{new:.4g}"
+        new, low, high = (stated.written(each) for each in found)
+        low, high, name = min(low, high), max(low, high), stated.name or name
+        before, text = stated.written(stated.value), f"{new:.4g}"
+        if stated.power < 0 and stated.value:
+            # What the number is the reciprocal of is the other way round.
+            words = words.replace("{share}", _share(found.value / stated.value))
         if not found.contradicts(stated.value, self.wider):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
             self._keep(f"{name} {before:.4g} {word} {text} [{low:.4g}, {high:.4g}]")
-        elif stated.span is not None and self.edits.get(stated.span, text.encode()) != text.encode():
-            self._keep(f"{name} is one number for all rotors, and the flights have another for each: {whom} {text}")
         elif stated.span is not None:
             self.edits[stated.span] = text.encode()
             self.note(stated.span.file, name, stated.where, (before, float(text), low, high), words, whom)
+            for other in stated.also:
+                # An entry of a matrix that stands twice may be 0, and is the same then.
+                share = other.value / before if before else 1.0
+                same = share * new, *sorted((share * low, share * high))
+                self.replace(name, other, _Found(*same), words, whom, None)
         elif room is not None and self.of.model.format == "sdf":
             self.put(room, f"<{name}>{text}</{name}>")
             self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
@@ -183,14 +239,22 @@ class _Corrections:
             high=high,
             sentence=words,
         )
-        self.changes.setdefault((name, change.before, after), (change, []))[1].append(whom)
+        self.changes.setdefault((change.file, name, change.before, after), (change, []))[1].append(whom)
 
     def put(self, room: Node, line: str) -> None:
-        """Put an element behind the last child of another one, indented as the first is."""
-        raw, first, last = raw_bytes(room.file), room.children[0].start, room.children[-1].close
+        """Put an element behind the last child of another one, indented as the first is; or into an empty one."""
+        raw, tag = raw_bytes(room.file), room.opening
+        assert tag is not None, "what was read has a tag"
+        if not room.children:
+            # A slash that closes it at once makes way for an end.
+            begin, end = (b">", f"</{room.tag}>".encode()) if tag[1] else (b"", b"")
+            place = Span(room.file, tag.start(1) if end else tag.end(), tag.end())
+            self.put_in[place] = self.put_in.get(place, begin + end).removesuffix(end) + line.encode() + end
+            return
+        first, last = room.children[0].start, room.children[-1].close
         indent = raw[raw.rfind(b"\n", 0, first) + 1 : first]
-        end = raw.index(b">", last) + 1
-        place = Span(room.file, end, end)
+        end_of_last = raw.index(b">", last) + 1
+        place = Span(room.file, end_of_last, end_of_last)
         text = b"\n" + (indent if not indent.strip() else b"") + line.encode()
         self.put_in[place] = self.put_in.get(place, b"") + text
 
@@ -198,30 +262,44 @@ class _Corrections:
         if sentence not in self.unchanged:
             self.unchanged.append(sentence)
 
-    def of_rotors(self, kind: str, found: Callable[[int, float], _Found], words: str) -> bool:
-        """Correct a number of each rotor; False where the format does not know it."""
+    def of_rotors(self, kind: str, found: Sequence[_Found], words: str, common: Sequence[_Found] = ()) -> bool:
+        """Correct a number of each rotor; False where the file does not state it.
+
+        Where one number stands for rotors that differ it becomes what is common to them.
+        """
         name = _TAGS[self.of.model.format].get(kind)
-        if name is None or not self.rotors or any(getattr(rotor, kind) is None for rotor in self.rotors):
+        held: list[Stated] = [own for rotor in self.rotors if (own := getattr(rotor, kind)) is not None]
+        if name is None or not held or len(held) < len(self.rotors):
             return False
-        for index, rotor in enumerate(self.rotors):
-            stated: Stated = getattr(rotor, kind)
-            self.replace(name, stated, found(index, stated.value), words, f"M{index + 1}", rotor.node)
+        wanted = [f"{own.written(each.value):.4g}" for own, each in zip(held, found, strict=True)]
+        for index, own in enumerate(held):
+            alike = [other for other, each in enumerate(held) if own.span is not None and each.span == own.span]
+            new = found[index]
+            if len({wanted[other] for other in alike}) > 1:
+                each = ", ".join(f"M{other + 1} {wanted[other]}" for other in alike)
+                self._keep(f"{name} is one number for all rotors, and the flights have another for each: {each}")
+                if not common or not common[index].contradicts(own.value, self.wider):
+                    continue
+                new = common[index]
+            self.replace(name, own, new, words, f"M{index + 1}", self.rotors[index].node)
         return True
 
 
 def corrected(
-    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[str]
+    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[Recording]
 ) -> tuple[Corrected, dict[str, bytes]]:
     """Put what a diagnosis names into a simulator's file: what there is to say, and the files by name.
 
     Parameters
     ----------
     vehicle : VehicleSettings
-        Of the study that was made of the file.
-    flights : sequence of str
-        Names of the flights that it was found in.
+        That flights were compared with: of the study that was made of the file, with what it leaves open.
+    flights : sequence of Recording
+        That it was found in.
     """
     made = _Corrections(of, vehicle, sum(len(each.numbers) for each in found.effects))
+    if not found.contradictions:
+        _directions(made, [each.signals for each in flights])
     if found.verdict in _WRITES and not found.contradictions:
         sure = [each for each in found.effects if each.name not in found.rivals]
         for each in found.effects:
@@ -235,7 +313,7 @@ def corrected(
     elif found.contradictions:
         made.unchanged.append("the log or its vehicle contradicts itself, so nothing is put in")
     changes = tuple(_said(change, whom) for change, whom in made.changes.values())
-    files = _written(made, changes, flights)
+    files = _written(made, changes, [each.name for each in flights])
     names = made.names
     texts = {names[file]: text for file, text in files.items()}
     diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
@@ -250,14 +328,58 @@ def corrected(
 
 
 def _said(change: Change, whom: Sequence[str]) -> Change:
-    from_to = f"{whom[0]} to {whom[-1]}" if len(whom) > 2 else joined(list(dict.fromkeys(whom)))
-    return Change(**{**vars(change), "sentence": change.sentence.format(whom=from_to, **_sizes(change))})
+    whom = list(dict.fromkeys(whom))
+    first = int(whom[0][1:]) if re.fullmatch(r"M\d+", whom[0]) else 0
+    in_turn = len(whom) > 2 and whom == [f"M{first + place}" for place in range(len(whom))]
+    names = f"{whom[0]} to {whom[-1]}" if in_turn else joined(whom)
+    more = _share(change.after / change.before) if change.before else "not 0"
+    return replace(change, sentence=change.sentence.format(whom=names, share=more))
 
 
-def _sizes(change: Change) -> dict[str, str]:
-    share = change.after / change.before - 1 if change.before else 0.0
-    more = f"{abs(100 * share):.3g} % {'more' if share > 0 else 'less'}"
-    return {"share": more if change.before else "not 0"}
+def _share(factor: float) -> str:
+    return f"{abs(100 * (factor - 1)):.3g} % {'more' if factor > 1 else 'less'}"
+
+
+def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
+    """Turn rotors round that the log has turn the other way, where flights show each of them by itself."""
+    if not made.of.turned:
+        return
+    measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
+    turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
+    stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
+    for place in made.of.turned:
+        rotor, spin = made.rotors[place], made.of.spins[place]
+        # The body turns against its rotors.
+        shown, whom = _Found(-turns[place], -turns[place] - half[place], -turns[place] + half[place]), f"M{place + 1}"
+        size = f"{shown.value:.2g} [{shown.low:.2g}, {shown.high:.2g}]"
+        way = "counter-clockwise" if spin > 0 else "clockwise"
+        says = f"{whom} turns {way}: fitted by itself, its yaw torque is {size} times the mean of all rotors"
+        if spin * shown.value < 0 or not shown.contradicts(0.0, made.wider):
+            made.unchanged.append(
+                f"the direction of {whom}: the log has it turn {way}, and flights do not show it ({size})"
+            )
+        elif rotor.turn is None or rotor.turn.span is None or sum(rotor.turn.span == each for each in stated) > 1:
+            where = "the format states no direction" if rotor.turn is None else rotor.turn.where
+            made.elsewhere.append(f"{says}; {where}: turn it round there")
+        else:
+            span, is_word = rotor.turn.span, made.of.model.format == "sdf"
+            old = raw_bytes(span.file)[span.start : span.end]
+            flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
+            made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
+            name = rotor.turn.name or ("turningDirection" if is_word else "gear yaw")
+            after = -rotor.turn.value
+            numbers = (rotor.turn.value, after, *shown.times(after * spin)[1:])
+            made.note(span.file, name, rotor.turn.where, numbers, says, whom)
+            made.turned.append(place)
+
+
+def _turned_round(rotor: Rotor) -> Rotor:
+    """Change the sign of a yaw torque whose number in the file has that of the turn."""
+    ratio, torque = (
+        replace(own, scale=-own.scale) if own and rotor.turn and own.span == rotor.turn.span else own
+        for own in (rotor.ratio, rotor.torque)
+    )
+    return replace(rotor, ratio=ratio, torque=torque)
 
 
 def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
@@ -272,10 +394,22 @@ def _put_in(made: _Corrections, effects: Sequence[NamedEffect]) -> None:
         held = quantity == "scales" or (
             rule is not None and rule(made, {number.name: number for number in each.numbers})
         )
+        held = held or _of_formula(made, each)
         if not held and not each.of_log:
             _not_held(made, each)
     if not made.changes and not made.elsewhere:
         made.unchanged.append("nothing that the flights determine contradicts the file")
+
+
+def _of_formula(made: _Corrections, each: NamedEffect) -> bool:
+    """Correct the numbers of an effect whose very formula the simulator has; False where it has not."""
+    stated = made.of.model.effects.get(each.name)
+    if stated is None or any(number.name not in stated for number in each.numbers):
+        return False
+    for number in each.numbers:
+        own = stated[number.name]
+        made.replace(own.name, own, _Found.of(number), f"{find(each.name).title}: {{share}}", "", None)
+    return True
 
 
 def _not_found(made: _Corrections, found: Conclusion) -> None:
@@ -287,9 +421,17 @@ def _not_found(made: _Corrections, found: Conclusion) -> None:
         stated: Stated | None = getattr(made.rotors[0], kind) if made.rotors else None
         if kind not in tags or quantity in named or stated is None or stated.value == 0:
             continue
-        reason = hidden.get(quantity)
-        why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
-        made.unchanged.append(f"{tags[kind]} {stated.scale * stated.value:.4g}: {why}")
+        _say_hidden(made, stated.name or tags[kind], stated, hidden.get(quantity))
+    names, reasons = {each.name for each in found.effects}, {each.name: each.reason for each in found.not_excited}
+    for effect, numbers in made.of.model.effects.items():
+        for stated in numbers.values() if effect not in names else ():
+            if stated.value != 0:
+                _say_hidden(made, stated.name, stated, reasons.get(effect))
+
+
+def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | None) -> None:
+    why = "these flights show none of it" if reason is None else f"these flights cannot show it: {reason}"
+    made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
 def _not_held(made: _Corrections, each: NamedEffect) -> None:
@@ -309,26 +451,61 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     scale = _significant(_factor(numbers.get("thrust_scale")), made.wider)
     lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
     modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
-
-    def thrust(index: int, stated: float) -> _Found:
-        own = [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
-        return scale.with_factor(_sum(*own, _part(lifts, spins[index]))).times(stated)
-
-    def turning(index: int, stated: float) -> _Found:
-        own = _sum(_part(drags, -spins[index]), _part(lifts, -spins[index]))
-        return _factor(numbers.get("error")).with_factor(own).times(stated)
-
+    patterns = [
+        [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
+        for index in range(len(spins))
+    ]
+    lifting = [_sum(*own, _part(lifts, spin)) for own, spin in zip(patterns, spins, strict=True)]
     differ = "difference_1" in numbers
-    words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
-    if ("thrust_scale" in numbers or differ) and not made.of_rotors("thrust", thrust, words):
-        made.elsewhere.append(
-            f"thrust of all rotors is {scale.value:.4g} [{scale.low:.4g}, {scale.high:.4g}] times that of the "
-            "file, whose controls are thrusts: scale gear or gainprm by it"
-        )
-    if "error" in numbers or drags is not None:
-        for kind in ("ratio", "torque"):
-            made.of_rotors(kind, turning, "yaw torque over thrust of {whom} is {share}")
+    if "thrust_scale" in numbers or differ:
+        words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
+        _as_found(made, "thrust", [scale.with_factor(each) for each in lifting], words, scale)
+        _largest_thrust(made, scale)
+    if "error" in numbers or differ:
+        error = _factor(numbers.get("error"))
+        kind = "torque" if any(rotor.torque is not None for rotor in made.rotors) else "ratio"
+        # What a rotor lifts less it drags less, so that the ratio of the two stays.
+        own = [
+            [_part(drags, -spin), *(pattern if kind == "torque" else [_part(lifts, -spin)])]
+            for pattern, spin in zip(patterns, spins, strict=True)
+        ]
+        words = f"yaw torque{'' if kind == 'torque' else ' over thrust'} of {{whom}} is {{share}}"
+        _as_found(made, kind, [error.with_factor(_sum(*each)) for each in own], words, error)
     _moments(made, numbers, scale)
+
+
+def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: str, common: _Found) -> None:
+    """Correct a number of each rotor by factors on it, or list them where flights were compared with another number."""
+    known = [
+        {"thrust": k, "torque": b, "ratio": b / k}[kind]
+        for k, b in ((each.thrust_factor_n_s2, each.drag_factor_n_m_s2) for each in made.vehicle.rotors)
+    ]
+    stated = [own.value for rotor in made.rotors if (own := getattr(rotor, kind)) is not None]
+    if len(stated) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
+        found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
+        if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
+            return
+    off = {
+        f"M{index + 1}": f"{each.value:.4g} [{each.low:.4g}, {each.high:.4g}]"
+        for index, each in enumerate(factors)
+        if each.contradicts(1.0, made.wider)
+    }
+    if off:
+        alike = len(off) == len(factors) and len(set(off.values())) == 1
+        sizes = {"all rotors": off["M1"]} if alike else off
+        made.elsewhere.append(
+            f"{words.partition(' of {whom}')[0]}, as a factor on that which flights were compared with: "
+            f"{', '.join(f'{whom} {size}' for whom, size in sizes.items())}; {_NOT_STATED[made.of.model.format]}"
+        )
+
+
+def _largest_thrust(made: _Corrections, scale: _Found) -> None:
+    """Change the largest thrust of gym-pybullet-drones with kf: rotors turn as fast as before."""
+    node = made.rotors[0].node if made.rotors and made.of.model.format == "urdf" else None
+    if node is not None and "thrust2weight" in node.attributes and scale.value != 1.0:
+        share = node.number("thrust2weight")
+        words = "rotors turn as fast as before, and lift {share}"
+        made.replace("thrust2weight", share, scale.times(share.value), words, "all", None)
 
 
 def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> None:
@@ -339,69 +516,65 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    factors = {
-        index: _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-        for index, axis in enumerate("xyz")
-        if f"inertia_{axis}" in numbers
-    }
-    _inertia(made, factors)
+    for index, axis in enumerate("xyz"):
+        if f"inertia_{axis}" in numbers:
+            factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+            _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
 
 
-def _inertia(made: _Corrections, factors: Mapping[int, _Found], products: Mapping[int, _Found] | None = None) -> None:
-    """Change entries of the inertia of the first link by what that of the vehicle is off."""
-    whole, first = made.of.model.inertia, made.of.model.bodies[0]
-    wanted = {entry: factor.times(float(whole[INERTIA_ENTRIES[entry]])) for entry, factor in factors.items()}
-    wanted |= {
-        entry: _Found(*(float(whole[INERTIA_ENTRIES[entry]]) + each for each in added))
-        for entry, added in (products or {}).items()
-    }
-    straight = bool(np.allclose(first.turned, np.eye(3), atol=1e-6))
+def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
+    """Change entries of the inertia of the heaviest link by what that of the vehicle is off."""
+    whole, own = made.of.model.inertia, made.of.model.heaviest
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
-        if not first.entries or not straight:
+        if not own.entries or not _straight(own.turned):
             if found.contradicts(total, made.wider):
                 made.elsewhere.append(
                     f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
-                    f"kg m^2, and not {total:.4g}: {first.inertia_at} states it in other axes, or not; change it there"
+                    f"kg m^2, and not {total:.4g}: {own.inertia_at} states it in other axes, or not; change it there"
                 )
             continue
-        rest = total - float(first.inertia[INERTIA_ENTRIES[entry]])
-        own = _Found(*(each - rest for each in found))
+        new = found.plus(float(own.inertia[INERTIA_ENTRIES[entry]]) - total)
         words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
-        made.replace(ENTRIES[entry], first.entries[entry], own, words, first.name or "the vehicle", _room(made, first))
+        room = None if own.node is None else own.node.first("inertia")
+        made.replace(ENTRIES[entry], own.entries[entry], new, words, own.name or "the vehicle", room)
 
 
-def _room(made: _Corrections, body: object) -> Node | None:
-    node = getattr(body, "node", None)
-    return node.first("inertia") if isinstance(node, Node) and made.of.model.format == "sdf" else None
+def _straight(turned: Array) -> bool:
+    return bool(np.allclose(turned, np.eye(3), atol=1e-6))
 
 
 def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    found = list(numbers.values())
-    _inertia(made, {}, {3 + at: _Found(each.value, each.low, each.high) for at, each in enumerate(found[:3])})
+    known = symmetric(made.vehicle.inertia_kg_m2)
+    added = dict(enumerate(list(numbers.values())[:3], start=3))
+    _inertia(made, {at: _Found.of(each).plus(float(known[INERTIA_ENTRIES[at]])) for at, each in added.items()})
     return True
 
 
 def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    model = made.of.model
-    first, share = model.bodies[0], model.mass_kg / model.bodies[0].mass.value
-    place, moved = [float(each) for each in first.centre], False
+    model, body = made.of.model, made.of.model.heaviest
+    share, whom = model.mass_kg / body.mass.value, body.name or "the vehicle"
+    place, moved = [each.value for each in body.place] or [0.0] * 3, False
     for axis, name in enumerate("xyz"):
         own = numbers.get(f"c_{name}")
         if own is None:
             continue
-        found = _Found(*(place[axis] + share * each for each in (own.value, own.low, own.high)))
+        found = _Found.of(own).times(share).plus(place[axis])
         words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
-        if first.place or first.node is None or model.format != "sdf":
-            stated = first.place[axis] if first.place else Stated(place[axis], first.inertia_at)
-            made.replace(f"pose {name}", stated, found, words, first.name, None)
+        if not _straight(body.link):
+            if found.contradicts(place[axis], made.wider):
+                made.elsewhere.append(f"{words}: {body.inertia_at} states it in other axes; change it there")
+        elif body.place or body.node is None or model.format != "sdf":
+            stated = body.place[axis] if body.place else Stated(place[axis], body.inertia_at)
+            made.replace(f"pose {name}", stated, found, words, whom, None)
         elif found.contradicts(place[axis], made.wider):
             values = (place[axis], float(f"{found.value:.4g}"), found.low, found.high)
-            made.note(first.node.file, f"pose {name}", f"{first.node.where}: no <pose>", values, words, first.name)
+            made.note(body.node.file, f"pose {name}", f"{body.node.where}: no <pose>", values, words, whom)
             place[axis], moved = found.value, True
-    if moved and first.node is not None:
-        made.put(first.node, f"<pose>{' '.join(f'{each:.4g}' for each in place)} 0 0 0</pose>")
+    if moved and body.node is not None:
+        empty, text = body.node.first("pose"), f"{' '.join(f'{each:.4g}' for each in place)} 0 0 0"
+        made.put(empty or body.node, text if empty else f"<pose>{text}</pose>")
     return True
 
 
@@ -418,23 +591,17 @@ def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         )
         return True
     for kind in ("lag_up", "lag_down"):
-        made.of_rotors(kind, lambda _i, _s: _Found(tau.value, tau.low, tau.high), "time constant of {whom} is {share}")
+        made.of_rotors(kind, [_Found.of(tau)] * len(made.rotors), "time constant of {whom} is {share}")
     return True
 
 
 def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["k_d"]
-    return made.of_rotors("drag", lambda _i, _s: _Found(own.value, own.low, own.high), "drag of {whom} is {share}")
+    return made.of_rotors("drag", [_Found.of(numbers["k_d"])] * len(made.rotors), "drag of {whom} is {share}")
 
 
 def _rolling(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
-    own = numbers["mu"]
-    signed = _Found(own.value, own.low, own.high)
-
-    def of(index: int, _stated: float) -> _Found:
-        return signed.times(made.vehicle.rotors[index].spin)
-
-    return made.of_rotors("rolling", of, "rolling moment of {whom} is {share}")
+    signed = [_Found.of(numbers["mu"]).times(rotor.spin) for rotor in made.vehicle.rotors]
+    return made.of_rotors("rolling", signed, "rolling moment of {whom} is {share}")
 
 
 _RULES: dict[Quantity, Callable[[_Corrections, Mapping[str, Estimate]], bool]] = {
@@ -457,9 +624,12 @@ def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[st
             continue
         for span in own:
             raw = raw[: span.start] + edits[span] + raw[span.end :]
-        if own:
+        own_changes = [change for change in changes if change.file == made.names[file]]
+        if own and made.of.model.format in _OF_XML:
             at = _root_at(file)
-            raw = raw[:at] + _comment(changes, flights, raw) + raw[at:]
+            raw = raw[:at] + _comment(_comment_lines(own_changes, flights), raw) + raw[at:]
+        elif own:
+            raw = with_comment(file, raw, _comment_lines(own_changes, flights))
         found[file] = raw
     return found
 
@@ -477,24 +647,32 @@ def _root_at(file: Path) -> int:
             return at
 
 
-def _comment(changes: Sequence[Change], flights: Sequence[str], raw: bytes) -> bytes:
-    """Write what was changed as a comment, with intervals and flights."""
-    lines = [f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:"]
-    lines += [
-        f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
-        for each in changes
+def _comment_lines(changes: Sequence[Change], flights: Sequence[str]) -> list[str]:
+    """Write what was changed, with intervals and flights."""
+    return [
+        f"Corrected by cpfls gap; 95 % intervals, from {', '.join(flights)}:",
+        *(
+            f"  {each.element} {each.before:.6g} to {each.after:.4g} [{each.low:.4g}, {each.high:.4g}]: {each.sentence}"
+            for each in changes
+        ),
     ]
+
+
+def _comment(lines: Sequence[str], raw: bytes) -> bytes:
+    """Write what was changed as a comment of XML."""
     end = "\r\n" if b"\r\n" in raw else "\n"
-    text = end.join(lines).replace("--", "- -")
-    return f"<!-- {text} -->{end}".encode()
+    # Two hyphens end a comment, and files are in many encodings.
+    text = re.sub("-(?=-)", "- ", end.join(map(visible, lines)))
+    return f"<!-- {text} -->{end}".encode("ascii", "xmlcharrefreplace")
 
 
-def _names(files: Sequence[Path]) -> dict[Path, str]:
-    """Name the files in the output folder; those of includes by their folders too."""
-    first, *others = files
-    taken = {first: first.name}
-    for file in others:
-        taken[file] = file.name if file.name not in taken.values() else f"{file.parent.name}-{file.name}"
+def corrected_names(files: Sequence[Path]) -> dict[Path, str]:
+    """Name the files in the output folder; where names are alike by their folders too, then by numbers."""
+    taken: dict[Path, str] = {}
+    for file in files:
+        names = (file.name, *(f"{file.parent.name}{number}-{file.name}" for number in ("", *range(2, len(files) + 2))))
+        given = {name.lower() for name in taken.values()}
+        taken[file] = next(name for name in names if name.lower() not in given)
     return taken
 
 

@@ -15,7 +15,11 @@ from defusedxml.ElementTree import DefusedXMLParser
 from cpfls_cli.errors import InputError
 
 _LARGEST = 20_000_000
+_DEEPEST = 100
+_HUGE = 1e30
+"""No number of a model is as large, and products of smaller ones are numbers."""
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
+_ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _WORD = re.compile(rb"\S+")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
@@ -40,13 +44,26 @@ class Stated:
     span : Span or None
         Of the number itself; None where it is not stated.
     scale : float
-        The number in the file over its value in SI units.
+        The number in the file over its value in SI units, to the power.
+    power : int
+        Of the value: -1 where the file states a reciprocal, such as a rate for a time constant.
+    name : str
+        As files write it; empty where its format has one name for it.
+    also : tuple of Stated
+        Other numbers, as the file has them, that change in proportion to that of the file, as the rest of a curve does.
     """
 
     value: float
     where: str
     span: Span | None = None
     scale: float = 1.0
+    power: int = 1
+    name: str = ""
+    also: tuple[Stated, ...] = ()
+
+    def written(self, value: float) -> float:
+        """Give a value in SI units as the file states it."""
+        return self.scale * value**self.power
 
 
 @dataclass
@@ -100,15 +117,17 @@ class Node:
         """Make the error of this element."""
         return InputError(f"{self.file}, line {self.line}, <{self.tag}>: {message}")
 
-    def numbers(self, attribute: str | None = None, count: int | None = None, scale: float = 1.0) -> list[Stated]:
-        """Read the numbers of its text, or of an attribute, each with its place."""
-        text = self.text if attribute is None else self.attributes.get(attribute, "")
-        words, spans = text.split(), self._spans(attribute)
+    def numbers(
+        self, attribute: str | None = None, count: int | None = None, scale: float = 1.0, usual: str = ""
+    ) -> list[Stated]:
+        """Read the numbers of its text, or of an attribute or what it is by default, each with its place."""
+        text = self.text if attribute is None else self.attributes.get(attribute, usual)
+        words, spans = text.split(), self.spans(attribute)
         try:
             values = [float(word) for word in words]
         except ValueError:
             raise self._no_number(text, attribute) from None
-        if (count is not None and len(values) != count) or not all(abs(each) < 1e300 for each in values):
+        if (count is not None and len(values) != count) or not all(abs(each) < _HUGE for each in values):
             raise self._no_number(text, attribute, count or 1)
         where = self.where if attribute is None else f"{self.where}, {attribute}"
         known = spans if len(spans) == len(values) else [None] * len(values)
@@ -128,14 +147,20 @@ class Node:
         )
         return self.error(f"{of}{text!r} is not {wanted}{template}")
 
-    def _spans(self, attribute: str | None) -> list[Span | None]:
-        raw = raw_bytes(self.file)
-        tag = _TAG.match(raw, self.start)
+    @property
+    def opening(self) -> re.Match[bytes] | None:
+        """Its first tag in the file; the group is the slash of one that is closed at once."""
+        return _TAG.match(raw_bytes(self.file), self.start)
+
+    def spans(self, attribute: str | None = None) -> list[Span | None]:
+        """Find the words of its text, or of an attribute, in the file."""
+        raw, tag = raw_bytes(self.file), self.opening
         if tag is None:
             return []
         if attribute is not None:
-            own = re.search(rb"\s" + re.escape(attribute.encode()) + rb"\s*=\s*[\"']([^\"']*)[\"']", tag[0])
-            first, last = (self.start + own.start(1), self.start + own.end(1)) if own else (0, 0)
+            named = (each for each in _ATTRIBUTE.finditer(tag[0]) if each[1] == attribute.encode())
+            own = next(((each.start(each.lastindex or 0), each.end(each.lastindex or 0)) for each in named), (0, 0))
+            first, last = (self.start + end for end in own) if own != (0, 0) else own
         else:
             first, last = tag.end(), self.close
         # Comments inside count as blanks, so that what follows keeps its place.
@@ -158,6 +183,7 @@ class _Builder:
         self.file, self._open = file, list[Node]()
         self.expat: Any = None
         self.root: Node | None = None
+        self.deepest = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         above = self._open[-1] if self._open else None
@@ -168,6 +194,7 @@ class _Builder:
         else:
             above.children.append(node)
         self._open.append(node)
+        self.deepest = max(self.deepest, len(self._open))
 
     def end(self, _tag: str) -> None:
         self._open.pop().close = self.expat.CurrentByteIndex
@@ -180,13 +207,13 @@ class _Builder:
         return self.root
 
 
-def read_xml(file: Path) -> Node:
-    """Read a file of XML; entities and document types, which no model needs, are refused.
+def read_bytes(file: Path) -> bytes:
+    """Read a file, and keep its bytes to correct them.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is no XML.
+        If it cannot be read, or is larger than any model.
     """
     try:
         with file.open("rb") as stream:
@@ -195,9 +222,21 @@ def read_xml(file: Path) -> Node:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
     if len(raw) > _LARGEST:
         raise InputError(f"{file}: is larger than {_LARGEST / 1e6:g} MB, which no model is")
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
     _READ[file] = raw
+    return raw
+
+
+def read_xml(file: Path) -> Node:
+    """Read a file of XML; entities and document types, which no model needs, are refused.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no XML.
+    """
+    raw = read_bytes(file)
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw[:4]:
+        raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
     builder = _Builder(file)
     parser = DefusedXMLParser(target=builder, forbid_dtd=True)
     builder.expat = parser.parser
@@ -209,7 +248,11 @@ def read_xml(file: Path) -> Node:
             f"{file}: has a DOCTYPE or entities of its own, which no model needs and which can fill a memory; remove "
             "them"
         ) from None
+    except (ValueError, LookupError):
+        raise InputError(f"{file}: is in an encoding that cannot be read; save it in UTF-8") from None
     except ParseError as error:
         raise InputError(f"{file}: is no valid XML: {error}; correct it there") from None
+    if builder.deepest > _DEEPEST:
+        raise InputError(f"{file}: has {builder.deepest} elements in each other, which no model has; correct it there")
     assert isinstance(root, Node), "a file without an element is no XML"
     return root

@@ -2,20 +2,23 @@
 
 A control times gain times gear is force and torque in the axes of the site (MuJoCo, XML reference, ``actuator``). Most
 files have thrusts in N for controls: they state no thrust over squared speed. Where two numbers of the file,
-``ctrl_rotor`` and ``ctrl_power`` as `cpfls export` writes them, say that controls are squared speeds, they do.
+``ctrl_rotor`` and ``ctrl_power`` as `cpfls export` writes them, say that controls are squared speeds, they do: then
+the third and the sixth number of gear, times gain, are thrust and yaw torque over squared speed. Else only the ratio of
+the two is the vehicle's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from os.path import isfile
 from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, rotated, turning
+from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, rotated, turning, unit
 
 _TURNING = ("hinge", "slide", "ball")
 _SMALL = 1e-9
@@ -23,7 +26,11 @@ CANNOT = (
     "drag of rotors, ground effect and a delay: no attribute of an actuator",
     "the speed of rotors: controls are thrusts unless the file says what they stand for",
 )
-_AXES = ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis")
+_AXES = {"pos": 3, "quat": 4, "euler": 3, "axisangle": 4, "xyaxes": 6, "zaxis": 3}
+"""Attributes that place an element, with how many numbers each has."""
+_COMPILED = "or give what MuJoCo's compiler makes of the file (mj_saveLastXML)"
+_UNREAD = ("frame", "replicate", "attach", "composite", "flexcomp")
+"""Elements in a body that may have mass and are not read."""
 
 
 @dataclass
@@ -34,6 +41,7 @@ class _File:
     degrees: bool = True
     order: str = "xyz"
     from_geoms: str = "auto"
+    total_mass: float = 0.0
     defaults: dict[str, dict[str, dict[str, str]]] = field(default_factory=dict)
     files: dict[Path, None] = field(default_factory=dict)
 
@@ -47,13 +55,32 @@ class _File:
             self.degrees = compiler.attributes.get("angle", "degree" if self.degrees else "radian") == "degree"
             self.order = compiler.attributes.get("eulerseq", self.order)
             self.from_geoms = compiler.attributes.get("inertiafromgeom", self.from_geoms)
+            self._masses(compiler)
+            if len(self.order) != 3 or set(self.order.lower()) - set("xyz"):
+                raise compiler.error(f"eulerseq is {self.order!r}; write three of x, y, z, X, Y, Z")
         for default in self.root.all("default"):
-            self._default(default, {}, "main")
+            # There is one main class, whatever its sections are called and how many there are.
+            self._default(default, self.defaults.get("main", {}), "main")
+
+    def _masses(self, compiler: Node) -> None:
+        """Take in what the compiler does to masses, or refuse it."""
+        own = compiler.attributes
+        if "settotalmass" in own:
+            self.total_mass = compiler.number("settotalmass").value
+        for name in ("boundmass", "boundinertia"):
+            if name in own and compiler.number(name).value > 0:
+                raise compiler.error(
+                    f"{name} changes parts that are too light, which is not read here; remove it, {_COMPILED}"
+                )
+        if own.get("balanceinertia") == "true":
+            raise compiler.error(
+                f"balanceinertia changes moments that no body has; correct those, and remove it, {_COMPILED}"
+            )
 
     def _include(self, node: Node) -> None:
         assert node.parent is not None
         file = node.file.parent / node.attributes.get("file", "")
-        if not file.is_file():
+        if not isfile(file):
             raise node.error(f"includes {node.attributes.get('file')!r}, which is not there; put it beside this file")
         if file in self.files:
             raise node.error(f"includes {file.name} again; remove that <include>")
@@ -66,11 +93,11 @@ class _File:
                     self._include(below)
 
     def _default(self, node: Node, above: Mapping[str, dict[str, str]], usual: str) -> None:
-        name = node.attributes.get("class", usual)
+        name = "main" if usual == "main" and node.parent is self.root else node.attributes.get("class", usual)
         own = {tag: dict(values) for tag, values in above.items()}
         for child in node.children:
             if child.tag != "default":
-                own[child.tag] = own.get(child.tag, {}) | child.attributes
+                own[_shared(child.tag)] = own.get(_shared(child.tag), {}) | child.attributes
         self.defaults[name] = own
         for child in node.all("default"):
             self._default(child, own, name)
@@ -78,47 +105,57 @@ class _File:
     def of(self, node: Node, childclass: str) -> dict[str, str]:
         """Give the attributes of an element with those that it has by default."""
         usual = self.defaults.get(node.attributes.get("class", childclass), self.defaults.get("main", {}))
-        return {**usual.get(node.tag, {}), **node.attributes}
+        return {**usual.get(_shared(node.tag), {}), **node.attributes}
 
     def placed(self, node: Node, attributes: Mapping[str, str]) -> Array:
         """Give the pose of an element in that of its body, shape (4, 4)."""
-        held = {name: _floats(node, name, attributes[name]) for name in _AXES if name in attributes}
+        held = {name: _floats(node, attributes, name, {count}) for name, count in _AXES.items() if name in attributes}
         place = held.get("pos", [0.0, 0.0, 0.0])
-        unit = np.pi / 180 if self.degrees else 1.0
+        radians = np.pi / 180 if self.degrees else 1.0
         turn = np.eye(3)
         if "quat" in held:
-            turn = of_quaternion(held["quat"])
+            turn = of_quaternion(unit(node, "quat", held["quat"]))
         elif "euler" in held:
             for axis, angle in zip(self.order, held["euler"], strict=True):
-                one = rotated([unit * angle if each == axis.lower() else 0.0 for each in "xyz"])
+                one = rotated([radians * angle if each == axis.lower() else 0.0 for each in "xyz"])
                 turn = turn @ one if axis.islower() else one @ turn
         elif "axisangle" in held:
             *axis_of, angle = held["axisangle"]
-            half = 0.5 * unit * angle
-            turn = of_quaternion([np.cos(half), *(np.sin(half) * np.array(axis_of) / np.linalg.norm(axis_of))])
+            half = 0.5 * radians * angle
+            turn = of_quaternion([np.cos(half), *(np.sin(half) * unit(node, "axisangle", axis_of))])
         elif "xyaxes" in held:
-            x = np.array(held["xyaxes"][:3]) / np.linalg.norm(held["xyaxes"][:3])
-            y = np.array(held["xyaxes"][3:]) - x * (x @ held["xyaxes"][3:])
-            y = y / np.linalg.norm(y)
+            x = unit(node, "xyaxes", held["xyaxes"][:3])
+            y = unit(node, "xyaxes", np.array(held["xyaxes"][3:]) - x * (x @ held["xyaxes"][3:]))
             turn = np.column_stack([x, y, np.cross(x, y)])
         elif "zaxis" in held:
-            turn = _upward(np.array(held["zaxis"]))
+            turn = _upward(unit(node, "zaxis", held["zaxis"]))
         return pose(turn, place)
 
 
+def _shared(tag: str) -> str:
+    """Name the defaults of an element: all actuators have the same."""
+    return "motor" if tag == "general" else tag
+
+
 def _upward(axis: Array) -> Array:
-    axis = axis / np.linalg.norm(axis)
     across = np.cross([0.0, 0.0, 1.0], axis)
     if np.linalg.norm(across) < _SMALL:
         return np.diag([1.0, np.sign(axis[2]), np.sign(axis[2])])
-    return of_quaternion([1 + axis[2], *across])
+    quaternion = np.array([1 + axis[2], *across])
+    return of_quaternion(quaternion / np.linalg.norm(quaternion))
 
 
-def _floats(node: Node, name: str, text: str) -> list[float]:
-    try:
-        return [float(word) for word in text.split()]
-    except ValueError:
-        raise node.error(f"{name} = {text!r} is not numbers; write numbers there") from None
+def _stated(node: Node, own: Mapping[str, str], name: str, counts: Collection[int], usual: str = "") -> list[Stated]:
+    """Read numbers of an attribute of an element, its class or MuJoCo itself, as many as there may be."""
+    numbers = node.numbers(name, usual=own.get(name, usual))
+    if len(numbers) not in counts:
+        wanted = f"{min(counts)}" if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
+        raise node.error(f"{name} has {len(numbers)} numbers; write {wanted}")
+    return numbers
+
+
+def _floats(node: Node, own: Mapping[str, str], name: str, counts: Collection[int], usual: str = "") -> list[float]:
+    return [each.value for each in _stated(node, own, name, counts, usual)]
 
 
 def read_mjcf(file: Path) -> SimulatorModel:
@@ -147,6 +184,10 @@ def read_mjcf(file: Path) -> SimulatorModel:
     _gather(whole, flying[0], np.eye(4), "main", bodies, sites)
     if not bodies:
         raise flying[0].error("has no mass; write <inertial> with pos, mass and diaginertia")
+    mass = sum(body.mass.value for body in bodies)
+    if whole.total_mass > 0 and mass > 0:
+        bodies = [_times(body, whole.total_mass / mass) for body in bodies]
+        notes.append(f"the compiler's settotalmass makes it {whole.total_mass:g} kg, and inertias in proportion")
     rotors = tuple(_rotors(whole, root, sites, notes))
     if root.first("option") and any(node.attributes.get("density", "0") != "0" for node in root.all("option")):
         notes.append("MuJoCo's own fluid drags the body (option density); no number of a rotor")
@@ -154,9 +195,19 @@ def read_mjcf(file: Path) -> SimulatorModel:
                           tuple(notes), tuple(whole.files))  # fmt: skip
 
 
+def _times(body: Body, share: float) -> Body:
+    """Scale mass and inertia of a part."""
+    mass, *entries = (
+        replace(each, value=share * each.value, scale=each.scale / share) for each in (body.mass, *body.entries)
+    )
+    return replace(body, mass=mass, inertia=share * body.inertia, entries=tuple(entries))
+
+
 def _gather(whole: _File, body: Node, placed: Array, above: str, bodies: list[Body], sites: dict[str, Array]) -> None:
     """Collect what has mass, and the sites, of a body and those below it, in the frame of the first."""
     named = body.attributes.get("childclass", above)
+    for unread in body.all(*_UNREAD):
+        raise unread.error(f"is not read here; write what is in it, {_COMPILED}")
     inertial = body.first("inertial")
     if inertial is not None and whole.from_geoms != "true":
         bodies.append(_inertial(whole, body, inertial, placed))
@@ -172,7 +223,6 @@ def _gather(whole: _File, body: Node, placed: Array, above: str, bodies: list[Bo
 
 
 def _inertial(whole: _File, body: Node, inertial: Node, placed: Array) -> Body:
-    at = placed @ whole.placed(inertial, inertial.attributes)
     entries: tuple[Stated, ...] = ()
     if "fullinertia" in inertial.attributes:
         entries = tuple(inertial.numbers("fullinertia", 6))
@@ -183,30 +233,30 @@ def _inertial(whole: _File, body: Node, inertial: Node, placed: Array) -> Body:
     else:
         raise inertial.error("has no diaginertia and no fullinertia; write one of them")
     place = inertial.numbers("pos", 3) if "pos" in inertial.attributes else []
-    return part_of(body.name, inertial.number("mass"), entries, at, place, inertial)
+    own = whole.placed(inertial, inertial.attributes)
+    return part_of(body.name, inertial.number("mass"), entries, placed, own, place, inertial)
 
 
 def _geom(whole: _File, geom: Node, placed: Array, named: str) -> Body | None:
     own = whole.of(geom, named)
-    stated = own.get("mass")
-    if stated is not None and _floats(geom, "mass", stated) == [0.0]:
+    stated = _stated(geom, own, "mass", {1})[0] if "mass" in own else None
+    if stated is not None and stated.value == 0:
         return None
-    kind, size = own.get("type", "sphere"), _floats(geom, "size", own.get("size", ""))
-    if kind == "mesh" or "mesh" in own or "fromto" in own or kind not in _SOLIDS or not size:
+    kind, size = own.get("type", "sphere"), _floats(geom, own, "size", range(4))
+    solid, count = _SOLIDS.get(kind, (_box, 4))
+    if "mesh" in own or "fromto" in own or own.get("shellinertia") == "true" or len(size) < count:
         raise geom.error(
             f"its mass follows from a {'mesh' if 'mesh' in own else kind}, which is not read here; give the body an "
             "<inertial> with pos, mass and diaginertia, as MuJoCo's compiler prints them"
         )
-    volume, per_mass = _SOLIDS[kind](*size, *[0.0] * (3 - len(size)))
-    if stated is not None:
-        # Of the class, where not of the geom itself.
-        mass = geom.number("mass") if "mass" in geom.attributes else Stated(float(stated), geom.where)
-    else:
-        density = _floats(geom, "density", own.get("density", "1000"))[0]
-        mass = Stated(density * volume, f"{geom.where}: from its density and size")
+    if not min(size[:count]) > 0:
+        raise geom.error(f"its size is {' '.join(f'{each:g}' for each in size)}; write numbers above 0")
+    volume, per_mass = solid(*size, *[0.0] * (3 - len(size)))
+    density = _floats(geom, own, "density", {1}, "1000")[0]
+    mass = stated or Stated(density * volume, f"{geom.where}: from its density and size")
     at = placed @ whole.placed(geom, own)
     turned = at[:3, :3]
-    return Body(geom.name or kind, mass, at[:3, 3], mass.value * turned @ np.diag(per_mass) @ turned.T, turned)
+    return Body(geom.name or kind, mass, at[:3, 3], mass.value * turned @ np.diag(per_mass) @ turned.T, turned, turned)
 
 
 def _box(x: float, y: float, z: float) -> tuple[float, list[float]]:
@@ -231,12 +281,13 @@ def _capsule(radius: float, half: float, _: float) -> tuple[float, list[float]]:
 
 
 _SOLIDS = {
-    "box": _box,
-    "ellipsoid": _ellipsoid,
-    "cylinder": _cylinder,
-    "capsule": _capsule,
-    "sphere": lambda radius, *_: _ellipsoid(radius, radius, radius),
+    "box": (_box, 3),
+    "ellipsoid": (_ellipsoid, 3),
+    "cylinder": (_cylinder, 2),
+    "capsule": (_capsule, 2),
+    "sphere": (lambda radius, *_: _ellipsoid(radius, radius, radius), 1),
 }
+"""Volume and moments over mass of what a geom may be, and of how many numbers."""
 
 
 def _rotors(whole: _File, root: Node, sites: Mapping[str, Array], notes: list[str]) -> Iterator[Rotor]:
@@ -250,36 +301,60 @@ def _rotors(whole: _File, root: Node, sites: Mapping[str, Array], notes: list[st
     for index, node in enumerate(actuators):
         own = whole.of(node, "main")
         squared = bool(powers) and powers[index] == 2
-        gear = np.array(_floats(node, "gear", own.get("gear", "1")) + [0.0] * 6)[:6]
+        gear = [*_stated(node, own, "gear", range(1, 7), "1"), *[Stated(0.0, node.where)] * 6][:6]
+        gain = _floats(node, own, "gainprm", range(1, 11), "1")[0]
         damps = own.get("gaintype") == "affine" or own.get("biastype") == "affine"
-        if own.get("site") in sites and abs(gear[2]) > _SMALL and not damps and (squared or not powers):
-            pushing.append((node, own, gear, squared))
-    places = {tuple(np.round(sites[own["site"]][:2, 3], 6)) for _, own, _, _ in pushing}
+        pushes = abs(gain * gear[2].value) > _SMALL
+        if own.get("site") in sites and pushes and not damps and (squared or not powers):
+            pushing.append((node, own, gear, gain, squared))
+    places = {tuple(np.round(sites[own["site"]][:2, 3], 6)) for _, own, *_ in pushing}
     if len(pushing) < 2 or len(places) < 2:
         notes.append("states no rotors: its actuators push and turn the body at one point")
         return
-    for node, own, gear, squared in pushing:
-        yield _rotor(node, own, gear, squared, sites[own["site"]])
+    for node, own, gear, gain, squared in pushing:
+        yield _rotor(node, own, gear, gain, squared, sites[own["site"]])
 
 
-def _rotor(node: Node, own: Mapping[str, str], gear: Array, squared: bool, site: Array) -> Rotor:
-    gain = _floats(node, "gainprm", own.get("gainprm", "1"))[0]
-    push, turn = float(gain * gear[2]), float(gear[5] / gear[2])
+def _rotor(node: Node, own: Mapping[str, str], gear: list[Stated], gain: float, squared: bool, site: Array) -> Rotor:
+    force, turn = gear[2], gear[5]
+    limited = "ctrlrange" in own and own.get("ctrllimited") != "false"
+    limits = _floats(node, own, "ctrlrange", {2}) if limited else [-np.inf, np.inf]
+    clamped = "forcerange" in own and own.get("forcelimited") != "false"
+    forces = np.clip(gain * np.array(limits), *(_floats(node, own, "forcerange", {2}) if clamped else (None, None)))
+    # Controls are above 0, but for those that may only be below.
+    sign, most = (1.0, forces[1]) if limits[1] > 0 else (-1.0, forces[0])
+    along = float(np.sign(sign * gain * force.value))
     words = f"{node.where}, gear and gain"
-    limits = _floats(node, "ctrlrange", own["ctrlrange"]) if "ctrlrange" in own else None
-    most = None if limits is None or squared else Stated(push * limits[1], f"{node.where}, ctrlrange")
-    lag = own.get("dynprm") if own.get("dyntype") in ("filter", "filterexact") else None
-    lagging = None if lag is None else Stated(_floats(node, "dynprm", lag)[0], f"{node.where}, dynprm")
+    lagging = None
+    if own.get("dyntype") in ("filter", "filterexact"):
+        lagging = _stated(node, own, "dynprm", range(1, 11), "1")[0]
+        if not lagging.value > 0:
+            raise node.error(f"dynprm is {lagging.value:g}; write a time constant above 0")
+    thrust, torque = (replace(_sized(each, gain), where=words) for each in (force, turn))
+    ratio = _sized(turn, 1 / force.value)
+    turns = abs(ratio.value) > _SMALL
+    top = limits[1] if limits[1] > 0 else -limits[0]
     return Rotor(
         node.name or own["site"],
         node.where,
         site[:3, 3],
-        site[:3, 2] * np.sign(push),
-        int(-np.sign(turn)) if abs(turn) > _SMALL else 0,
-        thrust=Stated(push, words) if squared else None,
-        ratio=Stated(abs(turn), words),
-        most=most,
+        site[:3, 2] * along,
+        int(-np.sign(turn.value / force.value)) if turns else 0,
+        thrust=thrust if squared else None,
+        torque=torque if squared and turns else None,
+        ratio=replace(ratio, where=words) if turns and not squared else None,
+        speed_max=Stated(float(np.sqrt(max(top, 0.0))), f"{node.where}, ctrlrange") if squared and limited else None,
+        most=Stated(abs(float(force.value * most)), f"{node.where}, limits")
+        if np.isfinite(most) and not squared
+        else None,
         lag_up=lagging,
         lag_down=lagging,
+        turn=replace(turn, where=words) if turns else None,
         node=node,
     )
+
+
+def _sized(stated: Stated, factor: float) -> Stated:
+    """Give the size of a number times a factor, and how the file has it."""
+    value = abs(factor * stated.value)
+    return replace(stated, value=value, scale=stated.value / value if value else 1.0)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Stated
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 GRAVITY = 9.81
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 """Names of the entries of an inertia in files."""
 _STRAIGHT = 0.9998
 """Cosine of one degree: up to there an axis of thrust is that of the body."""
+_SHORTEST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,8 @@ class Body:
         Its centre of mass, in the frame of the vehicle's first link: x forward, y left, z up.
     inertia : array, shape (3, 3), kg m^2
         About its centre of mass, in the same axes.
-    turned : array, shape (3, 3)
-        From the axes that its inertia is stated in to those of the vehicle.
+    turned, link : array, shape (3, 3)
+        From the axes that its inertia and its place are stated in to those of the vehicle.
     entries : tuple of Stated
         Ixx Iyy Izz Ixy Ixz Iyz as stated; empty where they are not stated so.
     place : tuple of Stated
@@ -45,6 +47,7 @@ class Body:
     centre: Array
     inertia: Array
     turned: Array
+    link: Array
     entries: tuple[Stated, ...] = ()
     place: tuple[Stated, ...] = ()
     node: Node | None = None
@@ -75,6 +78,8 @@ class Rotor:
         Yaw torque over squared speed, where that is what the file states.
     most : Stated or None, N
         Largest thrust, where controls are thrusts.
+    turn : Stated or None
+        Where its spin stands.
     node : Node or None
         The element that holds its numbers, to put something into.
     """
@@ -93,6 +98,7 @@ class Rotor:
     lag_down: Stated | None = None
     drag: Stated | None = None
     rolling: Stated | None = None
+    turn: Stated | None = None
     node: Node | None = None
 
     @property
@@ -118,13 +124,17 @@ class SimulatorModel:
     Attributes
     ----------
     bodies : tuple of Body
-        Parts with mass; the first one is that which the rotors hang on.
+        Parts with mass; the first one is that which the rotors hang on, though another may be heavier.
     cannot : tuple of str
         What files of this format cannot state.
     notes : tuple of str
         What is odd about the file.
     files : tuple of Path
         All files that it was read from, itself first.
+    effects : mapping from str to mapping from str to Stated
+        Numbers of effects by their coefficients, where the format has their very formulas.
+    of_commands : bool
+        Whether speeds are commands times the largest speed, so that logged speeds are others.
     """
 
     name: str
@@ -134,6 +144,8 @@ class SimulatorModel:
     cannot: tuple[str, ...]
     notes: tuple[str, ...]
     files: tuple[Path, ...]
+    effects: Mapping[str, Mapping[str, Stated]] = field(default_factory=dict)
+    of_commands: bool = False
 
     @property
     def file(self) -> Path:
@@ -144,6 +156,11 @@ class SimulatorModel:
     def mass_kg(self) -> float:
         """Mass of all parts."""
         return float(sum(body.mass.value for body in self.bodies))
+
+    @property
+    def heaviest(self) -> Body:
+        """The part that corrections of inertia and centre of mass go into."""
+        return max(self.bodies, key=lambda body: body.mass.value)
 
     @property
     def centre(self) -> Array:
@@ -158,6 +175,11 @@ class SimulatorModel:
             apart = body.centre - self.centre
             total += body.inertia + body.mass.value * (apart @ apart * np.eye(3) - np.outer(apart, apart))
         return total
+
+    @property
+    def states_inertia(self) -> bool:
+        """Whether the file states any inertia."""
+        return bool(self.inertia.any())
 
     @property
     def moments(self) -> tuple[float, ...]:
@@ -212,7 +234,7 @@ def checked(model: SimulatorModel) -> SimulatorModel:
     for body in model.bodies:
         _require_body(body)
     if not model.mass_kg > 0:
-        raise InputError(f"{model.file}: no link has a mass; write one, such as <mass>1.5</mass>")
+        raise InputError(f"{model.file}: states no mass above 0 ({model.bodies[0].mass.where}); write one")
     for rotor in model.rotors:
         if rotor.axis[2] < _STRAIGHT:
             raise InputError(
@@ -233,19 +255,65 @@ def part_of(
     name: str,
     mass: Stated,
     entries: Sequence[Stated],
-    at: Array,
+    link: Array,
+    own: Array,
     place: Sequence[Stated] = (),
     node: Node | None = None,
 ) -> Body:
-    """Make a part of its inertia as stated, in the axes of the pose `at`, shape (4, 4)."""
+    """Make a part of its inertia as stated, by the poses of its link and, in that, of its inertial, shape (4, 4)."""
+    at = link @ own
     turned = at[:3, :3]
     inertia = turned @ symmetric([entry.value for entry in entries]) @ turned.T
-    return Body(name, mass, at[:3, 3], inertia, turned, tuple(entries), tuple(place), node)
+    return Body(name, mass, at[:3, 3], inertia, turned, link[:3, :3], tuple(entries), tuple(place), node)
+
+
+def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
+    """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
+    return part_of(name, mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
+
+
+def of_settings(file: Path, vehicle: VehicleSettings, lag_s: float) -> SimulatorModel:
+    """Take what flights found of a vehicle for a model as a simulator's file states one."""
+    where = f"{file.name}: as flights have it"
+    entries = [Stated(value, where) for value in (*vehicle.inertia_kg_m2, 0.0, 0.0, 0.0)[:6]]
+    lag = Stated(lag_s, where) if lag_s > 0 else None
+    rotors = tuple(
+        Rotor(
+            f"rotor {index}",
+            where,
+            np.array(rotor.position_m),
+            np.array([0.0, 0.0, 1.0]),
+            rotor.spin,
+            thrust=Stated(rotor.thrust_factor_n_s2, where),
+            torque=Stated(rotor.drag_factor_n_m_s2, where),
+            speed_max=Stated(vehicle.rotor_speed_max_rad_s, where),
+            lag_up=lag,
+            lag_down=lag,
+        )
+        for index, rotor in enumerate(vehicle.rotors, 1)
+    )
+    body = of_one_body(file.stem, Stated(vehicle.mass_kg, f"{file.name}: of its config"), entries, where)
+    cannot = ("what effects it has: `cpfls gap` takes the file itself with all of them",)
+    return SimulatorModel(file.stem, "vehicle", (body,), rotors, cannot, (), (file,))
 
 
 def turning(node: Node, what: str) -> InputError:
     """Make the error of a joint that turns."""
     return node.error(f"{what} turns, and a study has one rigid body; fix it in the file that you give")
+
+
+def unit(node: Node, name: str, direction: Sequence[float] | Array) -> Array:
+    """Scale what an element states to length 1.
+
+    Raises
+    ------
+    InputError
+        If it has no length.
+    """
+    length = float(np.linalg.norm(direction))
+    if not length > _SHORTEST:
+        raise node.error(f"{name} has no direction; write one whose length is not 0")
+    return np.asarray(direction, dtype=float) / length
 
 
 def rotated(rpy: Sequence[float]) -> Array:
@@ -260,9 +328,9 @@ def rotated(rpy: Sequence[float]) -> Array:
     )
 
 
-def of_quaternion(quaternion: Sequence[float]) -> Array:
-    """Rotation by a quaternion w, x, y, z of any length, shape (3, 3)."""
-    w, x, y, z = np.array(quaternion) / np.linalg.norm(quaternion)
+def of_quaternion(quaternion: Sequence[float] | Array) -> Array:
+    """Rotation by a quaternion w, x, y, z of length 1, shape (3, 3)."""
+    w, x, y, z = quaternion
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from os.path import isdir, isfile
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from cpfls_cli.simulators.model import (
     pose,
     rotated,
     turning,
+    unit,
 )
 
 MOTOR = re.compile(r"multicopter-motor-model|gazebo_motor_model")
@@ -57,11 +59,13 @@ class _Parts:
         self.motors: list[tuple[str, Node]] = []
         self.plugins: list[Node] = []
         self.files: dict[Path, None] = {root.file: None}
-        self._frames: dict[str, tuple[Node, str, str]] = {}
+        # Element, scope of the names that it refers to, frame of the model that it is in, frame that it starts from.
+        self._frames: dict[str, tuple[Node, str, str, str]] = {}
         self._poses: dict[str, Array | None] = {"": np.eye(4)}
-        self._add(root, "", 0)
+        self._add(root, "", "", 0)
 
-    def _add(self, model: Node, scope: str, depth: int) -> None:
+    def _add(self, model: Node, scope: str, own: str, depth: int) -> None:
+        """Add the parts of a model to those of a scope, placed in a frame of its own."""
         if depth > 8:
             raise model.error("includes itself; remove that <include>")
         for node in model.children:
@@ -70,18 +74,18 @@ class _Parts:
                 case "link":
                     self._named(node, name)
                     self.links[name] = node
-                    self._frames[name] = node, scope, scope
+                    self._frames[name] = node, scope, own, own
                 case "joint":
                     self.joints[name] = node
-                    self._frames[name] = node, scope, scope + _text(node, "child")
+                    self._frames[name] = node, scope, own, scope + _text(node, "child")
                 case "frame":
                     attached = node.attributes.get("attached_to", "")
-                    self._frames[name] = node, scope, scope + attached if attached else scope
+                    self._frames[name] = node, scope, own, scope + attached if attached else own
                 case "model":
-                    self._frames[f"{name}::"] = node, scope, scope
-                    self._add(node, f"{name}::", depth + 1)
+                    self._frames[f"{name}::"] = node, scope, own, own
+                    self._add(node, f"{name}::", f"{name}::", depth + 1)
                 case "include":
-                    self._include(node, scope, depth)
+                    self._include(node, scope, own, depth)
                 case "plugin":
                     self.plugins.append(node)
                     if MOTOR.search(node.attributes.get("filename", "")):
@@ -91,25 +95,29 @@ class _Parts:
         if name in self.links:
             raise node.error(f"a second link is named {name}; rename one")
 
-    def _include(self, node: Node, scope: str, depth: int) -> None:
+    def _include(self, node: Node, scope: str, own: str, depth: int) -> None:
         file = _included(node)
         self.files[file] = None
         model = _model_of(read_xml(file))
+        placed = (node if node.first("pose") else model), scope, own, own
         if node.attributes.get("merge", "false") in ("true", "1"):
-            self._add(model, scope, depth + 1)
+            # Its parts are those of the scope, and where they are follows from a frame without a name.
+            frame = f"{scope}<include {len(self._frames)}>"
+            self._frames[frame] = placed
+            self._add(model, scope, frame, depth + 1)
             return
-        name = _text(node, "name") or model.name
-        self._frames[f"{scope}{name}::"] = (node if node.first("pose") else model), scope, scope
-        self._add(model, f"{scope}{name}::", depth + 1)
+        name = f"{scope}{_text(node, 'name') or model.name}::"
+        self._frames[name] = placed
+        self._add(model, name, name, depth + 1)
 
     def pose(self, name: str) -> Array:
         """Give the pose of a link, a joint, a frame or a nested model in the frame of the model, shape (4, 4)."""
         if name not in self._poses:
-            node, scope, usual = self._frames[name]
+            node, scope, model, usual = self._frames[name]
             self._poses[name] = None
             own = node.first("pose")
             asked = "" if own is None else own.attributes.get("relative_to", own.attributes.get("frame", ""))
-            base = usual if not asked else self._frame_named(node, scope, asked)
+            base = usual if not asked else model if asked == "__model__" else self._frame_named(node, scope, asked)
             self._poses[name] = self.pose(base) @ _pose(own)
         found = self._poses[name]
         if found is None:
@@ -117,7 +125,7 @@ class _Parts:
         return found
 
     def _frame_named(self, node: Node, scope: str, asked: str) -> str:
-        if asked in ("__model__", "world"):
+        if asked == "world":
             return scope
         for name in (scope + asked, f"{scope}{asked}::"):
             if name in self._frames:
@@ -130,9 +138,10 @@ def _included(node: Node) -> Path:
     name = uri.removeprefix("model://").removeprefix("file://")
     folders = [node.file.parent, node.file.parent.parent]
     for place in (folder / name for folder in folders if name):
-        if place.is_file():
+        # Unlike methods of a path, these take names that no system has.
+        if isfile(place):
             return place
-        sdf = sorted(place.glob("*.sdf")) if place.is_dir() else []
+        sdf = sorted(place.glob("*.sdf")) if isdir(place) else []
         model = [each for each in sdf if each.name == "model.sdf"] or sdf
         if len(model) == 1:
             return model[0]
@@ -152,7 +161,7 @@ def _pose(node: Node | None) -> Array:
         return np.eye(4)
     if node.attributes.get("rotation_format") == "quat_xyzw":
         x, y, z, *turn = (each.value for each in node.numbers(count=7))
-        return pose(of_quaternion([turn[3], *turn[:3]]), (x, y, z))
+        return pose(of_quaternion(unit(node, "its quaternion", [turn[3], *turn[:3]])), (x, y, z))
     x, y, z, *rpy = (each.value for each in node.numbers(count=6))
     degrees = node.attributes.get("degrees", "false") in ("true", "1")
     return pose(rotated([angle * (np.pi / 180 if degrees else 1.0) for angle in rpy]), (x, y, z))
@@ -257,7 +266,7 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
     if inertial is None or mass_node is None:
         notes.append(f"{link.where} states no mass, for which Gazebo takes 1 kg and moments of 1 kg m^2")
         mass = Stated(1.0, f"{link.where}: states no mass; Gazebo takes 1 kg")
-        return Body(name, mass, placed[:3, 3], np.eye(3), placed[:3, :3])
+        return Body(name, mass, placed[:3, 3], np.eye(3), placed[:3, :3], placed[:3, :3])
     stated = [inertial.first("inertia", entry) for entry in ENTRIES]
     entries = tuple(
         node.number() if node else Stated(float(index < 3), f"{link.where}: {entry} not stated; taken as Gazebo does")
@@ -265,20 +274,21 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
     )
     own = inertial.first("pose")
     place = own.numbers()[:3] if own is not None and own.text.strip() else []
-    return part_of(name, mass_node.number(), entries, placed @ _pose(own), place, inertial)
+    return part_of(name, mass_node.number(), entries, placed, _pose(own), place, inertial)
 
 
 def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inverse: Array) -> Rotor:
     name = scope + _text(plugin, "linkName")
     if name not in placed:
         raise plugin.error(f"its link {name!r} is not a part of the vehicle; correct <linkName>")
-    turning = _text(plugin, "turningDirection")
-    if turning not in ("ccw", "cw"):
-        raise plugin.error(f"turningDirection is {turning!r}; write ccw or cw")
+    turn = plugin.first("turningDirection")
+    if turn is None or turn.text.strip() not in ("ccw", "cw"):
+        raise plugin.error(f"turningDirection is {_text(plugin, 'turningDirection')!r}; write ccw or cw")
+    spin = 1 if turn.text.strip() == "ccw" else -1
     if _text(plugin, "motorType") not in ("", "velocity"):
         raise plugin.error(f"motorType is {_text(plugin, 'motorType')!r}; the plugin knows velocity alone: write that")
     found = {tag: _stated(plugin, tag) for tag in DEFAULTS}
-    for tag in ("motorConstant", "maxRotVelocity", "timeConstantUp", "timeConstantDown"):
+    for tag in ("motorConstant", "momentConstant", "maxRotVelocity", "timeConstantUp", "timeConstantDown"):
         if not found[tag].value > 0:
             raise plugin.error(f"{tag} is {found[tag].value:g}; write a number above 0")
     return Rotor(
@@ -286,7 +296,7 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
         f"{plugin.file.name} line {plugin.line}: motor plugin of {name}",
         placed[name].centre,
         (inverse @ parts.pose(name))[:3, 2],
-        1 if turning == "ccw" else -1,
+        spin,
         thrust=found["motorConstant"],
         ratio=found["momentConstant"],
         speed_max=found["maxRotVelocity"],
@@ -294,6 +304,7 @@ def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inv
         lag_down=found["timeConstantDown"],
         drag=found["rotorDragCoefficient"],
         rolling=found["rollingMomentCoefficient"],
+        turn=Stated(spin, turn.where, next(iter(turn.spans()), None)),
         node=plugin,
     )
 

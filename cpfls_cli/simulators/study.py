@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +12,18 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
 from cpfls_cli.simulators.document import Stated
-from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
+from cpfls_cli.simulators.model import GRAVITY, SimulatorModel
 
-_PROGRAMS = {"sdf": "Gazebo", "urdf": "gym-pybullet-drones", "mjcf": "MuJoCo"}
+_PROGRAMS = {
+    "sdf": "Gazebo",
+    "urdf": "gym-pybullet-drones",
+    "mjcf": "MuJoCo",
+    "rotorpy": "RotorPy",
+    "ardupilot": "ArduPilot's SITL",
+    "crazyflow": "crazyflow",
+    "crazyflie": "the Crazyflie's firmware",
+    "vehicle": "cpfls",
+}
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -22,6 +31,8 @@ _BESIDES = {
 }
 _KNOWN = ("stated", "data")
 """How sure a log has to be of its rotors to say in which order the columns are."""
+_DIRECTION, _SPIN = 0.7, 0.1
+"""Cosine from which two directions are the same, of rotors that are 45 degrees apart; what an equal spin counts."""
 
 
 class RotorLine(NamedTuple):
@@ -42,6 +53,8 @@ class VehicleOf:
     ----------
     order : tuple of int
         Which rotor of the file each rotor of the study is.
+    spins : tuple of int
+        Of the rotors of the study: those of the log where it is sure of them, else those of the file.
     warnings : tuple of str
         Where the file and the log contradict each other.
     """
@@ -52,8 +65,11 @@ class VehicleOf:
     speed_max: float | None
     where_of_speed: str
     order: tuple[int, ...]
+    spins: tuple[int, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    by_speed: bool = True
+    """Whether the speeds of the log are those that the file's thrust goes by."""
 
     @property
     def program(self) -> str:
@@ -66,16 +82,22 @@ class VehicleOf:
         return _short(self.model.centre.tolist())
 
     @property
-    def inertia(self) -> list[float]:
-        """Moments of inertia, kg m^2, and products where there are any."""
-        return _short(list(self.model.moments))
+    def inertia(self) -> list[float] | None:
+        """Moments of inertia, kg m^2, and products where there are any; None where the file states none."""
+        return _short(list(self.model.moments)) if self.model.states_inertia else None
 
     @property
     def asked(self) -> tuple[str, ...]:
         """Keys of the config that the file does not state and no log is there to state."""
         keys = [] if self.speed_max is not None else ["vehicle.rotor_speed_max_rad_s"]
         keys += [] if self.model.rotors else ["vehicle.rotors"]
-        return (*keys, *(f"vehicle.rotors.{i}.spin" for i, rotor in enumerate(self.rotors) if not rotor.spin))
+        return (*keys, *(f"vehicle.rotors.{i}.spin" for i, spin in enumerate(self.spins) if not spin))
+
+    @property
+    def turned(self) -> tuple[int, ...]:
+        """Rotors of the study that turn the other way in the file."""
+        both = zip(self.spins, self.order, strict=True)
+        return tuple(place for place, (spin, index) in enumerate(both) if spin * self.model.rotors[index].spin < 0)
 
     @property
     def lifts(self) -> float | None:
@@ -86,20 +108,23 @@ class VehicleOf:
     def rotors(self) -> list[RotorLine]:
         """The rotors, in the order of the log."""
         hubs, found = self.model.hubs, []
-        for index in self.order:
+        for index, spin in zip(self.order, self.spins, strict=True):
             rotor = self.model.rotors[index]
-            thrust = None if rotor.thrust is None else rotor.thrust.value
-            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, rotor.drag_factor))
-            found.append(
-                RotorLine(_short(hubs[index].tolist()), rotor.spin, thrust, drag, f"{rotor.name}, {rotor.where}")
-            )
+            thrust = rotor.thrust.value if rotor.thrust is not None and self.by_speed else None
+            drag = rotor.drag_factor if self.by_speed else None
+            thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, drag))
+            comment = f"{rotor.name}, {rotor.where}"
+            comment += "; it turns the other way there" if spin * rotor.spin < 0 else ""
+            found.append(RotorLine(_short(hubs[index].tolist()), spin, thrust, drag, comment))
         return found
 
     def where_of(self, quantity: str) -> str:
         """Say where a quantity of the first rotor stands."""
         rotor = self.model.rotors[self.order[0]]
         if quantity == "thrust":
-            return "not stated, for controls are thrusts" if rotor.thrust is None else rotor.thrust.where
+            if not self.by_speed:
+                return "by command, and the log has speeds"
+            return "not stated by speed" if rotor.thrust is None else rotor.thrust.where
         stated = rotor.torque or rotor.ratio
         ratio = f", {rotor.ratio.value:g} m times the thrust" if rotor.ratio is not None else ""
         return "not stated" if stated is None else f"{stated.where}{ratio}"
@@ -107,18 +132,14 @@ class VehicleOf:
     @property
     def besides(self) -> list[str]:
         """What the file states of the first rotor and the vehicle of a study does not hold."""
-        if not self.model.rotors:
-            return []
-        return list(_besides(self.model.rotors[self.order[0]]))
-
-
-def _besides(rotor: Rotor) -> Iterator[str]:
-    for name, (words, unit) in _BESIDES.items():
-        stated: Stated | None = getattr(rotor, name)
-        if stated is None:
-            continue
-        down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
-        yield f"{words} {stated.value:g} {unit}{down} ({stated.where})"
+        found = []
+        for name, (words, unit) in _BESIDES.items() if self.model.rotors else ():
+            rotor = self.model.rotors[self.order[0]]
+            stated: Stated | None = getattr(rotor, name)
+            if stated is not None:
+                down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
+                found.append(f"{words} {stated.value:g} {unit}{down} ({stated.where})")
+        return found
 
 
 def _short(values: list[float]) -> list[float]:
@@ -141,38 +162,66 @@ def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | No
             f"{model.file}: has {len(model.rotors)} rotors, and the log {logged}; give the file of the vehicle that "
             "flew"
         )
-    order, notes, warnings = tuple(range(len(model.rotors))), list[str](), list[str]()
+    usual = tuple(range(len(model.rotors)))
+    order, spins, notes, warnings = usual, tuple(rotor.spin for rotor in model.rotors), list[str](), list[str]()
     if model.rotors and airframe is not None and airframe.sure in _KNOWN:
-        order = _order(model, airframe)
-        if order != tuple(range(len(order))):
+        order, doubt = _order(model, airframe)
+        warnings += [f"{model.file}: {doubt}"] if doubt else []
+        if order != usual:
             notes.append("rotors are in the order of the log, whose motors are numbered another way than the file's")
-        warnings += _turned(model, airframe, order)
+        spins, turned = _spins(model, airframe, order)
+        warnings += turned
     speed, where = _speed(model, proposal)
     mass = model.mass_kg if mass_kg is None else mass_kg
-    return VehicleOf(model, mass_kg is not None, _short([mass])[0], speed, where, order, tuple(notes), tuple(warnings))
+    by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
+    given, short = mass_kg is not None, _short([mass])[0]
+    return VehicleOf(model, given, short, speed, where, order, spins, tuple(notes), tuple(warnings), by_speed)
 
 
-def _order(model: SimulatorModel, airframe: Airframe) -> tuple[int, ...]:
-    """Find the rotor of the file in the direction of each rotor of the log; the file's own order where none fits."""
+def _order(model: SimulatorModel, airframe: Airframe) -> tuple[tuple[int, ...], str]:
+    """Find the rotor of the file for each rotor of the log, and what is not sure of it.
+
+    They lie in the same direction from the middle; of two on one arm the spin says which is which.
+    """
+    from scipy.optimize import linear_sum_assignment
+
     hubs = model.hubs[:, :2] - model.hubs[:, :2].mean(axis=0)
     wanted = np.array([rotor.direction for rotor in airframe.rotors])
     wanted = wanted - wanted.mean(axis=0)
     lengths = np.linalg.norm(hubs, axis=1)[:, None] * np.linalg.norm(wanted, axis=1)[None]
     alike = (hubs @ wanted.T) / np.where(lengths > 0, lengths, np.inf)
-    found = alike.argmax(axis=0)
-    usual = tuple(range(len(hubs)))
-    return tuple(found.tolist()) if sorted(found.tolist()) == list(usual) else usual
-
-
-def _turned(model: SimulatorModel, airframe: Airframe, order: tuple[int, ...]) -> Iterator[str]:
-    ways = {1: "counter-clockwise", -1: "clockwise"}
-    for place, index in enumerate(order):
-        rotor, logged = model.rotors[index], airframe.rotors[place].spin
-        if rotor.spin * logged < 0:
-            yield (
-                f"{rotor.where}: {rotor.name} turns {ways[rotor.spin]} in the file and {ways[logged]} by the log "
-                f"({airframe.reason}): one of the two is wrong; the config has the file's"
+    same = np.equal.outer([rotor.spin for rotor in model.rotors], [rotor.spin for rotor in airframe.rotors])
+    order = linear_sum_assignment(-(alike + _SPIN * same).T)[1]
+    places = range(len(order))
+    if min(alike[order[place], place] for place in places) < _DIRECTION:
+        return tuple(places), "no order of its rotors fits that of the log, so they are as in the file; check it"
+    for one, other in combinations(places, 2):
+        near = min(alike[order[other], one], alike[order[one], other]) > _DIRECTION
+        if near and airframe.rotors[one].spin == airframe.rotors[other].spin:
+            return tuple(order.tolist()), (
+                f"M{one + 1} and M{other + 1} lie in the same direction and turn the same way, so which is which is a "
+                "guess; check it"
             )
+    return tuple(order.tolist()), ""
+
+
+def _spins(model: SimulatorModel, airframe: Airframe, order: tuple[int, ...]) -> tuple[tuple[int, ...], list[str]]:
+    """Give the spins of rotors, those of the log where it contradicts single ones of the file, and say so.
+
+    Where the motion has all turn the other way it may be the log whose axes are mirrored.
+    """
+    ways = {1: "counter-clockwise", -1: "clockwise"}
+    of_file, of_log_ = [model.rotors[index].spin for index in order], [rotor.spin for rotor in airframe.rotors]
+    wrong = [place for place, spin in enumerate(of_file) if spin * of_log_[place] < 0]
+    by_log = airframe.sure == "stated" or len(wrong) < len(order)
+    said = []
+    for place in wrong:
+        rotor = model.rotors[order[place]]
+        said.append(
+            f"{rotor.where}: {rotor.name} turns {ways[rotor.spin]} in the file and {ways[of_log_[place]]} by the log "
+            f"({airframe.reason}): one of the two is wrong; the config has the {'log' if by_log else 'file'}'s"
+        )
+    return tuple((its or own) if by_log else own for own, its in zip(of_file, of_log_, strict=True)), said
 
 
 def _speed(model: SimulatorModel, proposal: Proposal | None) -> tuple[float | None, str]:

@@ -102,7 +102,8 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     mass_node, inertia_node = (None if inertial is None else inertial.first(tag) for tag in ("mass", "inertia"))
     if inertial is None or mass_node is None:
         notes.append(f"{link.where} states no mass, and counts as none")
-        return part_of(link.name, Stated(0.0, f"{link.where}: states no mass"), (), placed)
+        nothing = Stated(0.0, f"{link.where}: states no mass")
+        return Body(link.name, nothing, placed[:3, 3], np.zeros((3, 3)), placed[:3, :3], placed[:3, :3])
     mass = mass_node.number("value")
     if inertia_node is None:
         raise inertial.error("has a mass and no <inertia>; write ixx to izz")
@@ -114,7 +115,7 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     )
     own = inertial.first("origin")
     place = own.numbers("xyz", 3) if own is not None and "xyz" in own.attributes else []
-    return part_of(link.name, mass, entries, placed @ _origin(own), place, inertial)
+    return part_of(link.name, mass, entries, placed, _origin(own), place, inertial)
 
 
 def _rotors(file: Path, root: Node, properties: Node, bodies: tuple[Body, ...]) -> tuple[Rotor, ...]:
@@ -127,13 +128,19 @@ def _rotors(file: Path, root: Node, properties: Node, bodies: tuple[Body, ...]) 
         )
     thrust = properties.number("kf", scale=1 / RPM**2)
     torque = properties.number("km", scale=1 / RPM**2) if "km" in properties.attributes else None
-    if not thrust.value > 0:
-        raise properties.error(f"kf is {properties.attributes['kf']}; write a number above 0")
+    for name, stated in (("kf", thrust), ("km", torque)):
+        if stated is not None and not stated.value > 0:
+            raise properties.error(f"{name} is {properties.attributes[name]}; write a number above 0")
     speed, drag = None, None
     if "thrust2weight" in properties.attributes:
         share = properties.number("thrust2weight")
         # Mass of the first link, as BaseAviary takes it.
-        most = share.value * bodies[0].mass.value * _GRAVITY / len(_SPINS)
+        most = (
+            share.value
+            * next((each.mass.value for each in bodies if each.mass.value > 0), 0.0)
+            * _GRAVITY
+            / len(_SPINS)
+        )
         words = f"{share.where}: from kf, mass and 9.8 m/s^2"
         speed = Stated(float(np.sqrt(max(most, 0.0) / thrust.value)), words)
     if "drag_coeff_xy" in properties.attributes:

@@ -13,29 +13,30 @@ from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.artifacts.gate import format_name
+from cpfls_cli.artifacts.gate import format_name, read_origin
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.models import is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
-from cpfls_cli.simulators.corrected import corrected
-from cpfls_cli.simulators.formats import is_simulator_file, read_model
+from cpfls_cli.simulators.corrected import corrected, corrected_names
+from cpfls_cli.simulators.formats import is_simulator_file
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
-from cpfls_cli.stages.init import Stated, proposed
+from cpfls_cli.stages.init import Stated, proposed, taken
+from cpfls_cli.weak_form.windows import Recording
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -50,7 +51,8 @@ ConfigArgument = Annotated[
     Path,
     typer.Argument(
         metavar="CONFIG",
-        help="Study config (YAML); or a simulator's own file (SDF, URDF, MJCF), which is corrected.",
+        help="Study config (YAML); a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow), which is "
+        "corrected; or vehicle.h5.",
         show_default=False,
     ),
 ]
@@ -87,7 +89,7 @@ class Gap:
     Gap,
     words={**WORDS, **of_diagnosis.WORDS},
     fills=Filled(PARTS),
-    study=lambda given: not is_simulator_file(given["config"]),
+    study=lambda given: not is_simulator_file(given["config"]) and not is_found(given["config"]),
 )
 def gap(
     run: Run,
@@ -98,10 +100,12 @@ def gap(
 ) -> Gap | None:
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 
-    The search adds one effect after another until nothing more can be named, so once through is all the way. Where the
-    model is a simulator's own file, a study is made of it, and the file corrected.
+    The search adds one effect after another until nothing more can be named, so once through is all the way. Of a
+    simulator's own file a study is made, and the file corrected; a vehicle that was found has its study with it.
     """
     held_out = held_out or []
+    if is_found(config):
+        model = _study_in(run, config, model)
     of_file = _study_of(run, config, [*flights, *held_out]) if is_simulator_file(config) else None
     with_numbers(run, "gap", model)
     why = "" if run.found is None else why_no_body_found(run, run.found)
@@ -131,7 +135,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file)
+        found = _with_file(run, found, of_file, split.training)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -148,10 +152,25 @@ def gap(
     return answer
 
 
+def _study_in(run: Run, file: Path, model: Path | None) -> Path:
+    """Take the study that a vehicle was found with, and the vehicle for the model."""
+    if model is not None:
+        raise InputError(f"--model {model}: {file} is the model; give one of the two, with a config for --model")
+    text = read_origin(file).config
+    run.study = stored_study(text, file)
+    run.with_config, run.config = True, run.output / _STUDY
+    run.outputs.append(run.config)
+    run.texts[run.config] = text
+    return file
+
+
 def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
-    run.take({"simulator": file})
-    stated = Stated(model=read_model(file))
+    stated = Stated(model=taken(run, file, "simulator"))
+    # Files that it includes may lie in the output folder, and none of them may be written over.
+    assert stated.model is not None, "it was just read"
+    names = corrected_names(stated.model.files).values()
+    run.outputs += [run.output / name for name in (_STUDY, *names)]
     logs = [path for path in flights if path.is_file() and not format_name(path)]
     made, _, text = proposed(run, logs, stated)
     if made.asked or made.vehicle is None:
@@ -167,10 +186,9 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf) -> Diagnosis:
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, training: Sequence[Recording]) -> Diagnosis:
     """Put what was found into the simulator's file."""
-    flights = [flight.name for flight in found.recorded.values() if flight.role == "training"]
-    said, files = corrected(of, run.study.vehicle, found, flights)
+    said, files = corrected(of, run.study.vehicle, found, training)
     run.texts.update({run.output / name: text for name, text in files.items()})
     return replace(found, corrected=said)
 

@@ -27,6 +27,7 @@ from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
 from cpfls_cli.flights.imported import imported
+from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
@@ -35,8 +36,8 @@ from cpfls_cli.report.content import Command
 from cpfls_cli.report.numbers import number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
-from cpfls_cli.simulators.formats import read_model
-from cpfls_cli.simulators.model import SimulatorModel
+from cpfls_cli.simulators.formats import file_of, read_model
+from cpfls_cli.simulators.model import SimulatorModel, of_settings
 from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -59,7 +60,8 @@ FromOption = Annotated[
     typer.Option(
         "--from",
         metavar="MODEL",
-        help="A simulator's own file, whose vehicle the config gets: SDF, URDF or MJCF.",
+        help="A simulator's own file, whose vehicle the config gets (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow, "
+        "Crazyflie), or vehicle.h5.",
         show_default=False,
     ),
 ]
@@ -111,9 +113,7 @@ class Stated:
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
-    """List the keys of the config that only a person can fill in; not those of rotors that a simulator's file has."""
-    if stated.model is not None and stated.model.rotors:
-        return ()
+    """List the keys of the config of logs that only a person can fill in."""
     keys = [] if stated.mass_kg is not None or stated.model is not None else ["vehicle.mass_kg"]
     airframe = proposal.airframe
     if not proposal.rotors:
@@ -141,9 +141,9 @@ class Proposed:
     @cached_property
     def asked(self) -> tuple[str, ...]:
         """Keys of the config that only a person can fill in."""
-        if self.proposal is not None:
-            return asked_keys(self.proposal, self.stated)
-        return () if self.vehicle is None else self.vehicle.asked
+        if self.vehicle is not None and (self.vehicle.model.rotors or self.proposal is None):
+            return self.vehicle.asked
+        return () if self.proposal is None else asked_keys(self.proposal, self.stated)
 
     @property
     def edits(self) -> str:
@@ -282,8 +282,7 @@ def init(
         raise InputError("Missing argument 'LOG...': give logs, or a simulator's file by --from, or both")
     file = None
     if model is not None:
-        run.take({"model": model})
-        file = read_model(model)
+        file = taken(run, model, "model")
         _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
     stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
@@ -295,6 +294,17 @@ def init(
         # A config that asks for something is refused by every command until it is filled in.
         run.next += _next(run, proposal, given) if not made.asked else ()
     return made
+
+
+def taken(run: Run, model: Path, role: str) -> SimulatorModel:
+    """Read a simulator's file, which is an input of the run with all that it includes, or a vehicle that was found."""
+    run.take({role: file_of(model)})
+    if is_found(model):
+        found = found_vehicle(model).model
+        return of_settings(model, found.vehicle, found.response.lag_s)
+    read = read_model(model)
+    run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
+    return read
 
 
 def _refuse_stated(file: SimulatorModel, *given: object) -> None:
@@ -337,7 +347,8 @@ def proposed(
     text, whole = config_text(made), not made.asked
     if whole and stated.knows_constants:
         # Numbers that the log's rotors make impossible, such as a thrust that lifts nothing.
-        validate(parse_config(text, str(run.output)), str(run.output))
+        name = str(run.output) if model is None else f"{model.file}, as a config"
+        validate(parse_config(text, name), name)
     if proposal is None:
         return made, given, text
     wrong, doubted = _parted(_findings(text, given[0], whole=whole), guessed_keys(proposal))

@@ -74,3 +74,95 @@ def write_log(path, flight):
     parts = [motion.position, motion.velocity, euler_angles(motion.rotation), motion.rate, 30 / np.pi * flight.speed]
     parts += [flight.setpoints[name] for name in ("position", "velocity", "attitude")]
     np.savetxt(path, np.column_stack([time, *parts]), delimiter=",", header=COLUMNS, comments="", fmt="%.9g")
+
+
+ROTORPY = """#!/usr/bin/env python3
+'''Mine.'''
+import numpy as np
+
+grams = {grams:.8g}
+d = {arm:.10g}  # Arm length, \u00e4hnlich
+side = d * np.cos(np.pi / 4)
+spins = np.array([-1, 1, -1, 1])
+
+quad_params = {{
+    'mass': grams / 1000, 'Ixx': {x:.8g}, 'Iyy': {y:.8g}, 'Izz': {z:.8g},   # kg m^2
+    'Ixy': 0.0, 'Ixz': 0.0, 'Iyz': 0,
+    'num_rotors': 4,
+    'rotor_pos': {{
+        'r1': np.array([side, -side, 0]),
+        'r2': d * np.array([-0.5**0.5, -0.5**0.5, 0]),
+        'r3': [-side, side, 0.],
+        'r4': np.array([side, side, 0.0]),
+    }},
+    'rotor_directions': -spins,
+    'k_eta': {thrust:.8g},  # from a data sheet
+    'k_m': {drag:.8g}, 'k_d': 0.0, 'tau_m': 0.02,
+    'rotor_speed_min': 0, 'rotor_speed_max': 6000.0, 'name': "mine", 'aero': True,
+}}
+"""
+
+
+def rotorpy_of(truth, *, thrust=1.0):
+    """RotorPy's dictionary for a vehicle, with a thrust that is so many times the true one."""
+    x, y, z = truth.inertia
+    return ROTORPY.format(
+        grams=1e3 * truth.mass,
+        arm=float(np.linalg.norm(truth.places[0])),
+        x=x,
+        y=y,
+        z=z,
+        thrust=thrust * truth.thrust_factor,
+        drag=thrust * truth.drag_factor,
+    )
+
+
+SECTION = """[{name}]  # mine
+gravity_vec = [0.0, 0.0, -9.81]
+mass = 0.0319
+L = 0.0325
+J = [  # TODO
+    [16.8e-6, 0.0, 0.0],
+    [0.0, 16.8e-6, 0.0],
+    [0.0, 0.0, 29.8e-6]
+]
+rpm2thrust = [0.0, -5.4e-7, 2.5e-10]
+rpm2torque = [0.0, 1.4e-9, 1.5e-12] # Index is order
+rotor_dyn_coef = [ 7.4, 0.0, 0.0, 0.00024,]
+mixing_matrix = [[-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, 1.0, -1.0], [-1.0, 1.0, -1.0, 1.0]]
+drag_matrix = [[-0.0147, 0.0, 0.0], [0.0, -0.0147, 0.0], [0.0, 0.0, -0.0128]]
+pwm_max = 65535
+thrust_max = 0.12  # N per motor
+
+"""
+FRAME = """# A frame.
+{
+    "mass": 1.5,   # kg
+    "diagonal_size": 0.45,
+    "hoverThrOut": 0.31, "propExpo": 0.5,
+    "spin_min": 0.2, "spin_max": 0.975,
+    "num_motors": 4
+}
+"""
+HEADER = """/* Platform.
+   #define CF_MASS 1.0f */
+#define ARM_LENGTH  0.046f
+#if defined(CONFIG_KIT_MASS) && (CONFIG_KIT_MASS >= 0)
+    #define CF_MASS (CONFIG_KIT_MASS / 1000000.0f)
+#elif defined(CONFIG_CRAZYFLIE_THRUST_UPGRADE_KIT)
+    #define CF_MASS 0.0325f
+#else
+    #define CF_MASS 0.029f  // kg
+#endif
+#ifdef CONFIG_ENABLE_THRUST_BAT_COMPENSATED
+  #if defined(CONFIG_CRAZYFLIE_21_PLUS)
+    #define THRUST_MAX 0.12f
+    #define THRUST2TORQUE 0.007f
+  #else
+    #define THRUST_MAX 0.18f
+    #define THRUST2TORQUE 0.005f
+  #endif
+#endif
+#define NAME "cf2"
+#define LIMIT(x) ((x) > 0)
+"""

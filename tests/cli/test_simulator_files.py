@@ -1,6 +1,7 @@
 """`cpfls init --from` and `cpfls gap` with a simulator's own file: what they write, and what they never touch."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -53,6 +54,7 @@ def test_rotors_that_turn_the_other_way_in_the_log_are_named(cpfls, folder, tmp_
     result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert result.exit_code == 0, result.stderr
     assert "rotor_3 turns clockwise in the file and counter-clockwise by the log" in result.stderr
+    assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
 
 
 def test_a_file_of_another_vehicle_is_refused(refuse, folder, tmp_path):
@@ -133,3 +135,56 @@ def test_a_file_without_rotors_takes_those_of_the_log(cpfls, folder, tmp_path):
     vehicle = load_study(output).vehicle
     assert vehicle.unknown == ("drag_factor", "thrust_factor")
     np.testing.assert_allclose([r.position_m[:2] for r in vehicle.rotors], TRUE.places, atol=1e-4)
+
+
+def test_an_included_file_in_the_output_folder_is_never_written_over(cpfls, folder, tmp_path):
+    """The corrected include would have its name: refused before anything is computed, even with --force."""
+    text = (folder / "mine.sdf").read_text()
+    body, plugins = (
+        tmp_path / "gap" / "body.sdf",
+        "".join(re.findall(r" *<plugin.*?</plugin>\n", text, flags=re.DOTALL)),
+    )
+    body.parent.mkdir()
+    body.write_text(re.sub(r" *<plugin.*?</plugin>\n", "", text, flags=re.DOTALL))
+    mine = tmp_path / "mine.sdf"
+    include = "<include merge='true'><uri>gap/body.sdf</uri></include>"
+    mine.write_text(f"<sdf version='1.9'><model name='mine'>{include}\n{plugins}</model></sdf>")
+    before = body.read_bytes()
+    words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path / "gap", "--force")
+    for added in ((), ("--dry-run",)):
+        result = cpfls(*words, *added)
+        assert result.exit_code == 2
+        assert "body.sdf: is an input of this command" in result.stderr
+        assert [path.name for path in body.parent.iterdir()] == ["body.sdf"]
+    result = cpfls("init", "--from", mine, "-o", body, "--force")
+    assert "body.sdf: is an input of this command" in result.stderr
+    assert body.read_bytes() == before
+
+
+ROUND = """<mujoco><worldbody><body name="b"><freejoint/>
+  <inertial pos="0 0 0" mass="0.045" diaginertia="3.7e-5 4.2e-5 6.6e-5"/>
+  <site name="s0" pos="0.03 -0.03 0"/><site name="s1" pos="-0.03 -0.03 0"/>
+  <site name="s2" pos="-0.03 0.03 0"/><site name="s3" pos="0.03 0.03 0"/></body></worldbody>
+  <actuator><motor site="s0" gear="0 0 1 0 0 0"/><motor site="s1" gear="0 0 1 0 0 -.006"/>
+  <motor site="s2" gear="0 0 1 0 0 .006"/><motor site="s3" gear="0 0 1 0 0 -.006"/></actuator></mujoco>"""
+
+
+def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_path):
+    """The first actuator turns nothing: its spin is that of a log that is sure of it, and else asked for."""
+    mine = tmp_path / "mine.xml"
+    mine.write_text(ROUND)
+    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
+    assert result.exit_code == 0, result.stderr
+    assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
+    # Rotors of another time say nothing of the motion.
+    header, *rows = (folder / "log0.csv").read_text().splitlines()
+    mixed = [
+        ",".join([*row.split(",")[:13], *late.split(",")[13:]]) for row, late in zip(rows, rows[::-1], strict=True)
+    ]
+    (tmp_path / "mixed.csv").write_text("\n".join([header, *mixed]))
+    result = cpfls("init", "--from", mine, tmp_path / "mixed.csv", "-o", tmp_path / "asked.yaml", "--json")
+    assert json.loads(result.stdout)["asked"] == ["vehicle.rotors.0.spin"]
+    assert "spin: ASK" in (tmp_path / "asked.yaml").read_text()
+    (message,) = refuse("gap", mine, tmp_path / "mixed.csv", "-o", tmp_path / "gap")
+    assert "does not state all that a gap needs; `cpfls init --from" in message
+    assert "write spin of M1 in place of ASK" in message

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.config.load import read_config
+from cpfls_cli.config.load import load_study, read_config
 from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
@@ -135,6 +135,25 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
     assert "Not shown, because" not in text
+
+
+def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_path):
+    """Its study is that which it was found with, so no config has to be given with it."""
+    apart = ("--held-out", flights[1])
+    said = cpfls.told("gap", found.output, flights[0], *apart, "-o", tmp_path / "alone")
+    with_config = cpfls.told("gap", config, flights[0], *apart, "--model", found.output, "-o", tmp_path / "both")
+    assert said["effects"] == with_config["effects"]
+    assert said["verdict"] == with_config["verdict"]
+    assert load_study(tmp_path / "alone" / "study.yaml").vehicle == load_study(config).vehicle
+    (message,) = refuse("gap", found.output, flights[1], "--model", found.output, "-o", tmp_path / "gap")
+    assert "is the model; give one of the two" in message
+    cpfls.done("init", "--from", found.output, "-o", tmp_path / "again.yaml")
+    vehicle, own = load_study(tmp_path / "again.yaml").vehicle, found.record.model.vehicle
+    np.testing.assert_allclose(vehicle.inertia_kg_m2, own.inertia_kg_m2[: len(vehicle.inertia_kg_m2)], rtol=1e-9)
+    for made, rotor in zip(vehicle.rotors, own.rotors, strict=True):
+        assert made.thrust_factor_n_s2 == pytest.approx(rotor.thrust_factor_n_s2, rel=1e-9)
+        assert made.drag_factor_n_m_s2 == pytest.approx(rotor.drag_factor_n_m_s2, rel=1e-9)
+        assert (made.spin, made.position_m) == (rotor.spin, pytest.approx(rotor.position_m))
 
 
 @pytest.mark.parametrize("along", [1, 0], ids=["held out", "another flight"])

@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
-from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
-from tests.builders.simulator_files import sdf_of, write_log
+from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
+from tests.builders.simulator_files import rotorpy_of, sdf_of, write_log
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
@@ -25,15 +26,30 @@ def logs(tmp_path_factory):
     return paths
 
 
-def corrected(folder, logs, **wrong):
-    mine = folder / "mine.sdf"
-    mine.write_text(sdf_of(TRUE, **wrong))
+MJCF = """<mujoco model="mine"><custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>
+  <worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
+  {sites}</body></worldbody><actuator>{motors}</actuator></mujoco>
+"""
+
+
+def mjcf_of(truth, spins):
+    """MJCF of what flies, whose controls are squared speeds."""
+    sites = "\n  ".join(f'<site name="s{i}" pos="{x:.9g} {y:.9g} 0"/>' for i, (x, y) in enumerate(truth.places))
+    gears = [f"0 0 {truth.thrust_factor:g} 0 0 {-spin * truth.drag_factor:g}" for spin in spins]
+    motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
+    inertia = " ".join(f"{each:g}" for each in truth.inertia)
+    return MJCF.format(mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
+
+
+def corrected(folder, logs, text="", ending="sdf", **wrong):
+    mine = folder / f"mine.{ending}"
+    mine.write_text(text or sdf_of(TRUE, **wrong))
     before = mine.read_bytes()
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", folder / "gap", "--json")
     result = command_line.run(*words)
     assert result.exit_code == 0, result.stderr
     assert mine.read_bytes() == before
-    return json.loads(result.stdout), read_model(folder / "gap" / "mine.sdf")
+    return json.loads(result.stdout), read_model(folder / "gap" / mine.name)
 
 
 def test_a_thrust_17_percent_too_large(tmp_path, logs):
@@ -57,7 +73,53 @@ def test_an_inertia_20_percent_too_small(tmp_path, logs):
     assert {rotor.thrust.value for rotor in new.rotors} == {TRUE.thrust_factor}
 
 
+@pytest.mark.parametrize(
+    ("ending", "spins"), [("sdf", (-1, 1, -1, -1)), ("xml", (1, 1, -1, 1)), ("sdf", (1, -1, -1, 1))]
+)
+def test_rotors_that_turn_the_other_way(tmp_path, logs, ending, spins):
+    """One of them, or two of different spins, which roll and pitch would not show."""
+    text = sdf_of(TRUE, spins=spins) if ending == "sdf" else mjcf_of(TRUE, spins)
+    said, new = corrected(tmp_path, logs, text, ending)
+    turned = [index for index in range(4) if spins[index] != SPINS[index]]
+    assert said["verdict"] == "NO_GAP"
+    assert [change["element"] for change in said["corrected"]["changes"]] == [
+        "turningDirection" if ending == "sdf" else "gear yaw"
+    ] * len(turned)
+    for index, change in zip(turned, said["corrected"]["changes"], strict=True):
+        assert change["sentence"].startswith(f"M{index + 1} turns {'counter-' if SPINS[index] > 0 else ''}clockwise")
+        assert change["after"] == -change["before"]
+        # A share of the mean, which is 1 where all rotors are alike.
+        assert change["low"] < change["after"] < change["high"]
+    assert [rotor.spin for rotor in new.rotors] == list(SPINS)
+    np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], TRUE.drag_factor)
+
+
 def test_a_file_that_is_right_stays(tmp_path, logs):
     said, _ = corrected(tmp_path, logs)
     assert said["corrected"]["changes"] == []
     assert (tmp_path / "gap" / "mine.sdf").read_bytes() == (tmp_path / "mine.sdf").read_bytes()
+
+
+def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
+    """RotorPy's dictionary, whose other numbers and text stay as they are."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(rotorpy_of(TRUE, thrust=1 / 0.83))
+    result = command_line.run("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", tmp_path / "gap", "--json")
+    assert result.exit_code == 0, result.stderr
+    (change,) = json.loads(result.stdout)["corrected"]["changes"]
+    assert change["element"] == "quad_params.k_eta"
+    assert change["low"] < TRUE.thrust_factor < change["high"]
+    before, after = mine.read_text().splitlines(), (tmp_path / "gap" / "mine.py").read_text().splitlines()
+    assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")
+    (differs,) = [pair for pair in zip(before[1:], after[3:], strict=True) if pair[0] != pair[1]]
+    assert differs[1] == f"    'k_eta': {change['after']:.4g},  # from a data sheet"
+
+
+def test_turns_of_single_rotors_have_their_intervals():
+    """Thirty times three flights in gusts: each rotor by itself is one of four that are alike."""
+    asked = [Flight(TRUE, GUSTS, path=run, draw=run, reach=3.0, swing=0.3) for run in range(90)]
+    flown = [(each.motion.rate, each.speed, 1 / each.motion.period, False) for each in gusty_flights(asked, 30.0)]
+    turns, half = np.transpose([turns_by_rotors(flown[first : first + 3]) for first in range(0, 90, 3)], (1, 0, 2))
+    # The body turns against its rotors.
+    assert (-turns * SPINS > half).all()
+    assert 0.9 <= (np.abs(-turns * SPINS - 1) < half).mean() <= 0.98

@@ -3,6 +3,9 @@
 import pytest
 
 from cpfls_cli.flightlog.names import column_groups, named_signals
+from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL
+from cpfls_cli.flightlog.vocabulary import ALLOWED, IN_RADIANS, KNOWN, MEANINGS, RANGES, sizes
+from cpfls_cli.units import KNOWN_UNITS
 
 
 def first(names, signal, system=""):
@@ -104,3 +107,17 @@ def test_events_of_a_card_stand_before_the_names_of_a_crazyflie():
 @pytest.mark.parametrize("signal", ["velocity", "acceleration"])
 def test_what_turns_is_no_translation(signal):
     assert first("ang_vel_x ang_vel_y ang_vel_z ang_acc_x ang_acc_y ang_acc_z", signal) is None
+
+
+def test_rows_of_the_table_fit_their_signals():
+    """A slip in `columns.toml` is found before a log meets it: units of another kind, signs or words that are none."""
+    for row in (own for own in KNOWN if own.signal in UNITS_OF_SIGNAL):
+        assert row.unit is None or KNOWN_UNITS[row.unit].si in UNITS_OF_SIGNAL[row.signal], row
+        assert row.sign is None or len(row.sign) in (len(row.columns), 3), row
+        assert row.frame in (None, "FLU", "FRD", "ENU", "NED"), row
+    assert {own.signal for own in MEANINGS} | set(ALLOWED) | {
+        signal for own in IN_RADIANS.values() for signal in own
+    } <= set(UNITS_OF_SIGNAL)
+    assert {kind for own in MEANINGS for kind in own.kinds} <= {"xyz", "wxyz", "angles", "numbers", "one"}
+    assert {own.clear for own in RANGES} == {"always", "of commands", "never"}
+    assert all(sizes(of) for of in ("body_rate", "attitude", "sensed", "over_ground"))

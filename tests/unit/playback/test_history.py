@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.playback.fit import Fitted, windows_of
+from cpfls_cli.playback.fit import Fitted, side_by_side, windows_of
 from cpfls_cli.playback.history import Observer, past_of
 from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, fit_observer
 from cpfls_cli.playback.model import VehicleModel
@@ -115,7 +115,8 @@ def gusty():
 def test_the_gradient_of_the_observer_is_the_difference_quotient(gusty):
     flights, fitted = gusty
     at, windows = _vehicle(fitted), windows_of(flights[:1], 0.3, 1.0)
-    begun, values = [_Begun.of(at, each, 0.2) for each in windows], np.log([[20.0, 0.2], [8.0, 0.4]] * 2).ravel()
+    begun = [_Begun.of(at, each, 0.2) for each in side_by_side(windows)]
+    values = np.log([[20.0, 0.2], [8.0, 0.4]] * 2).ravel()
     found = _point(at, begun, 0.2, values)
     steps = 1e-4 * np.eye(len(values))
     slopes = [

@@ -35,18 +35,19 @@ def somewhere(free, seed=0):
     return np.clip(free.starts + away, free.lows, free.highs)
 
 
+@pytest.mark.parametrize("every", [1, 2], ids=["steps of a sample", "steps of two"])
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules):
+def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules, every):
     free = numbers(STATED, blocks_of(STATED), rules)
     values, scale = somewhere(free), free.scales
-    starts = flight.starts(20, 40)
-    windows = WindowSet((FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20))),))
+    starts, steps = flight.starts(20, 40), 20 // every
+    windows = WindowSet((FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, steps, every)), every),))
     (((gradient,), _),) = windows.derivatives(free, values, [np.zeros(len(starts), dtype=np.int64)])
     gradient = gradient * scale
     step = 1e-5
     for place, number in enumerate(free.numbers):
         moved = step * scale[place] * np.eye(len(values))[place]
-        ahead, behind = (windows.losses(free, v)[0] for v in (values + moved, values - moved))
+        ahead, behind = (windows.errors(free, v)[0].sum() for v in (values + moved, values - moved))
         assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
 
 

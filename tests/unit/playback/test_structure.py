@@ -8,13 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
+from cpfls_cli.playback.fit import fit, window_errors
+from cpfls_cli.playback.flight import motion_at
 from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
+from cpfls_cli.playback.windows import Loss
 from cpfls_cli.search.vehicle_search import KeptStructure
-from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
+from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
 QUICK = PlaybackSettings(
@@ -208,3 +212,36 @@ def test_parts_are_flights_or_pieces_of_a_single_one(flights):
     assert [[windows.flight.name for windows in part] for part in parts] == [[each.name] for each in flights]
     first, second = (part[0].starts for part in parts_of(flights[:1], QUICK))
     assert first[-1] + 50 < second[0]
+
+
+def test_a_flight_of_one_window_is_too_short_to_be_judged(flights):
+    motion, speed = flights[0].motion, flights[0].speed
+    short = replace(flights[0], motion=motion_at(motion, slice(55)), speed=speed[:55], stretches=(slice(0, 55),))
+    with pytest.raises(InputError, match=r"figure-2-0: too short for a horizon of 0\.5 s to be judged"):
+        parts_of([short], QUICK)
+
+
+def test_flights_that_show_nothing_that_is_predicted_are_refused(flights):
+    motion = flights[0].motion
+    unseen = replace(flights[0], motion=motion._replace(rate=0.0 * motion.rate), has_attitude=False)
+    with pytest.raises(InputError, match="figure-2-0: no body rate changes, and no attitude was measured"):
+        parts_of([unseen, flights[1]], QUICK)
+
+
+def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
+    """Structures are compared by them, with nearly the same errors."""
+    fast = flown(truth(), ("figure", "steps"), duration_s=5.0, rate_hz=500.0, noise=MIDDLING, seed=2)
+    windows = [each for part in parts_of(fast, QUICK) for each in part]
+    assert [each.every for each in windows] == [5, 5]
+    free = Structure(TRUE_BLOCKS).free(STATED)
+    found = fit(free, windows, {}, 12, 1e-3)
+
+    def of_all_samples(each):
+        # Errors count at the ends of the longer steps alone.
+        weight, delta = (np.repeat(one, 5, axis=0) for one in each.loss)
+        weight[np.arange(len(weight)) % 5 != 4] = 0.0
+        return replace(each, loss=Loss(weight, delta), every=1)
+
+    coarse, fine = (window_errors(found, own) for own in (windows, [of_all_samples(each) for each in windows]))
+    assert np.concatenate(coarse) == pytest.approx(np.concatenate(fine), rel=0.05)
+    assert np.concatenate(coarse).mean() == pytest.approx(np.concatenate(fine).mean(), rel=0.005)

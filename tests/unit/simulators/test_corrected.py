@@ -1,19 +1,20 @@
 """A simulator's file corrected: what flights contradict is replaced, and not one byte besides."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NotExcited
-from cpfls_cli.simulators.corrected import corrected
+from cpfls_cli.simulators.corrected import corrected, corrected_names
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.study import of_log
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_artifacts import named_effect
 from tests.builders.gusty_flights import SMALL
-from tests.builders.simulator_files import sdf_of
+from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of
 
 URDF = """<robot name="cf2">
   <properties arm="0.046" kf="{kf}" km="1.3e-12" thrust2weight="3" drag_coeff_xy="1e-7"/>
@@ -25,6 +26,9 @@ PROP = """  <link name="prop{index}_link"><inertial><origin xyz="{x} {y} 0"/><ma
     <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
   <joint name="prop{index}_joint" type="fixed"><parent link="base_link"/><child link="prop{index}_link"/></joint>
 """
+
+
+ONE, TWO = (SimpleNamespace(name=f"{name}.csv", signals=None) for name in ("one", "two"))
 
 
 def urdf():
@@ -41,9 +45,9 @@ def effect(name, **values):
     return named_effect(name, numbers=[number(key, *np.atleast_1d(value)) for key, value in values.items()])
 
 
-def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(), hidden=()):
+def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(), hidden=(), vehicle=None):
     of = of_log(read_model(path), None, None)
-    vehicle = VehicleSettings(
+    vehicle = vehicle or VehicleSettings(
         mass_kg=of.mass_kg,
         inertia_kg_m2=tuple(of.model.moments[:3]),
         rotors=tuple(
@@ -62,7 +66,7 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(),
     found = SimpleNamespace(
         verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects, not_excited=hidden
     )
-    said, files = corrected(of, vehicle, found, ["one.csv", "two.csv"])
+    said, files = corrected(of, vehicle, found, [ONE, TWO])
     (path.parent / "new").mkdir(exist_ok=True)
     for name, content in files.items():
         (path.parent / "new" / name).write_bytes(content)
@@ -76,10 +80,13 @@ def mine(tmp_path):
     return path
 
 
-def rest(path):
-    """All of a file but its numbers and the comment that was put in."""
-    text = path.read_bytes().decode()
-    return re.sub(r"[-+]?\d[\d.e+-]*", "#", re.sub(r"<!-- Corrected.*?-->\r?\n", "", text, flags=re.DOTALL))
+def replaced(path):
+    """What differs in the corrected file, which is numbers alone but for the comment: each before and after."""
+    given, new = (file.read_bytes().decode() for file in (path, path.parent / "new" / path.name))
+    new = re.sub(r"<!-- Corrected.*?-->\r?\n", "", new, count=1, flags=re.DOTALL)
+    (*before,), (*after,) = (re.split(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)", text) for text in (given, new))
+    assert before[::2] == after[::2]
+    return [(own, its) for own, its in zip(before[1::2], after[1::2], strict=True) if own != its]
 
 
 def test_thrust_alone_leaves_the_inertia(mine):
@@ -97,7 +104,7 @@ def test_thrust_alone_leaves_the_inertia(mine):
         assert rotor.thrust.value == pytest.approx(0.83 * SMALL.thrust_factor, rel=1e-3)
     np.testing.assert_allclose(new.inertia, read_model(mine).inertia, rtol=1e-12)
     assert mine.read_bytes() == before
-    assert rest(mine) == rest(mine.parent / "new" / mine.name)
+    assert replaced(mine) == [("2e-08", "1.66e-08")] * 4
     assert "-      <motorConstant>2e-08</motorConstant><!-- from a data sheet -->" in said.diff
     assert "+      <motorConstant>1.66e-08</motorConstant><!-- from a data sheet -->" in said.diff
 
@@ -207,7 +214,7 @@ def test_line_ends_and_comments_stay(mine):
     mine.write_bytes(mine.read_bytes().replace(b"\n", b"\r\n").replace(b"<mass>", b"<mass><!-- kg --> ", 1))
     correct(mine, effect("parameter_error", inertia_x=0.2, thrust_scale=-0.17))
     new = (mine.parent / "new" / mine.name).read_bytes()
-    assert rest(mine) == rest(mine.parent / "new" / mine.name)
+    assert [own for own, _ in replaced(mine)] == ["2e-08"] * 4
     assert new.count(b"\n") == new.count(b"\r\n")
 
 
@@ -218,11 +225,51 @@ def test_attributes_of_urdf(tmp_path):
     look = 1 / 0.83 - 1
     wrong = effect("parameter_error", inertia_x=look, inertia_y=0.445, inertia_z=(0.0, 0.004), thrust_scale=-0.17)
     said, new = correct(path, wrong, effect("motor_lag", time_constant_s=(0.03, 0.002)))
-    assert [each.element for each in said.changes] == ["kf", "iyy"]
+    assert [each.element for each in said.changes] == ["kf", "thrust2weight", "iyy"]
     assert new.rotors[0].thrust.value == pytest.approx(0.83 * SMALL.thrust_factor, rel=1e-3)
     np.testing.assert_allclose(np.diag(new.inertia), [3.7e-5, 1.2 * 4.2e-5, 6.6e-5], rtol=2e-3)
     assert said.elsewhere[0].startswith("motor lag: ")
-    assert rest(path) == rest(path.parent / "new" / path.name)
+    assert [after for _, after in replaced(path)] == [
+        f"{new.rotors[0].thrust.scale * 1.66e-8:.4g}",
+        "2.49",
+        "5.037e-05",
+    ]
+    # Rotors turn as fast as before.
+    assert new.speed_max.value == pytest.approx(read_model(path).speed_max.value, rel=1e-3)
+
+
+def test_one_number_for_rotors_that_differ_takes_what_is_common(tmp_path):
+    path = tmp_path / "cf2x.urdf"
+    path.write_text(urdf())
+    uneven = effect(
+        "rotor_mismatch", difference_1=(0.1, 0.001), difference_2=0.0, drag_imbalance=0.0, lift_imbalance=0.0
+    )
+    said, _ = correct(path, uneven)
+    assert (said.changes, said.diff) == ((), "")
+    kf, km = said.unchanged[:2]
+    assert kf.startswith(
+        "kf is one number for all rotors, and the flights have another for each: M1 2.303e-10, M2 2.193e-10"
+    )
+    assert km.startswith(
+        "km is one number for all rotors, and the flights have another for each: M1 1.365e-12, M2 1.3e-12"
+    )
+    scale = effect("parameter_error", inertia_x=1 / 0.83 - 1, inertia_y=1 / 0.83 - 1, thrust_scale=(-0.17, 0.001))
+    said, new = correct(path, scale, uneven)
+    assert [each.element for each in said.changes] == ["kf", "thrust2weight"]
+    assert new.rotors[0].thrust.value == pytest.approx(0.83 * SMALL.thrust_factor, rel=1e-3)
+    assert said.unchanged[0].startswith("kf is one number for all rotors")
+
+
+def test_what_urdf_without_km_cannot_hold_is_listed(tmp_path):
+    path = tmp_path / "cf2x.urdf"
+    path.write_text(urdf().replace('km="1.3e-12" ', ""))
+    said, _ = correct(path, effect("drag_factor_error", error=(0.3, 0.02)), vehicle=SMALL.vehicle)
+    assert said.elsewhere == (
+        "yaw torque over thrust, as a factor on that which flights were compared with: all rotors 1.3 [1.28, 1.32]; "
+        "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
+        "forces and torques that you apply",
+    )
+    assert not any("nothing" in each for each in said.unchanged)
 
 
 MJCF = """<mujoco model="cf2">
@@ -245,9 +292,232 @@ def test_inertia_and_centre_of_mjcf(tmp_path):
         effect("rotor_drag", k_d=(1e-5, 1e-6)),
     )
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, vehicle, found, ["one.csv"])
+    said, files = corrected(of, vehicle, found, [ONE])
     (new,) = files.values()
     assert b'pos="0.002 0 0" mass="0.045" diaginertia="4.438e-05 4.2e-5 6.6e-5"/> <!-- by CAD -->' in new
     assert [each.element for each in said.changes] == ["ixx", "pose x"]
-    assert said.elsewhere[0].startswith("thrust of all rotors is 0.83 [0.825, 0.835] times that of the file")
+    assert said.elsewhere[0].startswith(
+        "thrust, as a factor on that which flights were compared with: all rotors 0.83 [0.825, 0.835]; controls"
+    )
     assert said.elsewhere[1].startswith("rotor drag (H-force): ")
+
+
+GEARS = """<mujoco model="cf2">
+  <custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>
+  <worldbody><body name="cf2"><freejoint/>
+    <inertial pos="0 0 0" mass="0.045" diaginertia="3.7e-5 4.2e-5 6.6e-5"/>
+    <site name="s0" pos="0.03 -0.03 0"/><site name="s1" pos="-0.03 -0.03 0"/>
+    <site name="s2" pos="-0.03 0.03 0"/><site name="s3" pos="0.03 0.03 0"/></body></worldbody>
+  <actuator><general name="m0" site="s0" gear="0 0 1 0 0 .006" gainprm="2e-8"/>
+    <general name="m1" site="s1" gear="0 0 1 0 0 -.006" gainprm="2e-8"/>
+    <general name="m2" site="s2" gear="0 0 2e-8 0 0 1.2e-10"/>
+    <general name="m3" site="s3" gear="0 0 1 0 0 -.006" gainprm="2e-8"/></actuator>
+</mujoco>
+"""
+
+
+def test_gear_of_mjcf_is_thrust_and_yaw_torque(tmp_path):
+    """Controls are squared speeds: the thrust in the third number, the torque in the sixth, each by its gain."""
+    path = tmp_path / "cf2.xml"
+    path.write_text(GEARS)
+    look = 1 / 0.83 - 1
+    wrong = effect("parameter_error", inertia_x=look, inertia_y=look, inertia_z=0.0, thrust_scale=-0.17)
+    said, new = correct(path, wrong, effect("drag_factor_error", error=0.25))
+    gears = [("1", "0.83"), (".006", "0.0075"), ("1", "0.83"), ("-.006", "-0.0075"), ("2e-8", "1.66e-08"),
+             ("1.2e-10", "1.5e-10"), ("1", "0.83"), ("-.006", "-0.0075")]  # fmt: skip
+    assert replaced(path) == gears
+    np.testing.assert_allclose([rotor.thrust.value for rotor in new.rotors], 1.66e-8)
+    np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], 1.5e-10)
+    assert [rotor.spin for rotor in new.rotors] == [-1, 1, -1, 1]
+    assert said.elsewhere == ()
+    assert all(change.low < change.after < change.high for change in said.changes)
+    assert [change.sentence for change in said.changes if change.before == 1] == [
+        "thrust of M1, M2 and M4 is 17 % less"
+    ]
+
+
+def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
+    path = tmp_path / "cf2.xml"
+    path.write_text(GEARS)
+    said, new = correct(path, effect("rotor_mismatch", difference_1=(0.1, 0.001), difference_2=0.0, drag_imbalance=0.0))
+    assert replaced(path) == [("1", "1.05"), (".006", "0.0063"), ("2e-8", "1.9e-08"), ("1.2e-10", "1.14e-10")]
+    assert [each.element for each in said.changes] == ["gear z", "gear z", "gear yaw", "gear yaw"]
+    np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], [1.26e-10, 1.2e-10, 1.14e-10, 1.2e-10])
+
+
+def test_a_filter_of_mjcf_is_the_lag(tmp_path):
+    path = tmp_path / "cf2.xml"
+    path.write_text(GEARS.replace("<general ", '<general dyntype="filterexact" dynprm="0.02 0" '))
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert replaced(path) == [("0.02", "0.04")] * 4
+    assert [change.sentence for change in said.changes] == ["time constant of M1 to M4 is 100 % more"]
+    path.write_text(GEARS)
+    said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
+    assert said.elsewhere[0].startswith("motor lag: ")
+
+
+def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
+    """A control in N says nothing of a thrust over squared speed: that is of the vehicle that was given."""
+    path = tmp_path / "cf2.xml"
+    text = re.sub(r" *<custom>.*\n", "", GEARS).replace(' gainprm="2e-8"', "").replace("2e-8 0 0 1.2e-10", "1 0 0 .006")
+    path.write_text(text.replace(".006", ".0045"))
+    of = of_log(read_model(path), None, None)
+    effects = (effect("drag_factor_error", error=0.25), effect("rotor_mismatch", difference_1=(0.1, 0.001)))
+    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
+    said, files = corrected(of, SMALL.vehicle, found, [ONE])
+    assert files["cf2.xml"] == path.read_bytes()
+    assert said.elsewhere[0].startswith(
+        "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95 [0.9495, 0.9505]; "
+        "controls are thrusts"
+    )
+    assert said.elsewhere[1].startswith(
+        "yaw torque over thrust, as a factor on that which flights were compared with: "
+    )
+
+
+def test_a_number_goes_into_an_empty_element(mine):
+    for text in ("<inertia/>", "<inertia></inertia>"):
+        start, end = mine.read_text().index("<inertia>"), mine.read_text().index("</inertia>") + len("</inertia>")
+        mine.write_text(mine.read_text()[:start] + text + mine.read_text()[end:])
+        _, new = correct(mine, effect("parameter_error", inertia_x=-0.9, inertia_y=-0.8))
+        np.testing.assert_allclose([new.bodies[0].inertia[0, 0], new.bodies[0].inertia[1, 1]], [0.1, 0.2], rtol=1e-4)
+        mine.write_text(sdf_of(SMALL))
+    mine.write_text(mine.read_text().replace("<pose>0 0 0 0 0 0</pose>", "<pose/>", 1))
+    _, new = correct(mine, effect("com_offset", c_x=(0.004, 1e-4)))
+    np.testing.assert_allclose(new.centre, [0.004, 0, 0], atol=3e-6)
+
+
+def test_a_first_link_without_mass_leaves_the_heaviest(tmp_path):
+    """A frame of reference as the first link, and the body on it, as drivers of ROS have them."""
+    path = tmp_path / "cf2x.urdf"
+    base = '<link name="footprint"/><joint name="j" type="fixed"><parent link="footprint"/><child link="base_link"/>'
+    path.write_text(urdf().replace('  <link name="base_link">', f'{base}</joint>\n  <link name="base_link">'))
+    _, new = correct(path, effect("com_offset", c_x=(0.004, 1e-4)), effect("parameter_error", inertia_x=(0.2, 0.001)))
+    np.testing.assert_allclose(new.centre, [0.004, 0, 0], atol=3e-6)
+    np.testing.assert_allclose(np.diag(new.inertia), [1.2 * 3.7e-5, 4.2e-5, 6.6e-5], rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["a--b---.csv", "\u00fc--.csv", "-->.csv", "line\nbreak.csv"])
+def test_no_name_of_a_log_ends_the_comment(mine, name):
+    of = of_log(read_model(mine), None, None)
+    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
+                            effects=(effect("drag_factor_error", error=0.25),))  # fmt: skip
+    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name, signals=None)])
+    comment = files["mine.sdf"].decode("ascii").partition("<!-- Corrected")[2].partition("-->")[0]
+    assert "--" not in comment
+    assert comment.endswith(" ")
+    mine.write_bytes(files["mine.sdf"])
+    assert read_model(mine).rotors[0].ratio.value == pytest.approx(0.0075)
+
+
+def test_each_file_says_its_own_changes(tmp_path):
+    """The inertia stands in what is included, and the rotors in the file itself."""
+    text = sdf_of(SMALL)
+    plugins = re.findall(r"    <plugin.*?</plugin>\n", text, flags=re.DOTALL)
+    for plugin in plugins:
+        text = text.replace(plugin, "")
+    (tmp_path / "base").mkdir()
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "base" / "model.sdf").write_text(text)
+    whole = (
+        "<sdf version='1.9'><model name='w'><include merge='true'><uri>model://base</uri></include>\n{}</model></sdf>"
+    )
+    path = tmp_path / "whole" / "model.sdf"
+    path.write_text(whole.format("".join(plugins)))
+    of = of_log(read_model(path), None, None)
+    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
+                            effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
+    _, files = corrected(of, SMALL.vehicle, found, [ONE])
+    assert list(files) == ["model.sdf", "base-model.sdf"]
+    own, base = (text.decode().partition("<!-- Corrected")[2].partition("-->")[0] for text in files.values())
+    assert "motorConstant" in own
+    assert "ixx" not in own
+    assert "ixx" in base
+    assert "motorConstant" not in base
+
+
+def test_files_of_one_name_are_numbered():
+    files = [Path("w/model.sdf"), Path("a/base/model.sdf"), Path("b/base/model.sdf"), Path("c/base2-model.sdf")]
+    assert list(corrected_names(files).values()) == [
+        "model.sdf", "base-model.sdf", "base2-model.sdf", "c-base2-model.sdf"
+    ]  # fmt: skip
+
+
+def lines_that_differ(path):
+    """Give the lines that were replaced and what stands there now, and the comment above."""
+    given, new = (file.read_text().splitlines() for file in (path, path.parent / "new" / path.name))
+    comment = [line for line in new if "Corrected by cpfls" in line or line.startswith("#   ")]
+    kept = [line for line in new if line not in comment]
+    return [pair for pair in zip(given, kept, strict=True) if pair[0] != pair[1]], comment
+
+
+def test_python_is_corrected_in_place(tmp_path):
+    """Literals in place, what is an expression as a whole; effects whose formula RotorPy has among them."""
+    path = tmp_path / "mine.py"
+    path.write_text(rotorpy_of(SMALL).replace("'Ixx': 3.7e-05", "'Ixx': 37e-6 * 1.0"))
+    said, new = correct(
+        path,
+        effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),
+        effect("inflow", k_z=(3e-7, 1e-8)),
+        effect("rotor_drag", k_d=(2e-7, 1e-8)),
+        effect("motor_lag", time_constant_s=(0.05, 0.002)),
+    )
+    changes = {change.element: change.after for change in said.changes}
+    assert changes == {
+        "quad_params.k_eta": 1.66e-8,
+        "quad_params.Ixx": float(f"{1.5 * 0.83 * 3.7e-5:.4g}"),
+        "quad_params.k_d": 2e-7,
+        "quad_params.tau_m": 0.05,
+    }
+    assert new.rotors[0].drag.value == 2e-7
+    # It has no k_z to replace.
+    (missing,) = [each for each in said.elsewhere if "k_z" in each]
+    assert missing == (
+        "quad_params.k_z = 3e-07 [2.9e-07, 3.1e-07]: mine.py: quad_params has no k_z, for which RotorPy takes 0; write "
+        "it there"
+    )
+    differ, comment = lines_that_differ(path)
+    assert len(differ) == 3
+    assert "'Ixx': 4.606e-05, 'Iyy'" in differ[0][1]
+    assert path.parent.joinpath("new", "mine.py").read_text().startswith("#!/usr/bin/env python3\n# Corrected by cpfls")
+    assert len(comment) == 5
+
+
+def test_a_curve_is_corrected_in_proportion(tmp_path):
+    path = tmp_path / "params.toml"
+    path.write_text(SECTION.format(name="a"))
+    before = read_model(path)
+    said, new = correct(
+        path,
+        effect("parameter_error", inertia_x=0.0, thrust_scale=-0.17),
+        effect("motor_lag", time_constant_s=(0.2, 0.002)),
+        effect("rotor_drag", k_d=(1e-6, 1e-8)),
+    )
+    changes = {change.element: (change.before, change.after) for change in said.changes}
+    assert changes["a.rpm2thrust[2]"] == (2.5e-10, 2.075e-10)
+    assert changes["a.rpm2thrust[1]"] == (-5.4e-7, -4.482e-7)
+    assert changes["a.rotor_dyn_coef[0]"] == (7.4, 5.0)
+    assert new.rotors[0].lag_up.value == pytest.approx(0.2, rel=1e-3)
+    (slower,) = [change.sentence for change in said.changes if change.element == "a.rotor_dyn_coef[0]"]
+    assert slower == "time constant of M1 to M4 is 48 % more"
+    assert new.rotors[0].lag_down.value == pytest.approx(0.2, rel=0.1)
+    assert changes["a.drag_matrix[0][0]"][1] == changes["a.drag_matrix[1][1]"][1]
+    assert new.rotors[0].drag.value == pytest.approx(1e-6, rel=0.1)
+    # At the same speed the new curve lifts 17 % less.
+    assert len(before.rotors) == len(new.rotors)
+    assert path.parent.joinpath("new", "params.toml").read_text().startswith("# Corrected by cpfls gap")
+
+
+@pytest.mark.parametrize("comments", [True, False])
+def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, comments):
+    path = tmp_path / "frame.json"
+    path.write_text(FRAME if comments else "\n".join(line.partition("#")[0].rstrip() for line in FRAME.splitlines()))
+    said, _ = correct(path, effect("parameter_error", inertia_x=0.0, thrust_scale=(-0.17, 0.01)))
+    (change,) = said.changes
+    assert (change.element, change.before, change.after) == ("hoverThrOut", 0.31, float(f"{0.31 / 0.83:.4g}"))
+    assert change.low < change.after < change.high
+    assert change.sentence == "thrust of M1 to M4 is 17 % less"
+    differ, comment = lines_that_differ(path)
+    assert len(differ) == 1
+    # JSON has no comments, unless it has some.
+    assert bool(comment) is comments

@@ -141,6 +141,141 @@ def test_an_include_beside_the_file_is_read(tmp_path):
     assert [path.parent.name for path in read.files] == ["whole", "base"]
 
 
+@pytest.mark.parametrize("of_include", ["", "<pose>1 0 0 0 0 1.5707963267948966</pose>"])
+def test_a_merged_include_has_its_own_pose_or_that_of_the_model(tmp_path, of_include):
+    """A battery 0.02 m ahead in its own model, which is placed 0.03 m to the left, or by the include."""
+    (tmp_path / "battery.sdf").write_text(
+        """<sdf version="1.9"><model name="battery"><pose>0 0.03 0 0 0 0</pose><link name="cell">
+        <pose>0.02 0 0 0 0 0</pose><inertial><mass>0.02</mass><inertia><ixx>2e-6</ixx><iyy>4e-6</iyy><izz>5e-6</izz>
+        <ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial></link>
+        <frame name="lid"><pose relative_to="__model__">0 0 0.01 0 0 0</pose></frame></model></sdf>"""
+    )
+    include = f"""<include merge="true"><uri>battery.sdf</uri>{of_include}</include>
+      <joint name="strap" type="fixed"><parent>base_link</parent><child>cell</child></joint>"""
+    path = tmp_path / "mine.sdf"
+    path.write_text(sdf_of(SMALL).replace('    <link name="rotor_0">', include + '<link name="rotor_0">', 1))
+    cell = next(body for body in read_model(path).bodies if body.name == "cell")
+    np.testing.assert_allclose(cell.centre, [1, 0.02, 0] if of_include else [0.02, 0.03, 0], atol=1e-12)
+    np.testing.assert_allclose(np.diag(cell.inertia), [4e-6, 2e-6, 5e-6] if of_include else [2e-6, 4e-6, 5e-6])
+
+
+def test_a_link_of_urdf_without_inertial_has_no_mass(tmp_path):
+    path = tmp_path / "mine.urdf"
+    path.write_text(
+        """<robot name="mine"><link name="camera"/><link name="base"><inertial><mass value="2"/>
+        <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="j" type="fixed"><parent link="base"/><child link="camera"/><origin xyz="1 0 0"/></joint></robot>"""
+    )
+    read = read_model(path)
+    assert read.mass_kg == 2
+    np.testing.assert_allclose(read.centre, 0)
+    assert "states no mass, and counts as none" in read.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("<robot/>".encode("utf-16"), "is in UTF-16; save it in UTF-8"),
+        ("<robot/>".encode("utf-16-le"), "is in UTF-16; save it in UTF-8"),
+        (b'<?xml version="1.0" encoding="klingon"?><robot/>', "encoding"),
+        (b'<?xml version="1.0" encoding="shift_jis"?><robot/>', "is in an encoding that cannot be read"),
+        (b'<?xml version="1.0" encoding="utf-8"?><robot name="\xff"/>', "is no valid XML"),
+        (b'<?xml version="1.0" encoding="utf-16"?><robot/>', "encod"),
+        (b'<robot name="\x00"/>', "is no valid XML"),
+    ],
+)
+def test_encodings_that_are_not_read(tmp_path, content, words):
+    path = tmp_path / "mine.urdf"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        read_model(path)
+
+
+def test_numbers_of_a_file_in_latin_1_have_their_places(tmp_path):
+    path = tmp_path / "mine.sdf"
+    path.write_bytes(
+        sdf_of(SMALL)
+        .replace('version="1.0"', 'version="1.0" encoding="latin-1"')
+        .replace("quadrotor", "M\xfcll")
+        .encode("latin-1")
+    )
+    thrust = read_model(path).rotors[0].thrust
+    assert path.read_bytes()[thrust.span.start : thrust.span.end] == b"2e-08"
+
+
+QUAD = """<mujoco><compiler angle="radian"{compiler}/><default><geom density="100"/></default>
+  <default><general ctrlrange="0 5"/></default>
+  <worldbody><body name="quad"><freejoint/>
+    <geom type="box" size="0.05 0.05 0.01"/><inertial pos="0 0 0" mass="0.5" diaginertia="1e-3 1e-3 2e-3"/>
+    <site name="a" pos="0.1 0.1 0"{site}/><site name="b" pos="-0.1 -0.1 0"/>{more}</body></worldbody>
+  <actuator><motor name="m0" site="a" gear="0 0 {gear} 0 0 -0.02"{motor}/>
+  <motor name="m1" site="b" gear="0 0 1 0 0 0.02"/>
+  </actuator></mujoco>"""
+
+
+def quad(folder, *, compiler="", site="", more="", gear="1", motor="", change=("", "")):
+    path = folder / "quad.xml"
+    path.write_text(QUAD.format(compiler=compiler, site=site, more=more, gear=gear, motor=motor).replace(*change))
+    return path
+
+
+def test_the_compiler_of_mujoco_scales_masses(tmp_path):
+    read = read_model(quad(tmp_path, compiler=' settotalmass="1.0"'))
+    assert read.mass_kg == pytest.approx(1.0)
+    np.testing.assert_allclose(np.diag(read.inertia), [2e-3, 2e-3, 4e-3])
+    assert read.bodies[0].entries[0].scale == pytest.approx(0.5)
+
+
+def test_classes_of_several_sections_are_one_main_class(tmp_path):
+    read = read_model(quad(tmp_path, compiler=' inertiafromgeom="true"'))
+    assert read.mass_kg == pytest.approx(100 * 0.1 * 0.1 * 0.02)
+    assert [rotor.most.value for rotor in read.rotors] == [5.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("given", "most", "spin"),
+    [
+        ({"gear": "2"}, 10.0, 1),
+        ({"gear": "2", "motor": ' forcerange="0 3"'}, 6.0, 1),
+        ({"gear": "2", "motor": ' ctrllimited="false"'}, None, 1),
+        ({"gear": "-1", "motor": ' ctrlrange="-4 0"'}, 4.0, -1),
+        ({"gear": "-1", "site": ' euler="3.141592653589793 0 0"'}, 5.0, -1),
+    ],
+)
+def test_limits_and_signs_of_gear(tmp_path, given, most, spin):
+    rotor = read_model(quad(tmp_path, **given)).rotors[0]
+    assert (None if rotor.most is None else rotor.most.value) == most
+    assert rotor.spin == spin
+    np.testing.assert_allclose(rotor.axis, [0, 0, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"gear": "-1"}, "not along z of the body"),
+        ({"compiler": ' boundmass="0.1"'}, "boundmass changes parts that are too light"),
+        ({"compiler": ' boundinertia="0.1"'}, "boundinertia changes parts"),
+        ({"compiler": ' balanceinertia="true"'}, "balanceinertia changes moments"),
+        ({"compiler": ' eulerseq="xyw"'}, "eulerseq is 'xyw'; write three of"),
+        ({"site": ' axisangle="0 0 0 1"'}, "axisangle has no direction; write one whose length is not 0"),
+        ({"site": ' quat="0 0 0 0"'}, "quat has no direction"),
+        ({"site": ' quat="1 0 0"'}, "quat has 3 numbers; write 4"),
+        ({"site": ' euler="1 nan 0"'}, "euler = '1 nan 0' is not"),
+        ({"site": ' zaxis="1e999 0 0"'}, "zaxis = '1e999 0 0' is not"),
+        ({"site": ' xyaxes="1 0 0 2 0 0"'}, "xyaxes has no direction"),
+        ({"gear": "1 2 3 4 5 6 7"}, "gear has 12 numbers; write 1 to 6"),
+        ({"motor": ' ctrlrange="5"'}, "ctrlrange has 1 numbers; write 2"),
+        ({"more": '<frame pos="0 0 1"><geom size="1"/></frame>'}, "<frame>: is not read here"),
+        ({"compiler": ' inertiafromgeom="true"', "change": ("0.05 0.05 0.01", "0.05 -0.05 0.01")}, "its size is"),
+    ],
+)
+def test_what_mujoco_would_not_take_is_refused(tmp_path, given, words):
+    with pytest.raises(InputError) as refused:
+        read_model(quad(tmp_path, **given))
+    assert words in str(refused.value)
+    assert "quad.xml" in str(refused.value)
+
+
 def test_mujoco_takes_mass_from_geoms_and_classes(tmp_path):
     """A cylinder of 0.4 kg on its side, and a box by its density."""
     path = tmp_path / "mine.xml"
@@ -173,11 +308,16 @@ GOOD = sdf_of(SMALL)
 BOMB = """<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]><sdf version="1.9"><model name="&b;"/></sdf>"""
 BAD = {
     "bomb": (BOMB, "has a DOCTYPE or entities of its own"),
+    "deep": ("<sdf>" * 200 + "</sdf>" * 200, "has 200 elements in each other"),
     "broken": (GOOD.replace("</model>", ""), "is no valid XML"),
     "empty": ("", "is no valid XML"),
     "other": ("<html/>", "begins with <html>, which is no model known here"),
     "negative": (GOOD.replace("<mass>1e-05</mass>", "<mass>-1</mass>", 1), "a mass of -1 kg; write one above 0"),
     "no number": (GOOD.replace("<izz>5", "<izz>five", 1).replace("<izz>6", "<izz>six", 1), "is not a number"),
+    "huge": (
+        GOOD.replace("<maxRotVelocity>6000", "<maxRotVelocity>1e200", 1),
+        "'1e200' is not a number; write a number",
+    ),
     "template": (GOOD.replace("<pose>0 0 0 0 0 0</pose>", "<pose>${x} 0 0 0 0 0</pose>", 1), "render it first"),
     "include": (
         GOOD.replace('<link name="base_link">', '<include><uri>model://away</uri></include><link name="base_link">'),
