@@ -50,8 +50,8 @@ class AxisFit(NamedTuple):
     sign: Sign  # Of those columns, in that order.
     gain: float  # Measured over reference.
     explained: float  # Share of the measured vector's square that the reference explains.
-    runner_up: float  # The same of the next best axes.
-    as_named: float  # The same of the axes in their order, with a plus.
+    times_better: float  # How many times smaller the unexplained part is than that of the next best axes.
+    as_named: float  # The share that the axes in their order, with a plus, explain.
     # Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
     # two does not move.
     along: Sequence[float]
@@ -60,11 +60,6 @@ class AxisFit(NamedTuple):
     def is_as_named(self) -> bool:
         """Whether the axes are in their order, with a plus."""
         return (self.order, self.sign) == AS_NAMED
-
-    @property
-    def times_better(self) -> float:
-        """How many times smaller the unexplained part is than that of the next best axes."""
-        return float(np.sqrt(max(1 - self.runner_up, 1e-9) / max(1 - self.explained, 1e-9)))
 
 
 def fit_axes(reference: Array, measured: Array) -> AxisFit:
@@ -95,7 +90,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     order, sign = best
     sizes = np.sqrt((reference**2).sum(axis=0) * (measured**2).sum(axis=0)[list(order)])
     along = [float(sign[i] * cross[order[i], i] / sizes[i]) if sizes[i] > 0 else float("nan") for i in range(3)]
-    return AxisFit(order, sign, gain, explained[best], runner_up, explained[AS_NAMED], along)
+    times_better = float(np.sqrt(max(1 - runner_up, 1e-9) / max(1 - explained[best], 1e-9)))
+    return AxisFit(order, sign, gain, explained[best], times_better, explained[AS_NAMED], along)
 
 
 def _all_move(vectors: Array) -> bool:

@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.agreement import rotations_of
 from cpfls_cli.flightlog.repair import continuous_attitude
-from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings
+from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, ImportSettings
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 from cpfls_cli.words import some
 
@@ -167,28 +167,27 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
     Those are roll, pitch, yaw, body vectors in FLU and world vectors in ENU.
     """
     # Quaternion, Euler rates and Euler torque are attitude and body vectors too, in the log's own frames.
-    in_body: dict[str, Array] = {name: signals[name] for name in ("attitude", *_BODY_SIGNALS) if name in signals}
-    if "quaternion" in signals:
-        in_body["attitude"] = attitude_from_quaternion(signals["quaternion"], settings.quaternion_order)
-    if "attitude_rate" in signals:
-        in_body["body_rate"] = rotations.body_rate(in_body["attitude"], signals["attitude_rate"])
-    if "torque" in signals:
-        in_body["body_torque"] = rotations.body_torque(in_body["attitude"], signals["torque"])
-    converted: dict[str, Array] = {name: signals[name] for name in ROTORS if name in signals}
-    if "rotor_command" in signals and settings.rotor_command_is == "thrust":
+    own = dict(signals)
+    if "quaternion" in own:
+        own["attitude"] = attitude_from_quaternion(own.pop("quaternion"), settings.quaternion_order)
+    if "attitude_rate" in own:
+        own["body_rate"] = rotations.body_rate(own["attitude"], own.pop("attitude_rate"))
+    if "torque" in own:
+        own["body_torque"] = rotations.body_torque(own["attitude"], own.pop("torque"))
+    if "rotor_command" in own and settings.rotor_command_is == "thrust":
         # Thrust goes with the square of the speed; a share below 0 gives none.
-        converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))
-    converted |= {name: signals[name][:, 0] for name in _SCALAR_SIGNALS if name in signals}
-    converted |= {name: body_to_flu(in_body[name], settings.body_frame) for name in _BODY_SIGNALS if name in in_body}
-    converted |= {name: world_to_enu(signals[name], settings.world_frame) for name in _WORLD_SIGNALS if name in signals}
-    if "attitude" in in_body:
-        converted["attitude"] = attitude_to_enu_flu(in_body["attitude"], settings.body_frame, settings.world_frame)
-    if "acceleration" in signals and settings.acceleration_frame == "body-specific-force":
-        converted.pop("acceleration")
-        sensed = converted["specific_force"] = body_to_flu(signals["acceleration"], settings.body_frame)
-        if "attitude" in converted:
-            converted["acceleration"] = acceleration_from_specific_force(converted["attitude"], sensed)
-    return converted
+        own["rotor_command"] = np.sqrt(np.maximum(own["rotor_command"], 0.0))
+    sensed = own.pop("acceleration") if settings.acceleration_frame != "world" and "acceleration" in own else None
+    own |= {name: own[name][:, 0] for name in _SCALAR_SIGNALS if name in own}
+    own |= {name: body_to_flu(own[name], settings.body_frame) for name in _BODY_SIGNALS if name in own}
+    own |= {name: world_to_enu(own[name], settings.world_frame) for name in _WORLD_SIGNALS if name in own}
+    if "attitude" in own:
+        own["attitude"] = attitude_to_enu_flu(own["attitude"], settings.body_frame, settings.world_frame)
+    if sensed is not None:
+        own["specific_force"] = body_to_flu(sensed, settings.body_frame)
+        if "attitude" in own:
+            own["acceleration"] = acceleration_from_specific_force(own["attitude"], own["specific_force"])
+    return own
 
 
 def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_dilation, binary_opening
+from scipy.ndimage import binary_closing, binary_dilation, binary_opening, correlate1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.units import STANDARD_GRAVITY
@@ -118,13 +118,12 @@ def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal[
 
 
 def averaged(values: Array, period: float, seconds: float) -> Array:
-    """Average values, shape (time,) or (time, column), over so many s around each sample."""
+    """Average values, shape (time,) or (time, column), over so many s around each sample, beyond the ends over 0."""
     width = max(1, round(seconds / period))
-    window = np.ones(width) / width
-    columns = values.reshape(len(values), -1).T
     if len(values) < width:
         return np.broadcast_to(values.mean(axis=0), values.shape)
-    return np.column_stack([np.convolve(column, window, mode="same") for column in columns]).reshape(values.shape)
+    window = np.ones(width) / width
+    return np.asarray(correlate1d(np.asarray(values, dtype=float), window, axis=0, mode="constant"))
 
 
 def smoothed(marked: BoolArray, period: float, shortest_s: float) -> BoolArray:

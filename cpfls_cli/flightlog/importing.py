@@ -74,7 +74,9 @@ def read_signals(
         SignalTable(table.time, {name: own for name, own in table.signals.items() if (name in SETPOINTS) == setpoint})
         for setpoint in (True, False)
     )
-    table = repair.make_continuous(table)
+    # Jumps that are not motion: full turns of roll and yaw, and signs of a quaternion.
+    ways = {"attitude": repair.continuous_attitude, "quaternion": repair.align_quaternion_signs}
+    table = SignalTable(table.time, {name: ways.get(name, np.asarray)(own) for name, own in table.signals.items()})
     spikes = repair.find_signal_spikes(table, settings)
     masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)

@@ -238,12 +238,8 @@ def _take_place(
 # The accelerometer.
 
 
-def take_acceleration(seen: Seen, reading: Reading | None) -> None:
-    """Take the first candidate that holds gravity, or follows the motion over ground."""
-    any(_take_acceleration(seen, named, reading) for named in seen.candidates.get("acceleration", ()))
-
-
-def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> bool:
+def take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> bool:
+    """Take a candidate that holds gravity, or follows the motion over ground; tell whether it does."""
     values, stated = seen.grid(named), named.unit
     vertical = float(np.median(values[:, 2]))
     carried = _carried(seen, reading)

@@ -35,15 +35,6 @@ _PX4_OLD: Final = tuple(f"actuator_controls_0.control[{axis}]" for axis in range
 _RATE: Final = ("RATE.ROut", "RATE.POut", "RATE.YOut", "RATE.AOut")
 _BATTERY: Final = ("MOTB.LiftMax", "MOTB.BatVolt")
 _AIR: Final = ("BARO.Press", "BARO.Alt", "BARO.GndTemp")
-_OUTPUTS: Final = tuple(
-    f"{name}[{motor}]" for name in ("actuator_motors.control", "actuator_outputs.output") for motor in range(16)
-)
-SOURCES: Final = (
-    *(*_PX4_NEW, *_PX4_OLD, *_RATE, *_BATTERY, *_AIR, *_OUTPUTS),
-    *(f"actuator_outputs[1].output[{motor}]" for motor in range(16)),
-    *(f"RCOU.{name}{motor}" for name in ("C", "Ch") for motor in range(1, 17)),
-)
-"""All columns that rebuilding reads."""
 
 # What rebuilt commands have to reach: share of what turns about each axis, lag, scale, and error of the mean, share of
 # full. docs/import.md has the study.
@@ -120,7 +111,7 @@ class _Mixed(NamedTuple):
 
 
 def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebuilt | None:
-    """Rebuild the commands of the rotors of a log; of `SOURCES` what it holds is enough.
+    """Rebuild the commands of the rotors of a log of PX4, ArduPilot or Betaflight, as its reader gives it.
 
     None where the log holds nothing to rebuild from, or no commands to compare with; `refused` says what speaks against
     the others.

@@ -170,13 +170,6 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
     return kept
 
 
-def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
-    """Refuse a log whose rotors are all logged and never change: it is of a vehicle on the ground."""
-    for own in () if candidates.keys() & {*ROTORS} else named:
-        if own.signal in ROTORS and len(log.values(own.group.columns[:1])[0]):
-            raise InputError(f"no flight in it: the rotors ({own.group.pattern}) never change")
-
-
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
     """Lay one uniform clock over all signals of motion and rotors."""
     leading = {name: log.values(found[0].group.columns[:1])[0] for name, found in candidates.items()}

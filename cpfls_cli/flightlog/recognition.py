@@ -72,7 +72,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         candidates = recognised.holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
         raise InputError(_nothing_found(log, named, system))
-    recognised.refuse_dead_rotors(log, named, candidates)
+    dead = [own for own in named if own.signal in ROTORS and len(log.values(own.group.columns[:1])[0])]
+    if dead and not candidates.keys() & {*ROTORS}:
+        raise InputError(f"no flight in it: the rotors ({dead[0].group.pattern}) never change")
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
     found = {
@@ -106,7 +108,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     reading = None if verdict is None else verdict.best
     motion_columns.take_places(seen, reading)
     motion_columns.take_body_rate(seen, reading)
-    motion_columns.take_acceleration(seen, reading)
+    any(motion_columns.take_acceleration(seen, named, reading) for named in candidates.get("acceleration", ()))
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)

@@ -230,12 +230,6 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
     return SignalTable(table.time, signals), tuple(warnings)
 
 
-def make_continuous(table: SignalTable) -> SignalTable:
-    """Remove jumps that are not motion, full turns of roll and yaw and signs of a quaternion, for interpolation."""
-    ways = {"attitude": continuous_attitude, "quaternion": align_quaternion_signs}
-    return SignalTable(table.time, {name: ways.get(name, np.asarray)(own) for name, own in table.signals.items()})
-
-
 def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
     """Mark spikes, shape (sample, column), or without `spike_deviations` what is suspected of being one.
 

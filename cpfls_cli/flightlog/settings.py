@@ -58,8 +58,10 @@ SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
 ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")  # Signals with a column for each rotor.
 # Signals that keep their value until the next one.
 COMMANDS: Final = ("torque", "body_torque", "thrust", "rotor_command")
-_COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1})
-_COLUMNS_OF_VECTOR, _COLUMNS_OF_QUATERNION = 3, 4
+_COLUMNS_OF_SIGNAL: Final[Mapping[str, int]] = MappingProxyType(
+    {"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1}
+)
+_COLUMNS_OF_VECTOR = 3
 _COLUMNS_OF_STICKS = (3, 4)  # Roll, pitch, yaw, and the throttle where it counts in the same way.
 
 
@@ -110,19 +112,13 @@ class SignalMap(ColumnMap):
         return (self, *self.otherwise)
 
 
-def _expected_columns(name: SignalName, signal: SignalMap) -> int:
-    """Give the number of columns of a kind of signal; an attitude that is asked for may be a quaternion, in unit 1."""
-    given = len(signal.names)
-    if name in ROTORS or (name == "sticks" and given in _COLUMNS_OF_STICKS):
-        return given
-    if name == "setpoint_attitude" and signal.unit == "1":
-        return _COLUMNS_OF_QUATERNION
-    return _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
-
-
 def _check_signal(name: SignalName, signal: SignalMap) -> None:
     """Check the number of columns and the unit against the kind of signal."""
-    expected = _expected_columns(name, signal)
+    given = len(signal.names)
+    # An attitude that is asked for may be a quaternion, in unit 1.
+    kind = "quaternion" if name == "setpoint_attitude" and signal.unit == "1" else name
+    any_number = name in ROTORS or (name == "sticks" and given in _COLUMNS_OF_STICKS)
+    expected = given if any_number else _COLUMNS_OF_SIGNAL.get(kind, _COLUMNS_OF_VECTOR)
     # A flight keeps one unit of a signal, whichever columns it came from.
     kinds = UNITS_OF_SIGNAL[name]
     for number, choice in enumerate(signal.choices):
@@ -236,13 +232,12 @@ def _check_attitude(settings: ImportSettings) -> None:
 
 
 def _check_torque(settings: ImportSettings) -> None:
-    names = settings.signals.keys()
     needed: dict[str | None, set[SignalName]] = {
         "column": {"torque", "body_torque"},
         "rotor-speed": {"rotor_speed"},
         "rotor-command": {"rotor_command"},
     }
     wanted = needed.get(settings.torque_source)
-    if wanted is not None and not wanted & names:
+    if wanted is not None and not wanted & settings.signals.keys():
         missing = " or ".join(sorted(wanted))
         raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")

@@ -182,23 +182,28 @@ def _reader(path: Path) -> ModuleType:
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
-    clocks = import_module("cpfls_cli.flightlog.topics")
-    mapped, notes = settings.mapped_columns, ()
-    rebuilds = any(column.startswith(f"{clocks.REBUILT}.") for column in mapped)
-    rebuilding = import_module("cpfls_cli.flightlog.rebuilt") if rebuilds else None
-    contents = log_contents(path, mapped if rebuilding is None else (*mapped, *rebuilding.SOURCES))
-    topics = contents.topics
-    refuse_other_vehicle = import_module("cpfls_cli.flightlog.stated_vehicle").refuse_other_vehicle
+    from cpfls_cli.flightlog.stated_vehicle import refuse_other_vehicle
+    from cpfls_cli.flightlog.topics import REBUILT, on_one_clock, stamped_rates
+
+    rebuilds = any(column.startswith(f"{REBUILT}.") for column in settings.mapped_columns)
+    contents = log_contents(path, None if rebuilds else settings.mapped_columns)
+    topics, notes = contents.topics, ()
     with about(path, InputError):
-        refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
-        if rebuilding is not None:
-            topics, notes = rebuilding.with_topic(contents.topics, contents.parameters, contents.system, settings)
-        columns, chosen, warnings = clocks.on_one_clock(topics, contents.units, settings)
-    stamped_hz = clocks.stamped_rates(topics, chosen)
+        refuse_other_vehicle(topics, contents.parameters, contents.system)
+        if rebuilds:
+            with_topic = import_module("cpfls_cli.flightlog.rebuilt").with_topic
+            topics, notes = with_topic(topics, contents.parameters, contents.system, settings)
+        columns, chosen, warnings = on_one_clock(topics, contents.units, settings)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
-    warnings = (*contents.warnings, *notes, *warnings)
     return LogColumns(
-        columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system, stamped_hz
+        columns,
+        chosen,
+        (*contents.warnings, *notes, *warnings),
+        contents.flown_at,
+        begins,
+        contents.parameters,
+        contents.system,
+        stamped_rates(topics, chosen),
     )
 
 

@@ -76,7 +76,6 @@ def read_ardupilot(file: Path) -> SimulatorModel:
     ]
     none = Stated(0.0, f"{file.name}: ArduPilot's frames have no products of inertia")
     body = of_one_body(
-        "frame",
         mass,
         [*(each for each in moments if each is not None), none, none, none],
         "motorN_position is from the centre of mass: move all motors by as much the other way",

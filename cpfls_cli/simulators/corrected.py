@@ -54,6 +54,8 @@ _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_u
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _OF_XML = ("sdf", "urdf", "mjcf")
 _ROUNDING, _SAME = 1e-9, 1e-6
+_LEAST_S = 5.0
+"""Length of a flight that shows single rotors."""
 _BY_HAND = {
     "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
     "urdf": "applyExternalForce and applyExternalTorque at each step",
@@ -344,7 +346,14 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
     """Turn rotors round that the log has turn the other way, where flights show each of them by itself."""
     if not made.of.turned:
         return
-    measured = [(each, each.rotor_speed) for each in flights if each.rotor_speed is not None]
+    measured = [
+        (each, speed)
+        for each in flights
+        if (speed := each.rotor_speed) is not None and speed.any() and len(each) * each.period > _LEAST_S
+    ]
+    if not measured:
+        made.unchanged.append(f"directions of rotors: no flight of more than {_LEAST_S:g} s has speeds of rotors")
+        return
     turns, half = turns_by_rotors((each.body_rate, speed, 1 / each.period, each.commanded) for each, speed in measured)
     stated = [rotor.turn.span for rotor in made.rotors if rotor.turn is not None]
     for place in made.of.turned:

@@ -58,7 +58,7 @@ def read_crazyflie(file: Path, option: str) -> SimulatorModel:
         for index, (forward, left, turn) in enumerate(AUTOPILOTS["crazyflie"].cross, 1)
     )
     unknown = [Stated(0.0, f"{file.name}: no inertia")] * 6
-    body = of_one_body("platform", numbers.need("CF_MASS"), unknown, f"{file.name}: no centre of mass")
+    body = of_one_body(numbers.need("CF_MASS"), unknown, f"{file.name}: no centre of mass")
     notes = (
         f"options CONFIG_{option} and {_ALWAYS} count as set, and no other; {file.name}:CRAZYFLIE_THRUST_UPGRADE_KIT "
         "reads it with that one in place of the first",

@@ -49,7 +49,7 @@ def read_crazyflow(file: Path, section: str) -> SimulatorModel:
     rows = [numbers.row(name, "J", row, count=3) for row in range(3)]
     entries = [replace(rows[i][j], also=(rows[j][i],) if i != j else ()) for i, j in _INERTIA]
     body = of_one_body(
-        name, numbers.need(name, "mass"), entries, "mixing_matrix and L are from the centre of mass: there is no other"
+        numbers.need(name, "mass"), entries, "mixing_matrix and L are from the centre of mass: there is no other"
     )
     rotors, notes = _rotors(numbers, name, body.mass.value * GRAVITY)
     return SimulatorModel(name, "crazyflow", (body,), rotors, CANNOT, notes, (file,))

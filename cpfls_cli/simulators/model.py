@@ -267,9 +267,9 @@ def part_of(
     return Body(name, mass, at[:3, 3], inertia, turned, link[:3, :3], tuple(entries), tuple(place), node)
 
 
-def of_one_body(name: str, mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
+def of_one_body(mass: Stated, entries: Sequence[Stated], centre: str) -> Body:
     """Make the only part of a vehicle, about its centre of mass; the last says why no number states that."""
-    return part_of(name, mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
+    return part_of("the vehicle", mass, entries, np.eye(4), np.eye(4), [Stated(0.0, centre)] * 3)
 
 
 def of_settings(file: Path, vehicle: VehicleSettings, lag_s: float) -> SimulatorModel:
@@ -292,7 +292,7 @@ def of_settings(file: Path, vehicle: VehicleSettings, lag_s: float) -> Simulator
         )
         for index, rotor in enumerate(vehicle.rotors, 1)
     )
-    body = of_one_body(file.stem, Stated(vehicle.mass_kg, f"{file.name}: of its config"), entries, where)
+    body = of_one_body(Stated(vehicle.mass_kg, f"{file.name}: of its config"), entries, where)
     cannot = ("what effects it has: `cpfls gap` takes the file itself with all of them",)
     return SimulatorModel(file.stem, "vehicle", (body,), rotors, cannot, (), (file,))
 

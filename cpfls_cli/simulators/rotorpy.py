@@ -45,7 +45,6 @@ def read_rotorpy(file: Path) -> SimulatorModel:
         )
     (name,) = names
     body = of_one_body(
-        name,
         numbers.need(name, "mass"),
         [numbers.need(name, entry) for entry in _ENTRIES],
         "rotor_pos is from the centre of mass: move all rotors by as much the other way",

@@ -139,7 +139,8 @@ class VehicleOf:
             if stated is not None:
                 down = f" up, {rotor.lag_down.value:g} {unit} down" if name == "lag_up" and rotor.lag_down else ""
                 found.append(f"{words} {stated.value:g} {unit}{down} ({stated.where})")
-        return found
+        known = [own for numbers in self.model.effects.values() for own in numbers.values() if own.value != 0]
+        return [*found, *(f"{own.name.rpartition('.')[2]} {own.value:g} ({own.where})" for own in known)]
 
 
 def _short(values: list[float]) -> list[float]:

@@ -1,6 +1,7 @@
 """A simulator's file corrected: what flights contradict is replaced, and not one byte besides."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -521,3 +522,13 @@ def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, c
     assert len(differ) == 1
     # JSON has no comments, unless it has some.
     assert bool(comment) is comments
+
+
+def test_a_direction_that_no_flight_shows_stays(mine):
+    """The log states another one, and its flight has no speeds of rotors."""
+    of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
+    found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
+    flight = SimpleNamespace(name="one.csv", signals=SimpleNamespace(rotor_speed=None))
+    said, files = corrected(of, SMALL.vehicle, found, [flight])
+    assert files["mine.sdf"] == mine.read_bytes()
+    assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")

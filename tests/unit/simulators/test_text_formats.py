@@ -80,6 +80,8 @@ def test_python_states_numbers_and_their_places(mine):
     mass = read.bodies[0].mass
     assert ast.literal_eval(raw[mass.span.start : mass.span.end].decode().replace("grams", "45").split(" / ")[0]) == 45
     assert mass.value == pytest.approx(SMALL.mass)
+    more = of_log(read_model(mine("more.py", rotorpy_of(SMALL).replace("'k_d'", "'k_z': 2e-7, 'k_d'"))), None, None)
+    assert "k_z 2e-07 (more.py line 22: quad_params.k_z)" in more.besides
     assert all(rotor.hub is not None and rotor.lag_up is rotor.lag_down for rotor in read.rotors)
 
 
