@@ -198,7 +198,7 @@ class Judge:
         sums = np.array([difference[block == number].sum(axis=0) for number in np.unique(block)])
         spread = len(sums) * mean_error(sums) if len(sums) > 1 else np.zeros(6)
         left = np.sqrt(squares[0].sum(axis=0) / count)
-        return Without(difference.sum(axis=0) / count, spread / count, left)
+        return Without(difference.sum(axis=0) / count, spread / count, left, there.gusty)
 
 
 class Without(NamedTuple):
@@ -207,11 +207,16 @@ class Without(NamedTuple):
     raised: Array  # Shape (6,): mean square of each channel beyond that with the effect, in squared floors.
     error: Array  # Shape (6,): standard error of it over blocks.
     left: Array  # Shape (6,): root mean square without it, in floors.
+    gusts: BoolArray = np.zeros(6, dtype=bool)  # Shape (6,): channels whose floor holds gusts.
 
     @property
     def seen(self) -> Array:
-        """By how much the gap of each channel is larger without it; what is below the floor without it is noise."""
-        return np.where(self.left > 1.0, self.raised, 0.0)
+        """By how much the gap of each channel is larger without it; what is below the floor without it is noise.
+
+        The floor of gusts that are drawn anew is above most of them: below it counts what is surely larger.
+        """
+        surely = self.gusts & (self.raised > ERRORS * self.error)
+        return np.where((self.left > 1.0) | surely, self.raised, 0.0)
 
     @property
     def visibly(self) -> float:
