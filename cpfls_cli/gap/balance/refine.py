@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
@@ -27,18 +27,28 @@ of a step, or of what it takes off, below which it is none."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
-    """Refine the shapes of the chosen effects together (`refitted`): a lag and a delay, say, trade with each other.
+    """Refine the shapes of the chosen effects by minimising the squared residual.
 
-    The newest one is sought in its valleys first where it has such.
+    The newest shapes first, one by one between the points of their grids; then, where there are several, all together
+    (`refitted`), because a lag and a delay, say, trade with each other.
 
     `floor`: shape (6,).
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
+    rotor_wrench = system(flights).rotor_wrench
     # Numbers of the vehicle alone, such as its mass, can be all that is named.
     for shape in best[-1].effect.shapes if best else ():
         if shape.valley is not None:
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
-    return refitted(system(flights, best), floor)
+    # What took the place of a linear effect has no place on a grid.
+    indices = [index for index, candidate in enumerate(best) if candidate.effect is chosen[-1].effect]
+    newest = [(index, shape) for index in indices for shape in best[index].effect.shapes]
+    # A second round where there are several: the best length of a cable depends on its damping.
+    rounds = 2 if len(newest) > 1 else 1
+    for index, shape in rounds * newest:
+        best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
+    hypothesis = system(flights, best)
+    return refitted(hypothesis, floor) if len(hypothesis.shapes) > 1 else hypothesis
 
 
 @dataclass(frozen=True)
@@ -274,6 +284,28 @@ def _exact(hypothesis: System, weight: Array) -> System:
             chosen[effect.name] = Candidate(exact, shapes)
     listed = tuple(chosen.values())
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
+
+
+def _improved(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    index: int,
+    shape: Shape,
+    floor: Array,
+    rotor_wrench: Array,
+) -> Candidate:
+    candidate = chosen[index]
+
+    def error(value: float) -> float:
+        hypothesis = system(flights, [*chosen[:index], candidate.at({shape.name: float(value)}), *chosen[index + 1 :]])
+        weight = torque_loss_ratio(rotor_wrench, hypothesis.rotor_wrench) / floor
+        return float(((hypothesis.residual_at(fit(hypothesis, floor)) * weight) ** 2).sum())
+
+    value = candidate.shape[shape.name]
+    bracket = _bracket(_steps(shape, value), value)
+    between = minimize_scalar(error, bounds=bracket, method="bounded", options={"xatol": 1e-3 * np.ptp(bracket)})
+    # It comes near the ends of the bracket, where a bound may be, and never there.
+    return candidate.at({shape.name: smallest((float(between.x), *bracket), error)})
 
 
 def _in_deepest_valley(
