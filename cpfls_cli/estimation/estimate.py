@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_covariance
 
 _STEPS, _STEPS_LEFT_OUT = 60, 4
@@ -46,25 +46,6 @@ class Normal(NamedTuple):
 
 Equations = Callable[[Array], Normal]
 """From values of the numbers, shape (number,), in units in which a step of 1 is a large one."""
-
-
-def of_rows(residual: Array, slopes: Array, instruments: Array, weight: Array, block: IntArray) -> Normal:
-    """Sum rows of equations by block.
-
-    Parameters
-    ----------
-    residual, weight : array, shape (row,)
-        Weight: inverse variance of the disturbance.
-    slopes, instruments : array, shape (row, number)
-    block : array of int, shape (row,)
-        From 0.
-    """
-    blocks, weighed = int(block.max()) + 1, instruments * weight[:, None]
-    information = np.zeros((blocks, slopes.shape[1], slopes.shape[1]))
-    score = np.zeros((blocks, slopes.shape[1]))
-    np.add.at(information, block, weighed[:, :, None] * slopes[:, None, :])
-    np.add.at(score, block, weighed * residual[:, None])
-    return Normal(information, score)
 
 
 class Prior(NamedTuple):

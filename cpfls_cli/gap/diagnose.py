@@ -45,13 +45,12 @@ from cpfls_cli.gap.naming.results import (
     GapVerdict,
     NamedEffect,
     TorqueAlone,
-    gap_stays,
-    matters,
+    gap_remains,
     verdict_of,
 )
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -103,17 +102,15 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, only = None, named.judgement.found.floor, -1
+    gusts, quiet = None, named.judgement.found.floor
     if unexplained_channels(named.judgement.found, rng):
         given = known_motion(training)
-        gusts = _gusts(named, given, settings, rng)
-        # With what is named then, more channels may turn out to be nothing but gusts.
-        while gusts is not None and gusts.split.any() and gusts.gusts_only.sum() > only:
-            only, quiet = int(gusts.gusts_only.sum()), np.minimum(quiet, gusts.noise(windows))
-            axes = unidentified_axes(named.judgement.found, given)
-            flights = flights.in_air(gusts, axes)
+        gusts = _gusts(named, given, settings)
+        if gusts is not None and gusts.split.any():
+            quiet = np.minimum(quiet, gusts.noise(windows))
+            flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
-            gusts = _gusts(named, given, settings, rng)
+            gusts = _gusts(named, given, settings)
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
@@ -214,10 +211,10 @@ def _named(
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
-def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
+def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | None:
     """Find gusts in the residual of the training flights."""
     found = named.judgement.found
-    return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
+    return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
@@ -243,10 +240,8 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
     lags = decided_by_instruments(found, named.effects, given)
-    judgement, without = judge.judge(lags.found), judge.judge(lags.without)
-    after, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
-    if not lags.chances or np.nanmax(more**2 - after**2) < VISIBLE**2:
-        lags, judgement = lags._replace(chances={}, alike=()), without
+    judgement = judge.judge(lags.found)
+    if not lags.chances:
         refusals += [
             Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
             for each in found.hypothesis.chosen
@@ -347,21 +342,17 @@ def _concluded(
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
-        # Faults and wrong numbers alone: of all the gap, where one is left, or numbers in still air are not most of it.
-        removed = held_out.shares(as_given=True)
-        by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
-        removed = removed if effects and (remainder or by_numbers) else {}
+        # Faults and wrong numbers alone: of all the gap, where one is left.
+        removed = held_out.shares(as_given=True) if effects and remainder else {}
     share = min(removed.values(), default=1.0)
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
-    gap = held_out.size(held_out.before).floors
-    least = settings.named_share
-    known = [each for each in remainder if matters(each, gap, least)] if effects else remainder
-    stays = gap_stays(
-        held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
-    )
-    verdict = verdict_of(effects, rivals, known, tuple(removed.values()) or (1.0,), stays, excited, settings)
+    before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
+    remains = bool(remainder)
+    if effects:
+        remains = gap_remains(before, after, remainder, settings.named_share, len(named))
+    verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
     wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
     if not (wrong or differ) and verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL):
@@ -384,7 +375,7 @@ def _concluded(
         alternatives=rivals,
         # In gusts fits of lags see the loop, and do not compare.
         sets=() if lags and not still else likely_sets(judged),
-        unexplained=tuple(known) if verdict is GapVerdict.NAMED else remainder,
+        unexplained=() if verdict is GapVerdict.NAMED else remainder,
         not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         vehicle_numbers=all_numbers(estimates),
         gap=GapChange.of(held_out.size(held_out.before), held_out.size(held_out.after), held_out.floor),

@@ -12,12 +12,14 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.player import still_runs
 from cpfls_cli.playback.windows import MOST_RUNS, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
 from cpfls_cli.rounding import smallest
 
@@ -31,9 +33,6 @@ _STILL = 1e-9
 _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
-
-PRIOR = 1e-5
-"""Weight of what is believed before the flights, so small that it decides only what they do not tell."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +74,6 @@ class FitWindows:
         """Motion at these samples."""
         motion = self.flight.motion
         return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
-
-    @classmethod
-    def of(cls, flight: PlaybackFlight, horizon: int, interval: int) -> FitWindows:
-        """Take every n-th window of a flight.
-
-        Parameters
-        ----------
-        horizon, interval : int
-            Samples.
-        """
-        starts = flight.starts(horizon, interval)
-        return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
 
     def rotor_terms(self, at: VehicleAt, by: str = "") -> Array:
         """Average the terms of the rotors, or their derivatives by a number, over steps, shape (step, run, column).
@@ -138,34 +125,9 @@ def windows_of(
 
 
 def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int, every: int = 1) -> Array:
-    """Compute mean errors of "rate stays": the attitude turns with it, and velocity stays.
-
-    Parameters
-    ----------
-    horizon : int
-        Steps.
-    every : int
-        Samples of a step.
-
-    Returns
-    -------
-    array, shape (horizon, 4), m, m/s, rad, rad/s
-    """
-    from scipy.spatial.transform import Rotation
-
-    motion, errors = flight.motion, np.zeros((horizon, 4))
-    turned = Rotation.from_matrix(motion.rotation[starts])
-    for step in range(1, horizon + 1):
-        at, elapsed = starts + every * step, every * step * motion.period
-        moved = motion.position[starts] + elapsed * motion.velocity[starts] - motion.position[at]
-        turn = (turned * Rotation.from_rotvec(elapsed * motion.rate[starts])).inv()
-        away = (turn * Rotation.from_matrix(motion.rotation[at])).magnitude()
-        faster = motion.velocity[starts] - motion.velocity[at]
-        spun = motion.rate[starts] - motion.rate[at]
-        sizes = (np.linalg.norm(each, axis=1) for each in (moved, faster, spun))
-        position, velocity, rate = (float(size.mean()) for size in sizes)
-        errors[step - 1] = position, velocity, float(away.mean()), rate
-    return errors
+    """Compute mean errors of "rate stays" after steps of so many samples, shape (horizon, 4), m, m/s, rad, rad/s."""
+    errors = still_runs(flight, starts, horizon, moves=True, every=every).errors
+    return np.asarray(np.linalg.norm(errors, axis=3).mean(axis=0))
 
 
 def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
@@ -221,19 +183,6 @@ class Fitted(FittedNumbers):
         return float(eigenvalues[-1] / max(eigenvalues[0], rounding.eps * eigenvalues[-1], rounding.tiny))
 
 
-class Believed(NamedTuple):
-    """What is believed of numbers before the flights: that they are at their starts, so far away in their scales.
-
-    Attributes
-    ----------
-    start, scale, spread : array, shape (number,)
-    """
-
-    start: Array
-    scale: Array
-    spread: Array
-
-
 @dataclass(frozen=True)
 class FitPoint:
     """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
@@ -245,17 +194,22 @@ class FitPoint:
     derivatives : callable
         Gives gradient and Hessian of the loss by the numbers. They cost ten times the loss, and a step that fails, or
         is the last one, needs none.
+    scales : array, shape (number,)
+    prior : Prior
+        What was believed before, in scales.
     """
 
     values: Array
     loss: float
     derivatives: Callable[[], tuple[Array, Array]]
-    believed: Believed
+    scales: Array
+    prior: Prior
 
     @cached_property
     def objective(self) -> float:
         """Loss, and what was believed before."""
-        return self.loss + 0.5 * float(self._belief @ self._away**2)
+        away = self.values / self.scales - self.prior.mean
+        return self.loss + 0.5 * float(self.prior.precision @ away**2)
 
     @property
     def gradient(self) -> Array:
@@ -267,19 +221,13 @@ class FitPoint:
         """Of the objective, in scales of the numbers."""
         return self._in_scales[1]
 
-    @property
-    def _belief(self) -> Array:
-        return np.asarray(PRIOR / self.believed.spread**2)
-
-    @property
-    def _away(self) -> Array:
-        return (self.values - self.believed.start) / self.believed.scale
-
     @cached_property
     def _in_scales(self) -> tuple[Array, Array]:
-        gradient, hessian = self.derivatives()
-        scale, belief = self.believed.scale, self._belief
-        return gradient * scale + belief * self._away, hessian * scale[:, None] * scale + np.diag(belief)
+        (gradient, hessian), scales, prior = self.derivatives(), self.scales, self.prior
+        return (
+            gradient * scales - prior.pull(self.values / scales),
+            hessian * scales[:, None] * scales + np.diag(prior.precision),
+        )
 
 
 def fit(
@@ -521,7 +469,7 @@ class WindowSums:
             return gradient, hessian
 
         loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
-        return FitPoint(self.values, loss, derivatives, Believed(self.free.starts, self.free.scales, self.free.spreads))
+        return FitPoint(self.values, loss, derivatives, self.free.scales, self.free.prior)
 
 
 @dataclass(frozen=True)
@@ -573,9 +521,8 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     without = fitted.hessian * count - hessian * scale[:, None] * scale
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
     covariance = jackknife_covariance(moved * scale)
-    belief = PRIOR / free.spreads**2
-    conditional = np.diag(fitted.hessian) - belief
-    return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
+    conditional = np.diag(fitted.hessian) - free.prior.precision
+    return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * free.prior.precision))
 
 
 def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[Array]:
@@ -583,14 +530,7 @@ def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[
     return WindowSet(tuple(windows)).errors(fitted.free, fitted.values)
 
 
-def weighed(loss: Loss, errors: Array) -> Array:
-    """Weigh the errors of runs, shape (run, horizon, 4, 3), as the fit does, shape (run,)."""
-    root = np.sqrt(1.0 + (errors**2).sum(axis=3) / loss.delta**2)
-    return np.asarray((loss.weight * loss.delta**2 * (root - 1.0)).sum(axis=(1, 2)))
-
-
 def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
-    weight, delta = window.loss.weight, window.loss.delta
     size = rate_stays(window.flight, window.starts, window.horizon, window.every)
-    return float((weight * delta**2 * (np.sqrt(1.0 + (size / delta) ** 2) - 1.0)).sum())
+    return float(window.loss.of(size[:, :, None] ** 2).sum())

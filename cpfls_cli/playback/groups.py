@@ -11,6 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.registry import CENTRE_OF_MASS
+from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -18,6 +19,9 @@ from cpfls_cli.playback.parameters import AS_STATED, COUNTED, INERTIA, MASS, Fre
 
 CENTRE = tuple(f"{CENTRE_OF_MASS.name}.{coefficient.name}" for coefficient in CENTRE_OF_MASS.coefficients)
 """Numbers of a fit that say where the centre of mass is, ahead and to the left."""
+
+PRIOR = 1e-5
+"""Weight of what is believed before the flights, so small that it decides only what they do not identify."""
 
 OF_A_WEIGHT = (MASS, CENTRE_OF_MASS.name, INERTIA)
 """Blocks that an added weight changes."""
@@ -95,6 +99,11 @@ class JointNumbers:
     def spreads(self) -> Array:
         """Standard deviations of what is believed before, in scales, shape (number,)."""
         return self._column("spread")
+
+    @cached_property
+    def prior(self) -> Prior:
+        """What is believed before flights are seen, in scales."""
+        return Prior(self.starts / self.scales, self.spreads / np.sqrt(PRIOR))
 
     def _column(self, name: str) -> Array:
         return np.array([getattr(number, name) for number in self.numbers], dtype=float)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
@@ -109,7 +109,10 @@ class GustRanges:
 
     def axes(self, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
-        return gust_axes(self, inertia, mass)
+        bodies = np.append(inertia[:3], [mass] * 3)[: len(self.size)]
+        sizes = (self.size / bodies, self.low / bodies, self.high / bodies)
+        columns = (*sizes, self.memory, self.memory_low, self.memory_high)
+        return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
 
     @classmethod
     def of_known(cls, *known: Array) -> GustRanges | None:
@@ -121,14 +124,6 @@ class GustRanges:
         for values, own in zip(columns, known, strict=True):
             values[: len(there)][there] = own[there]
         return GustRanges(**dict(zip(RANGES, columns, strict=True)))
-
-
-def gust_axes(found: Any, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
-    """Give what has the fields of `GustRanges` as accelerations by axis; other parameters as `GustRanges.axes`."""
-    bodies = np.append(inertia[:3], [mass] * 3)[: len(found.size)]
-    sizes = (found.size / bodies, found.low / bodies, found.high / bodies)
-    columns = (*sizes, found.memory, found.memory_low, found.memory_high)
-    return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
 
 
 RANGES = tuple(each.name for each in fields(GustRanges))

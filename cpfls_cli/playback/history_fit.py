@@ -16,10 +16,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
+from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.fit import (
-    Believed,
     FitPoint,
     Fitted,
     FittedNumbers,
@@ -29,6 +29,7 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import PRIOR
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -194,5 +195,5 @@ def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array)
             gradient, hessian = gradient + sums[0][0], hessian + sums[1][0]
         return gradient / total, hessian / total
 
-    believed = Believed(_FIRST.ravel(), np.ones(count), np.full(count, _SPREAD))
-    return FitPoint(values, float(loss / total), derivatives, believed)
+    prior = Prior(_FIRST.ravel(), np.full(count, _SPREAD / np.sqrt(PRIOR)))
+    return FitPoint(values, float(loss / total), derivatives, np.ones(count), prior)

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.gauss_newton import damped_step
-from cpfls_cli.playback.fit import PRIOR, FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
+from cpfls_cli.playback.fit import FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
@@ -179,9 +179,9 @@ class Outlook:
         return [self._mean(self.part != part) for part in range(int(self.part.max()) + 1)]
 
     def _mean(self, kept: BoolArray) -> tuple[Array, Array]:
-        scale, belief, count = self.free.scales, PRIOR / self.free.spreads**2, self.count[kept].sum()
-        gradient = self.gradient[kept].sum(axis=0) / count + belief * (self.values - self.free.starts) / scale
-        return gradient, self.hessian[kept].sum(axis=0) / count + np.diag(belief)
+        prior, count = self.free.prior, self.count[kept].sum()
+        gradient = self.gradient[kept].sum(axis=0) / count - prior.pull(self.values / self.free.scales)
+        return gradient, self.hessian[kept].sum(axis=0) / count + np.diag(prior.precision)
 
     @cached_property
     def _room(self) -> tuple[Array, Array, Array]:

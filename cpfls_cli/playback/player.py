@@ -249,7 +249,7 @@ def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> Play
 
 
 def still_runs(
-    flight: PlaybackFlight, starts: IntArray, horizon: int, *, moves: bool, fading_s: float = np.inf
+    flight: PlaybackFlight, starts: IntArray, horizon: int, *, moves: bool, fading_s: float = np.inf, every: int = 1
 ) -> Runs:
     """Predict that the whole state stays what it was, or that velocity does and rates stay or fade.
 
@@ -257,24 +257,27 @@ def still_runs(
     ----------
     starts : array of int, shape (run,)
     horizon : int
-        Samples.
+        Steps.
     moves : bool
         Whether attitude and position follow the rates and the velocity.
     fading_s : float, s
         Time constant with which rates fade.
+    every : int
+        Samples of a step.
     """
     motion = flight.motion
     velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]
     errors = np.empty((len(starts), horizon, 4, 3))
     for step in range(horizon):
-        elapsed = (step + 1) * motion.period
+        after = (step + 1) * every
+        elapsed = after * motion.period
         share = np.exp(-elapsed / fading_s)
         if moves:
             # How far it has turned: of one that fades, as far as the rate at the start does in a shorter time.
             as_long = elapsed if np.isinf(fading_s) else fading_s * (1.0 - share)
             held = motion.rotation[starts] @ rotations.turns(as_long * rate)
         position = motion.position[starts] + (elapsed * velocity if moves else 0.0)
-        errors[:, step] = less_measured(State(position, velocity, held, share * rate), motion, starts + step + 1)
+        errors[:, step] = less_measured(State(position, velocity, held, share * rate), motion, starts + after)
     return Runs(errors, np.full(len(starts), -1))
 
 

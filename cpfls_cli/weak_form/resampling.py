@@ -12,7 +12,6 @@ from cpfls_cli.blocks import contiguous
 _LARGEST_NUMBER = 24
 _RIDGE = 1e-9  # Of columns brought to one length: far below noise, far above rounding.
 _LEAST_SHARE = 10  # A shift is at least this part of a flight, so that slow motion does not meet itself.
-_ALONE = 0.95  # Share of the information on a coefficient from which on one block alone shows it.
 
 
 @dataclass(frozen=True)
@@ -56,23 +55,15 @@ class Folds:
         """Number of blocks."""
         return len(self.gram)
 
-    def solve(self, columns: IntArray, believed: int = 0) -> tuple[Array, Array]:
+    def solve(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns without each block and evaluate it on that block.
 
-        `believed`: so many of the first columns are not in question: a block that alone shows one of these stays in the
-        fit, because without it nothing is known of that coefficient.
         Result `coefficients`: shape (block, column, draw).
         Result `error`, shape (block, draw): sum of squares left on the block that the fit did not see.
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
-        out = np.where(self.alone(columns[:believed]), 0.0, 1.0)[:, None, None]
-        coefficients = _solve(gram.sum(axis=0) - out * gram + self._known(columns), moment.sum(axis=0) - out * moment)
+        coefficients = _solve(gram.sum(axis=0) - gram + self._known(columns), moment.sum(axis=0) - moment)
         return coefficients, self._left(gram, moment, coefficients)
-
-    def alone(self, columns: IntArray) -> BoolArray:
-        """Mark blocks that alone show the coefficient of one of some columns, shape (block,)."""
-        own = self.gram[:, columns, columns]
-        return np.asarray((own > _ALONE * own.sum(axis=0)).any(axis=1))
 
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns on all blocks.
@@ -93,14 +84,11 @@ class Folds:
         return np.asarray(self.square - explained)
 
     def conditional_on(self, base: IntArray) -> "ConditionalNormalEquations":
-        """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
-
-        `base`: not in question: a block that alone shows one of these stays in the fit.
-        """
-        gram, moment, out = self.gram, self.moment, np.where(self.alone(base), 0.0, 1.0)[:, None, None]
+        """Fit a base, so that a fit of it with a few columns more costs no more than those columns."""
+        gram, moment = self.gram, self.moment
         # After the blocks comes the fit on all of them, judged on all of them.
         whole = gram.sum(axis=0, keepdims=True), moment.sum(axis=0, keepdims=True)
-        seen, right = (np.concatenate([w - out * own, w]) for w, own in zip(whole, (gram, moment), strict=True))
+        seen, right = (np.concatenate([w - own, w]) for w, own in zip(whole, (gram, moment), strict=True))
         own, own_right = (np.concatenate([own, w]) for w, own in zip(whole, (gram, moment), strict=True))
         square = np.concatenate([self.square, self.square.sum(axis=0, keepdims=True)])
         across, inner, inner_right = seen[:, base], own[:, base], own_right[:, base]
@@ -173,7 +161,7 @@ class ConditionalNormalEquations:
         moment = (power @ moments).reshape(len(gram), len(base), -1) - rows.products(known, weighed)
         own = rows.products(weighed, taken) - 2 * rows.products(weighed, rows.right)
         found = Folds(gram, moment, power @ rows.squares + own[:, 0], self.normal.prior[base], rows)
-        return found.solve(np.arange(len(base)), len(base))[1]
+        return found.solve(np.arange(len(base)))[1]
 
     @cached_property
     def _by_channel(self) -> tuple[Array, Array, Array]:

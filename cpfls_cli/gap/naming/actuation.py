@@ -24,10 +24,9 @@ _Names = tuple[str, ...]
 
 
 class ActuationFit(NamedTuple):
-    """Lags between command and rotors: fits with the set that leaves the least residual, and with none."""
+    """Lags between command and rotors: the fit with the set that leaves the least residual."""
 
     found: NamedFit
-    without: NamedFit
     chances: dict[str, float]  # P-value of each effect of the set.
     alike: tuple[Alternative, ...]  # Sets that leave as little.
 
@@ -46,7 +45,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     shifted = {each.effect.name for each in found.hypothesis.chosen}
     tried = {each.name: each for each in lags if each.actuation or each.name in shifted}
     if not tried:
-        return ActuationFit(found, found, {}, ())
+        return ActuationFit(found, {}, ())
     sets = _Sets(found, tried, given)
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.is_lag)
@@ -56,18 +55,19 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
             rivals += sets.fit(untried)
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
     alike = []
-    larger = [each for each in sets.fits if set(best) < set(each) and sets.count(each) == len(each)]
-    for names in [*rivals, *larger]:
-        if sets.count(names) > sets.count(best) and not sets.lacks(best, names):
+    lacking = bool(best) and sets.is_predictable(best)
+    for names in rivals:
+        # More numbers are a rival where they leave nothing and the named ones something.
+        if sets.count(names) > sets.count(best) and not (lacking and not sets.is_predictable(names)):
             continue
         gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
-        if best and new and not sets.surely_more(names, best):
-            *jointly, last = new if gone else names
-            alike.append(alternative(tried[(gone or best)[0]], tried[last], 1.0, *jointly))
+        if gone and new and not sets.surely_more(names, best):
+            *jointly, last = new
+            alike.append(alternative(tried[gone[0]], tried[last], 1.0, *jointly))
     # One number is judged by its own size, several by how much less they leave.
     less = chance_of_ranks(more_residual(sets.predictable[()], sets.predictable[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
-    return ActuationFit(sets.fits[best], sets.fits[()], chances, tuple(alike))
+    return ActuationFit(sets.fits[best], chances, tuple(alike))
 
 
 @dataclass
@@ -129,12 +129,6 @@ class _Sets:
         """Check whether the past predicts the residual of a set, which makes an answer more careful."""
         return self._more(self.predictable[names], CHANCE)
 
-    def lacks(self, best: _Names, names: _Names) -> bool:
-        """Check whether a set may lack what one with more numbers has: a number jointly, or what the past predicts."""
-        if set(best) < set(names):
-            return self._needed(names, CHANCE) == set(names)
-        return self.is_predictable(best) and not self.is_predictable(names)
-
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance."""
         residual = (self.predictable[names] * (self.predictable[names].sum() > 0) for names in (one, other))
@@ -158,19 +152,14 @@ class _Sets:
         return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
 
     def _needed(self, names: _Names, rate: float) -> set[str]:
-        """Name the effects whose only number is significant at a rate, and within its bounds.
+        """Name the effects whose only number is significant at a rate.
 
         Jointly with others it is enough of the usual effect that it is not less than anybody has.
         """
-        needed, usual = set(), next(iter(self.effects)) if len(names) > 1 else ""
-        for name, (number, *_) in self.numbers(names).items():
-            if name == usual:
-                significant = number.value >= self.effects[name].shapes[0].grid[0]
-            else:
-                significant = self.chance_of(number) <= rate
-            if significant and number.value < number.plausible[1]:
-                needed.add(name)
-        return needed
+        usual = next(iter(self.effects)) if len(names) > 1 else ""
+        own = {name: number for name, (number, *_) in self.numbers(names).items()}
+        least = {name: self.effects[name].shapes[0].grid[0] for name in own}
+        return {n for n, one in own.items() if (one.value >= least[n] if n == usual else self.chance_of(one) <= rate)}
 
     def chance_of(self, number: Estimate) -> float:
         """Compute the p-value of a time by its interval and the error of the log's clock.

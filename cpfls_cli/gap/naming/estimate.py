@@ -22,7 +22,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR, GapSettings
-from cpfls_cli.rounding import levelled, tied
+from cpfls_cli.rounding import tied
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _KNOWN_TO = 0.005
@@ -267,7 +267,7 @@ def earned(
 
 
 def on_bound(found: NamedFit) -> Refusal | None:
-    """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
+    """Find an effect with a number of its size on a bound; where one is surely asked for beyond, that one is said.
 
     Zero is not such a bound: many coefficients cannot be less.
     """
@@ -281,7 +281,6 @@ def on_bound(found: NamedFit) -> Refusal | None:
         ]
         if len(shapes) > 1 and all(at_ends):
             return Refusal(effect.name, f"{' and '.join(shapes)} may all be at the bounds of what is possible", True)
-    free = None
     for index, (effect, _) in enumerate(chosen):
         sizes = sized(effect, effects[index])
         bounds = {
@@ -292,22 +291,9 @@ def on_bound(found: NamedFit) -> Refusal | None:
         }
         if not bounds:
             continue
-        free = free or free_estimates(found)
-        says = "would surely be beyond what is possible"
+        free = free_estimates(found)
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
-        if not beyond:
-            says = "sits on the bound of what is possible"
-            beyond = [name for name in _main(found, index, sizes) if name in bounds]
-        if beyond:
-            return Refusal(effect.name, f"its {beyond[0]} {says}, {bounds[beyond[0]]}", True)
+        says = "would surely be beyond" if beyond else "sits on the bound of"
+        name = next(iter(beyond or bounds))
+        return Refusal(effect.name, f"its {name} {says} what is possible, {bounds[name]}", True)
     return None
-
-
-def _main(found: NamedFit, index: int, sizes: Sequence[Estimate]) -> list[str]:
-    """Name the coefficient that explains most; all numbers where they are not coefficients of columns."""
-    candidate, linear = found.hypothesis.chosen[index], found.estimates.of_effect[index]
-    names = [coefficient.name for coefficient in candidate.effect.coefficients]
-    if not names or candidate.effect.physical is not None or len(linear) != len(names):
-        return [number.name for number in sizes]
-    columns = found.hypothesis.columns(candidate) * linear / found.floor[:, None]
-    return [names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]]

@@ -183,11 +183,10 @@ def score(
 
 
 def _error(candidate: Candidate, columns: IntArray, weight: Array, conditional: ConditionalNormalEquations) -> Array:
-    """Compute the residual of each block with a candidate; a block that alone shows it does not count against it."""
+    """Compute the residual of each block with a candidate, shape (block, draw)."""
     if candidate.effect.unit_coefficient:
         return conditional.subtracted(int(columns[0]), weight)
-    error = conditional.unseen(columns)
-    return np.where(conditional.normal.alone(columns)[:, None], np.minimum(conditional.before, error), error)
+    return conditional.unseen(columns)
 
 
 def _scored(

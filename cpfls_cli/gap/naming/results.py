@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, OFF, GapSettings
 from cpfls_cli.result import about, part, result
 
 BODY = "body (FLU)"
@@ -257,65 +257,54 @@ class Conclusion:
 def verdict_of(
     effects: Sequence[NamedEffect],
     alternatives: Sequence[Alternative],
-    unexplained: Sequence[Unexplained],
+    remains: bool,
     shares: Sequence[float],
-    stays: bool,
     excited: bool,
     settings: GapSettings,
 ) -> GapVerdict:
-    """Derive the verdict from named effects, rivals and unexplained residuals.
+    """Derive the verdict from named effects, rivals and the gap that remains.
 
     What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round; so
     has an effect that is not significant jointly with the others.
 
-    `unexplained`: where effects were found: of those, the ones that matter.
+    `remains`: whether a gap does, with effects as `gap_remains` says.
     `shares`: of the gap of torque or force above the floor that the effects take off flights not seen, where there is
     one.
-    `stays`: whether an axis keeps a clear gap.
     `excited`: whether anything moved enough to show a gap.
     """
     if not effects:
-        if unexplained:
+        if remains:
             return GapVerdict.UNEXPLAINED
         return GapVerdict.NO_GAP if excited else GapVerdict.NOT_EXCITED
     if max(shares) < settings.partial_share:
         return GapVerdict.UNEXPLAINED
     by_chance = any(effect.p_value > settings.significance for effect in effects)
-    if min(shares) < settings.named_share or unexplained or stays or by_chance:
+    if min(shares) < settings.named_share or remains or by_chance:
         return GapVerdict.PARTIAL
     # What may be left without a name may be called by another one.
     main = {effect.name for effect in effects if effect.share >= 1 - settings.named_share}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
-def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> bool:
-    """Check whether a relevant gap of the held-out flights about or along an axis is not reduced.
+def gap_remains(
+    before: Array, after: Array, remainder: Sequence[Unexplained], named_share: float, effects: int
+) -> bool:
+    """Decide whether a gap remains beside what is named: the one gate between NAMED and PARTIAL.
 
-    Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
+    A gap is above `CLEAR` floors. It remains where a channel keeps more of it than names may leave; with several
+    effects wherever there is one, because one may fill in for what the formula of another is off by. A residual that
+    depends on a signal, or has a narrow band, is a second cause where that part of it counts.
 
-    `before`, `after`, shape (6,), floors: with the vehicle's own numbers refitted, and with so many named effects.
+    `before`, `after`, shape (6,), floors: on held-out flights, with the vehicle's own parameters refitted, and with so
+    many named effects.
+    `remainder`: residuals of the training flights.
     `named_share`: of the gap above the floor that has to go.
     """
-    filled = effects > 1 and bool((after > CLEAR).any())
-    largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
-    clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
-    large = (after > ERRORS * CLEAR) & (after > OFF * before)
-    return filled or bool((clear & (_is_unexplained(after, before, named_share) | large)).any())
+    kept = (effects > 1) | (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0))
+    return bool(((after > CLEAR) & kept).any()) or any(_second_cause(each, before) for each in remainder)
 
 
-def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
-    """Check whether an unexplained residual is a second cause, by its dependence, or more than a name may leave.
-
-    `before`, shape (6,), floors: the gap of each channel without effects.
-    `named_share`: of the gap above the floor that has to go.
-    """
-    follows = unexplained.signal is not None or unexplained.frequency_hz is not None
+def _second_cause(unexplained: Unexplained, before: Array) -> bool:
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
-    largest = float(np.nanmax(before[kind], initial=1.0))
-    second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest**2
-    return second or bool(_is_unexplained(np.array(unexplained.floors), np.array(largest), named_share))
-
-
-def _is_unexplained(after: Array, before: Array, named_share: float) -> BoolArray:
-    """Check whether each channel keeps a clear gap, and more of it than a name may leave."""
-    return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))
+    part = unexplained.share * unexplained.floors**2
+    return part > COUNTS * float(np.nanmax(before[kind], initial=1.0)) ** 2

@@ -10,10 +10,10 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
-from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.balance.weak_flight import WeakFlight, dense
+from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
-from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
+from cpfls_cli.gap.settings import ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
@@ -21,7 +21,6 @@ from cpfls_cli.playback.innovations import (
     MOST_PREDICTED,
     ResidualInnovations,
     blows,
-    ranks,
     residual_innovations,
 )
 from cpfls_cli.playback.instruments import (
@@ -109,7 +108,6 @@ def air(
     block: IntArray,
     given: Instruments,
     settings: GapSettings,
-    rng: np.random.Generator,
 ) -> Air | None:
     """Find gusts in the residual of flights under a hypothesis.
 
@@ -129,15 +127,14 @@ def air(
     bound = gusts_in(flown.sides, given, "none")
     if bound is None:
         return None
-    found, (only, sized, refuted) = None, np.zeros((3, 6), dtype=bool)
+    found, (only, sized) = None, np.zeros((2, 6), dtype=bool)
     ends = {name: getattr(bound, name).copy() for name in (*RANGES, "noise")}
     for witness in _WITNESSES[given.kind]:
         own = gusts_in(flown.sides, given, witness)
         if own is None:
             continue
-        own, like = flown.judged(own, only, rng)
-        like &= known & ~only & ~refuted
-        refuted |= own.foretold - ERRORS * own.foretold_error > _PREDICTED[witness]
+        own, like = flown.judged(own, only)
+        like &= known & ~only
         # What is not repeatable is no effect's; what setpoints do not predict may be one's.
         size = ~sized & (like | (np.isfinite(own.size) & (witness == "repeats")))
         for name, values in ends.items():
@@ -176,19 +173,19 @@ class _Residual:
             sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
         return sides
 
-    def judged(self, found: FoundGusts, others: BoolArray, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+    def judged(self, found: FoundGusts, others: BoolArray) -> tuple[FoundGusts, BoolArray]:
         """Mark channels that are gusts alone by a witness, jointly with those of `others`; add its shares."""
-        witness, steady = found.told_by, np.ones(6, dtype=bool)
+        witness = found.told_by
         if witness == "past":
             new = self._innovations(found.noise)
             share, without = new.shares
             found = replace(found, foretold=share, foretold_without=without)
-            steady = ~new.grows(RARE)
         only = np.isfinite(found.size) & _gusty(found, self.moved, _PREDICTED[witness])
+        if witness == "past" and only.any():
+            only &= ~new.grows(RARE)
         if witness == "repeats" or not only.any():
             return found, only
         # Nothing else than that all of it is air shows it where nothing was asked.
-        only = only & (steady if witness == "past" else self._like_air(rng))
         blown = only | others if witness == "past" else np.isfinite(found.size)
         return found, only & blows(blown, np.asarray(self.residual.any(axis=0)))
 
@@ -203,27 +200,6 @@ class _Residual:
         own = [residual[there.flight_index == number] for number in range(len(states))]
         moving = np.isin(names, list(without_actuation(states[0])))
         return residual_innovations(windows, own, before, moving, noise, self.settings.block_s)
-
-    def _like_air(self, rng: np.random.Generator) -> BoolArray:
-        """Mark channels of which the air is believed where setpoints do not predict them.
-
-        Setpoints predict no effect that is not linear in them. So a channel may depend on no curve of a signal, as far
-        as setpoints predict that; and the air turns and pushes as much in gentle flight as in fierce.
-        """
-        flights, given, settings = self.hypothesis.flights, self.given, self.settings
-        if [run.flight for run in given.runs] != list(range(len(flights))):
-            return np.zeros(6, dtype=bool)
-        signals = zip(flights, self.hypothesis.signals, strict=True)
-        states = [without_actuation(state_signals(*pair)) for pair in signals]
-        names, flown = _common(states)
-        asked = np.concatenate(predicted_rows(given, flights[0].windows, flown))
-        time = np.concatenate([each["time"] for each in states])
-        state = dict(zip(names, asked.T, strict=True)) | {"time": time}
-        index = self.hypothesis.flight_index
-        ranked = rank_dependence(self.residual, index, self.block, state, settings.shifts, rng)
-        follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-        grows = _growing(self.residual, asked, index, self.block, settings.shifts, rng)
-        return ~np.isin(CHANNELS, follows) & ~grows
 
 
 def _common(states: Sequence[dict[str, Array]]) -> tuple[list[str], list[Array]]:
@@ -273,17 +249,3 @@ def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) 
     }
     found = first_stage_fit_by_run(asked, rows)
     return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
-
-
-def _growing(
-    residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
-) -> BoolArray:
-    """Mark channels whose residual surely grows with how much a signal moves, by ranks over blocks of time.
-
-    Reference: Winkler et al. 2014, permutation inference with the largest statistic.
-    """
-    rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
-    sizes, moves = (ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
-    alike = (moves.T @ sizes).max(axis=0, initial=0.0)
-    chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
-    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))

@@ -63,7 +63,7 @@ def in_what_is_left(recordings):
     windows, model = common_windows(recordings, FEW), plain(None)
     hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
     block = block_index(hypothesis, FEW)
-    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW, np.random.default_rng(1))
+    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW)
     assert found is not None
     return found
 

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.shared.playback_scores import free_runs, score
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.playback.fit import FitWindows, fit
+from cpfls_cli.playback.fit import fit, windows_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
@@ -30,7 +30,7 @@ RATE = 3
 
 
 def fitted(vehicle, blocks, flights):
-    windows = [FitWindows.of(flight, 50, 60) for flight in flights]
+    windows = [own for flight in flights for own in windows_of([flight], 0.5, 0.6)]
     return fit(Structure(blocks).free(vehicle), windows, {}, 60, 3e-5)
 
 

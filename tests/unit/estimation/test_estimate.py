@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from cpfls_cli.blocks import contiguous
-from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, estimate, of_rows, positive_ratio
+from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, estimate, positive_ratio
+
+
+def of_rows(residual, slopes, instruments, weight, block):
+    """Sum rows of equations by block."""
+    weighed, own = instruments * weight[:, None], [block == number for number in range(block[-1] + 1)]
+    return Normal(
+        np.array([weighed[rows].T @ slopes[rows] for rows in own]),
+        np.array([weighed[rows].T @ residual[rows] for rows in own]),
+    )
 
 
 def closed_loop(rng, rows=4000, instrument=1.0):

@@ -98,13 +98,6 @@ def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
 
 
-def test_a_delay_beside_the_lag_that_is_likely_not_0_is_a_rival_of_the_lag_alone(monkeypatch):
-    left = {(): 90.0, LAG: LITTLE, DELAY: 9.0, BOTH: LITTLE}
-    # One in forty that it is 0, and one in five.
-    for half, rivals in ((0.0137, {("command_delay", "motor_lag", "motor_lag")}), (0.025, set())):
-        assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.016, half)]})[:2] == (LAG, rivals)
-
-
 def test_less_than_nothing_is_nothing(monkeypatch):
     left = {(): 90.0, LAG: -2.0, DELAY: LITTLE, BOTH: LITTLE}
     names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
@@ -149,16 +142,11 @@ def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(
         assert (names, rivals, told.chances) == ((), set(), {})
 
 
-def test_a_lateness_at_the_end_of_what_is_possible_is_none(monkeypatch):
-    end = CATALOGUE["motor_lag"].shapes[0].grid[-1]
-    assert apart(monkeypatch, LAG, {(): 90.0, LAG: LITTLE}, {LAG: [(end, 0.001)]})[0] == ()
-
-
 def test_rotors_that_are_measured_are_never_late():
     found = found_with((), [])
     found.hypothesis.can = lambda _candidate: False
     told = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
-    assert told.found is told.without is found
+    assert told.found is found
 
 
 def test_numbers_that_instruments_do_not_tell_are_listed():

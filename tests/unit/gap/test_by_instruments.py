@@ -12,7 +12,6 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments
 from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects
 from cpfls_cli.gap.naming.estimate import NamedFit
-from cpfls_cli.gap.residual.air import _growing
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import held as stays
@@ -92,16 +91,6 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
         stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
     assert stand.count(names) >= 17
-
-
-def test_what_grows_with_the_motion_is_no_air_in_its_own_channel():
-    rng = np.random.default_rng(3)
-    block = np.repeat(np.arange(24), 20)
-    speed = np.repeat(rng.uniform(0.2, 3.0, 24), 20)[:, None] * rng.standard_normal((480, 1))
-    left = rng.standard_normal((480, 6))
-    left[:, 4] *= np.abs(np.repeat(np.sqrt(np.bincount(block, speed[:, 0] ** 2) / 20), 20))
-    found = _growing(left, speed, np.zeros(480, dtype=int), block, 199, rng)
-    assert found.tolist() == [False, False, False, False, True, False]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback import vehicle
-from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, window_errors
+from cpfls_cli.playback.fit import (
+    FitWindows,
+    WindowSet,
+    fit,
+    loss_of,
+    rate_stays,
+    uncertainty,
+    window_errors,
+    windows_of,
+)
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
@@ -53,7 +62,7 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules,
 
 def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
     free = numbers(STATED, ("inertia", "linear_damping"), RULES["one rule"])
-    windows = FitWindows.of(flight, 20, 30)
+    (windows,) = windows_of([flight], 0.2, 0.3)
     ((by_group, _),) = WindowSet((windows,)).derivatives(free, free.starts, [np.arange(len(windows.starts))])
     fitted = fit(free, [windows], {}, 0, 1e-3)
     assert window_errors(fitted, [windows])[0].mean() == pytest.approx(fitted.loss, rel=1e-12)
@@ -108,7 +117,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     free = numbers(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
     # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
     still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
-    quiet = [FitWindows.of(replace(flight, speed=still), 20, 20)]
+    quiet = windows_of([replace(flight, speed=still)], 0.2, 0.2)
     spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
 
@@ -116,7 +125,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
 def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
     """Rotors that follow at once are asked for their lag, of which at least 1 ms is believed."""
     flights = flown(VehicleModel(vehicle=STATED), ("multisine", "steps"), duration_s=4.0, noise=MIDDLING, seed=1)
-    windows = [FitWindows.of(each, 20, 20) for each in flights]
+    windows = [own for each in flights for own in windows_of([each], 0.2, 0.2)]
     fitted = fit(numbers(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
     lag, *inertia = vehicle.found_numbers(fitted, uncertainty(fitted, windows))
     assert (lag.value, lag.low, lag.at_bound) == (0.001, 0.001, True)
@@ -127,6 +136,6 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
 
 
 def test_a_vehicle_as_it_is_stated_has_no_numbers(flight):
-    windows = [FitWindows.of(flight, 20, 20)]
+    windows = windows_of([flight], 0.2, 0.2)
     fitted = fit(numbers(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
     assert list(vehicle.found_numbers(fitted, uncertainty(fitted, windows))) == []

@@ -5,9 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming import ranking
 from cpfls_cli.weak_form.resampling import blocks_of, folds
 
 WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
@@ -70,12 +67,10 @@ def test_columns_beside_a_base_are_judged_as_one_fit_of_both(known):
     columns[block != 2, :, 4] = 0.0
     normal, base = folds(columns, right, block, np.full(COLUMNS, known)), np.array([0, 4])
     conditional = normal.conditional_on(base)
-    np.testing.assert_allclose(conditional.before, normal.solve(base, 2)[1], rtol=1e-9)
+    np.testing.assert_allclose(conditional.before, normal.solve(base)[1], rtol=1e-9)
     for own in ([1], [3], [2], [1, 2, 3], []):
         together = np.array([*base, *own])
-        np.testing.assert_allclose(
-            conditional.unseen(np.array(own, dtype=int)), normal.solve(together, 2)[1], rtol=1e-6
-        )
+        np.testing.assert_allclose(conditional.unseen(np.array(own, dtype=int)), normal.solve(together)[1], rtol=1e-6)
         found, _ = conditional.fit(np.array(own, dtype=int))
         np.testing.assert_allclose(found, normal.fit(together)[0][2:, 0], rtol=1e-6)
 
@@ -115,34 +110,6 @@ def test_a_column_that_a_fit_never_sees_gets_nothing():
     without = folds(columns, right, block).solve(np.array([0]))[1]
     assert coefficients[2, 1, 0] == 0.0
     assert error[2] == pytest.approx(without[2])
-
-
-def test_a_believed_column_stays_known_in_the_block_that_alone_shows_it():
-    columns, right, block = problem(5)
-    columns[block != 2, :, 3] *= 1e-4
-    normal = folds(columns, right, block)
-    assert normal.alone(np.array([3])).tolist() == [number == 2 for number in range(normal.blocks)]
-    assert not normal.alone(np.array([0])).any()
-    asked, believed = (normal.solve(np.array([3, 0]), count) for count in (0, 1))
-    whole, error = normal.fit(np.array([3, 0]))
-    np.testing.assert_allclose(believed[0][2], whole)
-    np.testing.assert_allclose(believed[1][2], error[2])
-    others = np.arange(normal.blocks) != 2
-    np.testing.assert_allclose(believed[0][others], asked[0][others])
-    # Without its block next to nothing is known of it, and what that says of the block is far off.
-    assert asked[1][2, 0] > 10 * believed[1][2, 0]
-
-
-def test_a_block_that_alone_shows_a_candidate_is_no_evidence_against_it():
-    columns, right, block = problem(5)
-    columns[block != 2, :, 3] *= 1e-4
-    normal, base, own = folds(columns, right, block), np.array([0]), np.array([3])
-    candidate = Candidate(CATALOGUE["torque_bias"], {})
-    before, plain = normal.solve(base)[1], normal.solve(np.array([0, 3]))[1]
-    error = ranking._error(candidate, own, np.ones(6), normal.conditional_on(base))
-    assert plain[2, 0] > before[2, 0] == error[2, 0]
-    others = np.arange(normal.blocks) != 2
-    np.testing.assert_allclose(error[others], plain[others])
 
 
 def test_a_column_of_zeros_does_no_harm():
