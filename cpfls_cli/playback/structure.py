@@ -34,7 +34,7 @@ from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
+_SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 2e-4
 """Of the fits that structures are compared by: a twentieth of what is worth a name is close enough."""
 
 _STEPS, _TOLERANCE = 60, 3e-6
