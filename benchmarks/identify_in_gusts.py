@@ -86,7 +86,7 @@ def _table(name: str, of: str, rows: list[list[str]]) -> None:
 
 def _found(truth: Truth, source: TorqueSource, *, past: bool = False) -> Found | None:
     freed = freed_torque(source, source)
-    if freed is None or (freed.told_by == "past") != past:
+    if freed is None or (freed.instrument_kind == "past") != past:
         return None
     again, least = (
         np.log(fit_baselines(data, 1 / axis_scale(data), 3e-7)[0].parameters[:3] / truth.inertia)

@@ -86,7 +86,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
     if gusts is not None:
-        print(f"  repeatable share of the residual, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
+        print(f"  repeatable share of the residual, by axis: {np.round(gusts.predicted, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts
     model = replace(solved.model, gusts=held)
     return Found(

@@ -166,12 +166,12 @@ class Diagnosis(Conclusion):
         if air is None:
             return None
         return {
-            "told_by": air.told_by,
+            "instrument_kind": air.instrument_kind,
             "axes": {
                 axis.name: {
                     "unit": "N m" if axis.turns else "N",
                     "alone": None if air.alone is None else bool(air.alone[number]),
-                    "foretold": float(air.foretold[number]),
+                    "predicted": float(air.predicted[number]),
                     **{
                         name if place < 3 else f"{name}_s": float(getattr(air, name)[number])
                         for place, name in enumerate(columns)

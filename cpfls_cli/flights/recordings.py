@@ -253,7 +253,7 @@ def _actuated(
     if speed is not None:
         command = _command_beside(flight, known, study)
         return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command), ()
-    told = _told_by_wrench(known, study.vehicle)
+    told = _by_wrench(known, study.vehicle)
     if told is None:
         torque, thrust = known["body_torque"], known.get("thrust")
         return replace(signals, stated_torque=torque, stated_thrust=thrust, commanded=True), ()
@@ -264,7 +264,7 @@ def _actuated(
     return replace(signals, rotor_speed=speed, commanded=True), tuple(notes)
 
 
-def _told_by_wrench(known: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, int] | None:
+def _by_wrench(known: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, int] | None:
     """Find the commands behind thrust and torque, shape (time, rotor), rad/s, of four rotors, which leave no choice.
 
     The factors of thrust only scale them. At the samples that are counted a rotor would have to push down.

@@ -33,7 +33,7 @@ from cpfls_cli.identification.data import (
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments, ToldBy, instruments, past_setpoints
+from cpfls_cli.playback.instruments import InstrumentKind, Instruments, instruments, past_setpoints
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
@@ -76,7 +76,7 @@ class FreedTorque:
         Runs that repeat each other, and their paths; or runs with setpoints, of no common path.
     alone, flights : int
         Flights without instruments, and all flights.
-    told_by : str
+    instrument_kind : str
         "repeats", "setpoints", or "past", which is what was before.
     setpoints : tuple of str
         Those that are the instruments.
@@ -91,7 +91,7 @@ class FreedTorque:
     paths: int
     alone: int
     flights: int
-    told_by: ToldBy
+    instrument_kind: InstrumentKind
     setpoints: tuple[str, ...] = ()
 
     @property
@@ -117,8 +117,8 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
     noise of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
     setpoints what the rest of the flights tells of the answer to them. Then ``sum A'^T (tau - A x) = 0``, for what is
-    foretold errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and what
-    is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body
+    predicted errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and
+    what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body
     of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know
     most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
@@ -188,7 +188,7 @@ def _by_instruments(
         paths=len(given.repeats.paths()),
         alone=len(parts) - len({given.runs[run.number].flight for run in runs}),
         flights=len(parts),
-        told_by=given.kind,
+        instrument_kind=given.kind,
         setpoints=() if repeated else given.names,
     )
     if not (found.told[:2].all() and len(found.learned)):
@@ -250,7 +250,7 @@ def _shows_loop(training: TorqueSource, rigid_body: Array) -> bool:
     return loop_along(training, lambda motion: rigid_columns(motion) @ rigid_body).shows_loop
 
 
-def told_by(
+def source_of(
     freed: FreedTorque | None, training: TorqueSource, learned: TorqueSource
 ) -> tuple[TorqueSource, TorqueSource]:
     """Give what parameters and their errors are learned from: the torque that instruments know, or as measured."""

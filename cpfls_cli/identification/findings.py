@@ -138,7 +138,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
         source = f"{asked} {know} no gust, so the parameters come from the torque that follows, {pure}"
         little, without = "too little of yaw follows", "have no such setpoint"
-    elif freed.told_by == "past":
+    elif freed.instrument_kind == "past":
         source = (
             "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
         )

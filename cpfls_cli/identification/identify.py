@@ -12,7 +12,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import History
-from cpfls_cli.identification.closed_loop import freed_torque, loop_along, told_by
+from cpfls_cli.identification.closed_loop import freed_torque, loop_along, source_of
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
@@ -104,13 +104,13 @@ def identify(
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
     freed = freed_torque(training, learned)
-    evaluator = model_evaluator(*told_by(freed, training, learned), settings)
+    evaluator = model_evaluator(*source_of(freed, training, learned), settings)
     result = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
     model, fit, system = solved
-    baselines = fit_baselines(told_by(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
+    baselines = fit_baselines(source_of(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
     uniform = _solve(evaluator, training, uniform_chromosome(model.structure))
     if uniform is not None and model.structure.genes > 0:
@@ -133,7 +133,7 @@ def identify(
         scores=scores,
         learned=scores[TRAINING]["model"] if len(learned) == len(training) else score_of(learned, model.torque),
         freed=freed,
-        loop=loop_along(training, model.torque) if freed is None or freed.told_by == "past" else None,
+        loop=loop_along(training, model.torque) if freed is None or freed.instrument_kind == "past" else None,
     )
     return Identification(
         **vars(diagnostics),

@@ -15,7 +15,7 @@ def still_air_text() -> Text:
     return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
 
 
-def gust_words(axes: list[GustAxis], told_by: str) -> str:
+def gust_words(axes: list[GustAxis], instrument_kind: str) -> str:
     """Tell sizes and memories by axis, and what no gust exceeds."""
     known = [axis_words(axis) for axis in axes if np.isfinite(axis.size)]
     least = [
@@ -26,16 +26,16 @@ def gust_words(axes: list[GustAxis], told_by: str) -> str:
     open_ = [_where(axis) for axis in axes if not np.isfinite(axis.high)]
     said = [f"Gusts: {'; '.join(known)}."] if known else []
     if least:
-        said.append(f"No gusts above {joined(least)}{_UNTOLD if told_by == 'none' else ''}.")
+        said.append(f"No gusts above {joined(least)}{_UNIDENTIFIED if instrument_kind == 'none' else ''}.")
     if open_:
         said.append(f"Gusts {joined(open_)} are not known, because what they move is not.")
     if known:
-        what = "what nothing before foretells" if told_by == "past" else "what does not come again"
+        what = "what nothing before predicts" if instrument_kind == "past" else "what does not come again"
         said.append(f"Standard deviations of {what}; `cpfls simulate --model --gusts` plays them.")
     return " ".join(said)
 
 
-_UNTOLD = ": all that the model leaves, because nothing separates gusts from what it lacks"
+_UNIDENTIFIED = ": all that the model leaves, because nothing separates gusts from what it lacks"
 
 
 def axis_words(axis: GustAxis) -> str:

@@ -27,7 +27,7 @@ from cpfls_cli.playback.balances import middles_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
-from cpfls_cli.playback.instruments import Instruments, ToldBy
+from cpfls_cli.playback.instruments import InstrumentKind, Instruments
 from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
 from cpfls_cli.playback.loop import during, wrench_during
 from cpfls_cli.playback.model import VehicleModel
@@ -69,14 +69,16 @@ class FoundGusts(GustRanges):
     ----------
     noise : array, shape (axis, 2)
         Variance of the white noise with them, and of that which a derivative is taken of, as of samples; in no file.
-    foretold_without : array, shape (block, axis)
+    predicted_without : array, shape (block, axis)
         What is predicted without each block, for its errors; in no file.
     """
 
     SHOWN: ClassVar = ("name",)
 
-    told_by: ToldBy = about("what separates gusts from what a model lacks: repeats, setpoints, past, none")
-    foretold: Array = about(
+    instrument_kind: InstrumentKind = about(
+        "what separates gusts from what a model lacks: repeats, setpoints, past, none"
+    )
+    predicted: Array = about(
         "share of the residual that repeats or setpoints predict; by the past, of its innovations", "gust", gaps=True
     )
     alone: BoolArray | None = about("whether all that is left of a gap is gusts and noise", "gust", default=None)
@@ -85,7 +87,7 @@ class FoundGusts(GustRanges):
     )
     lack: Lack | None = part(default=None)
     noise: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    foretold_without: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    predicted_without: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def name(self) -> tuple[str, ...]:
@@ -93,9 +95,9 @@ class FoundGusts(GustRanges):
         return GUST_AXES[: len(self.size)]
 
     @property
-    def foretold_error(self) -> Array:
-        """Standard errors of the shares that are foretold, shape (axis,)."""
-        return jackknife_error(self.foretold_without)
+    def predicted_error(self) -> Array:
+        """Standard errors of the shares that are predicted, shape (axis,)."""
+        return jackknife_error(self.predicted_without)
 
     @property
     def gusts(self) -> Gusts | None:
@@ -221,7 +223,7 @@ def find_gusts(
 
 
 def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Sequence[Array]) -> FoundGusts:
-    """Give gusts where what is new in what is left was not foretold by what was before, nor its size; else the bound.
+    """Give gusts where what is new in what is left was not predicted by what was before, nor its size; else the bound.
 
     Air turns a vehicle about every axis, and pushes it where flights know their velocity.
     """
@@ -239,14 +241,14 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
         return bound
     moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
     new = residual_innovations(seen, left, told, moving, found.noise)
-    foretold, without = new.shares
-    little = foretold + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
+    predicted, without = new.shares
+    little = predicted + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
     gusty = np.isfinite(found.size) & little & ~new.grows(_RARE)
     if not blows(gusty, np.ones_like(gusty)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
     white = None if found.white is None else np.where(gusty, found.white, np.nan)
-    return replace(replace(found, **ends), foretold=foretold, foretold_without=without, white=white)
+    return replace(replace(found, **ends), predicted=predicted, predicted_without=without, white=white)
 
 
 def _wrench_of_parts(model: VehicleModel, flight: PlaybackFlight) -> dict[str, Array]:
@@ -264,7 +266,7 @@ def _wrench_of_parts(model: VehicleModel, flight: PlaybackFlight) -> dict[str, A
 def gusts_in(
     sides: Sequence[Array],
     given: Instruments,
-    told_by: ToldBy,
+    instrument_kind: InstrumentKind,
     parts: Mapping[str, Sequence[Array]] = MappingProxyType({}),
 ) -> FoundGusts | None:
     """Find sizes and memories of gusts in what both sides of a balance differ by; see `find_gusts`.
@@ -275,7 +277,7 @@ def gusts_in(
         For each run momentum, and what changes it.
     given : Instruments
         Of these runs.
-    told_by : str
+    instrument_kind : str
         Which instruments to take.
     parts : mapping of str to sequence of array, shape (time, axis), N m and N
         For each run what parts of the model give; what is left is held against them to tell what the model lacks.
@@ -291,49 +293,49 @@ def gusts_in(
     if length > longest or any(flight.motion.period != period for flight in given.flown):
         return None
     band = _Band.of(period, length)
-    powers = _powers(sides, given, band, told_by)
+    powers = _powers(sides, given, band, instrument_kind)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
-    shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
+    shared = np.sqrt(2 * runs / (2 * runs - 1)) if instrument_kind == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
-    columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
-    white = np.array([np.nan if told_by == "none" else axis.white for axis in axes])
+    columns = np.array([axis.bound() if instrument_kind == "none" else axis.found(shared) for axis in axes])
+    white = np.array([np.nan if instrument_kind == "none" else axis.white for axis in axes])
     lack = None
-    if parts and told_by in ("repeats", "setpoints"):
-        rows = zip(axes, powers.left.swapaxes(0, 1), _foretold_parts(parts, given, band, told_by), strict=True)
+    if parts and instrument_kind in ("repeats", "setpoints"):
+        rows = zip(axes, powers.left.swapaxes(0, 1), _predicted_parts(parts, given, band, instrument_kind), strict=True)
         lack = Lack.of(tuple(parts), [axis.lack(power, own) for axis, power, own in rows])
-    foretold, without = _share_foretold(powers)
-    none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
+    predicted, without = _share_predicted(powers)
+    none = np.full(len(axes), np.nan) if instrument_kind == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
     return FoundGusts(
         **ends,
-        told_by=told_by,
+        instrument_kind=instrument_kind,
         noise=columns[:, len(RANGES) :],
-        foretold=none * foretold,
-        foretold_without=none * (foretold + shared * (without - foretold)),
+        predicted=none * predicted,
+        predicted_without=none * (predicted + shared * (without - predicted)),
         white=white,
         lack=lack,
     )
 
 
-def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
-    """Compute the shares of all that is left which instruments foretell, shape (axis,), and without each block."""
+def _share_predicted(powers: _Powers) -> tuple[Array, Array]:
+    """Compute the shares of all that is left which instruments predict, shape (axis,), and without each block."""
     both = np.where(np.arange(powers.power.shape[2]) > 0, 2.0, 1.0)
     kept, whole = powers.power @ both, powers.whole @ both
-    # An axis that a flight does not know has nothing that could be foretold.
+    # An axis that a flight does not know has nothing that could be predicted.
     whole = np.where(whole.any(axis=0), whole, np.nan)
     without = 1 - (kept.sum(axis=0) - kept) / (whole.sum(axis=0) - whole)
     return 1 - kept.sum(axis=0) / whole.sum(axis=0), without
 
 
-def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: ToldBy) -> _Powers:
+def _powers(sides: Sequence[Array], given: Instruments, band: _Band, instrument_kind: InstrumentKind) -> _Powers:
     """Take the power of the non-repeatable residual, by block of a run."""
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
-    if told_by == "repeats":
+    if instrument_kind == "repeats":
         beside = [band.left(flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
-    elif told_by == "setpoints":
+    elif instrument_kind == "setpoints":
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]
@@ -353,14 +355,16 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     return _Powers(power, whole, np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
-def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: ToldBy) -> _Complex:
+def _predicted_parts(
+    parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, instrument_kind: InstrumentKind
+) -> _Complex:
     """Give parts of a model as instruments predict them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]
-    if told_by == "repeats":
+    if instrument_kind == "repeats":
         flat = [given.repeats.others(number, flat) for number in range(len(flat))]
     laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
-    if told_by == "setpoints":
+    if instrument_kind == "setpoints":
         laid = _expected(given, laid, band)
     known = np.concatenate([each[np.isfinite(each).all(axis=(1, 2))] for each in laid])
     return known.reshape(len(known), values[0].shape[1], len(parts), -1).swapaxes(0, 1)
@@ -464,7 +468,7 @@ class _Axis:
         return float(np.sqrt(np.exp(self._fit.numbers[2]) * self._period))
 
     def lack(self, power: Array, parts: _Complex) -> AxisLack:
-        """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
+        """Find what the model lacks, in power of what is left by piece and its parts as they are predicted."""
         known = self._expected(self._fit.numbers)[0]
         both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
         squares = np.abs(parts) ** 2 @ both / (len(self._process.lags) * self._noise[0, 0])

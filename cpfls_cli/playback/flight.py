@@ -150,7 +150,7 @@ class LoggedFlight:
     system: str = ""
 
     @property
-    def told_hz(self) -> float:
+    def logged_hz(self) -> float:
         """How often what drives the playback is known, Hz."""
         return self.updated_hz or 1 / self.parts[0].period
 

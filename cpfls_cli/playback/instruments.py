@@ -33,9 +33,9 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 """
 
 
-Told = Literal["repeats", "setpoints", "none"]
+GivenKind = Literal["repeats", "setpoints", "none"]
 """What separates gusts from what a model lacks."""
-ToldBy = Literal[Told, "past"]
+InstrumentKind = Literal[GivenKind, "past"]
 """Where nothing moves a vehicle but its loop, the past may separate them."""
 
 _ANSWERED_S = 0.5
@@ -84,7 +84,7 @@ class Instruments:
     names: tuple[str, ...]
 
     @property
-    def kind(self) -> Told:
+    def kind(self) -> GivenKind:
         """What identifies most: runs of a path show more than what was asked for."""
         if self.repeats.likeness:
             return "repeats"

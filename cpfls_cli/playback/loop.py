@@ -136,7 +136,7 @@ def loop_beside_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Se
     return better._replace(missed=found.explained) if far.any() or not best.shows_loop else better
 
 
-def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], told_hz: float) -> bool:
+def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:
     """Tell before any search whether no body can be found, because the rotors are logged too slowly.
 
     They are where motors are logged below `SLOW_HZ`, and with no lag of the rotors the torque explains the rotation
@@ -144,10 +144,10 @@ def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight
 
     Parameters
     ----------
-    told_hz : float, Hz
+    logged_hz : float, Hz
         How often the logs hold the rotors.
     """
-    if told_hz >= SLOW_HZ:
+    if logged_hz >= SLOW_HZ:
         return False
     return all(bounds.shows_loop for bounds in _plain_bounds(vehicle, flights))
 

@@ -478,7 +478,7 @@ def _summary(proposal: Proposal, asked: Sequence[str]) -> dict[str, Any]:
 
 def _grounds(entry: Guess | KeyChoice) -> dict[str, Any]:
     rivals = [{"text": rival.text, "reason": rival.reason} for rival in entry.rivals]
-    return {"told_by": entry.sure, "reason": entry.reason, "rivals": rivals}
+    return {"certainty": entry.sure, "reason": entry.reason, "rivals": rivals}
 
 
 def _columns(columns: ColumnMap) -> dict[str, Any]:

@@ -376,7 +376,7 @@ def _what_can_come(
         raise InputError("\n".join(map(contradicted, wrong)) + f"\n{NOTHING_COMES}")
     tell_before_search(wrong)
     own = [flight for flight in training if not flight.group]
-    logged_hz = min(flight.told_hz for flight in own)
+    logged_hz = min(flight.logged_hz for flight in own)
     along = [flight.playback for flight in own]
     if settings.anyway or not shows_loop_anyhow(run.study.vehicle, along, logged_hz):
         return settings, ()
@@ -439,7 +439,7 @@ def _judged(
         responses=responses,
         fading_s=fading_s,
         full_speed_rad_s=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
-        rotors_logged_hz=min(flight.told_hz for flight in training),
+        rotors_logged_hz=min(flight.logged_hz for flight in training),
         logged_by=tuple(dict.fromkeys(flight.system for flight in training if flight.system)),
         warnings=tuple(warnings),
         contradictions=contradictions_of(flights),

@@ -12,7 +12,7 @@ from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.identification.closed_loop import told_by
+from cpfls_cli.identification.closed_loop import source_of
 from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -96,7 +96,7 @@ def validate(
     part, source = next(iter(held_out.items()), (TRAINING, training))
     drawing, examining, simulating = rng.spawn(3)
     tell("compares structures")
-    told = told_by(result.freed, training, learned)
+    told = source_of(result.freed, training, learned)
     structures = compare_structures(*told, settings) if asked.structures else None
     tell("draws bands")
     draws = bootstrap(model_evaluator(*told, settings), told[0], model, result.fit, asked, drawing)

@@ -78,14 +78,14 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, 
         "disturbance": None
         if not gusts
         else FoundGusts(
-            told_by="repeats",
+            instrument_kind="repeats",
             size=size,
             low=0.8 * size,
             high=1.3 * size,
             memory=memory,
             memory_low=0.7 * memory,
             memory_high=1.4 * memory,
-            foretold=np.full(6, np.nan),
+            predicted=np.full(6, np.nan),
             white=white,
             lack=None if lack is None else lack_of(np.asarray(lack), 0.5 * size),
         ),

@@ -120,7 +120,7 @@ def test_the_answer_for_machines(proposed, log):
     result, _, _ = proposed(log, "--json")
     summary = json.loads(result.stdout)
     assert summary["asked"] == ["vehicle.mass_kg", *(f"vehicle.rotors.{index}.position_m" for index in range(4))]
-    assert summary["signals"]["body_rate"]["told_by"] == "data"
+    assert summary["signals"]["body_rate"]["certainty"] == "data"
     assert summary["signals"]["body_rate"]["columns"] == ["gyro_x", "gyro_y", "gyro_z"]
     assert summary["choices"]["body_frame"]["value"] == "FLU"
     assert [rotor["name"] for rotor in summary["rotors"]] == ["front right", "rear left", "front left", "rear right"]

@@ -24,10 +24,10 @@ from cpfls_cli.playback.innovations import (
     residual_innovations,
 )
 from cpfls_cli.playback.instruments import (
+    GivenKind,
+    InstrumentKind,
     Instruments,
     Repeats,
-    Told,
-    ToldBy,
     held,
     instruments,
     past_setpoints,
@@ -39,7 +39,7 @@ _PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_PREDICTED}
 """Largest share of the residual, at 95 %, that instruments predict of the air. Other runs show all that is
 repeatable, a linear answer to setpoints about two thirds of it."""
 
-_WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
+_WITNESSES: dict[GivenKind, tuple[InstrumentKind, ...]] = {
     "repeats": ("repeats", "past"),
     "setpoints": ("setpoints", "past"),
     "none": ("past",),
@@ -175,11 +175,11 @@ class _Residual:
 
     def judged(self, found: FoundGusts, others: BoolArray) -> tuple[FoundGusts, BoolArray]:
         """Mark channels that are gusts alone by a witness, jointly with those of `others`; add its shares."""
-        witness = found.told_by
+        witness = found.instrument_kind
         if witness == "past":
             new = self._innovations(found.noise)
             share, without = new.shares
-            found = replace(found, foretold=share, foretold_without=without)
+            found = replace(found, predicted=share, predicted_without=without)
         only = np.isfinite(found.size) & _gusty(found, self.moved, _PREDICTED[witness])
         if witness == "past" and only.any():
             only &= ~new.grows(RARE)
@@ -216,15 +216,17 @@ def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
 
     `moved`, shape (6,): mean square of the residual, in squared floors of the sensors.
     """
-    own = found.foretold + ERRORS * found.foretold_error < most
+    own = found.predicted + ERRORS * found.predicted_error < most
     for kind in (slice(3), slice(3, 6)):
         # Of a channel that moves no more than its sensors nothing is known.
-        known = np.isfinite(found.foretold[kind]) & (moved[kind] > 1)
-        weight = np.where(known, 1 / np.maximum(found.foretold_error[kind], np.finfo(float).tiny) ** 2, 0.0)
+        known = np.isfinite(found.predicted[kind]) & (moved[kind] > 1)
+        weight = np.where(known, 1 / np.maximum(found.predicted_error[kind], np.finfo(float).tiny) ** 2, 0.0)
         weight /= max(weight.sum(), np.finfo(float).tiny)
-        share, without = (np.nan_to_num(each[..., kind]) @ weight for each in (found.foretold, found.foretold_without))
+        share, without = (
+            np.nan_to_num(each[..., kind]) @ weight for each in (found.predicted, found.predicted_without)
+        )
         if weight.any() and share + ERRORS * jackknife_error(without) < most:
-            own[kind] |= found.foretold[kind] < most
+            own[kind] |= found.predicted[kind] < most
     return own
 
 

@@ -111,12 +111,12 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
 
 
-@pytest.mark.parametrize(("setpoints", "told_by"), [(True, "setpoints"), (False, "past")])
-def test_gusts_alone_are_no_gap(flown, setpoints, told_by):
+@pytest.mark.parametrize(("setpoints", "instrument_kind"), [(True, "setpoints"), (False, "past")])
+def test_gusts_alone_are_no_gap(flown, setpoints, instrument_kind):
     run = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=setpoints))
     assert run.diagnosis.verdict is GapVerdict.NO_GAP
     assert run.air is not None
-    assert run.air.found.told_by == told_by
+    assert run.air.found.instrument_kind == instrument_kind
     assert run.air.gusts_only.all()
     tells_sizes(run.air.found)
 
@@ -136,22 +136,22 @@ def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypa
     # No path comes again.
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
     found = in_what_is_left(recordings)
-    assert found.found.told_by == "past"
+    assert found.found.instrument_kind == "past"
     assert found.gusts_only.all()
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
     assert diagnosed(recordings).air is None
 
 
 def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, monkeypatch):
-    def without_pitch(sides, given, told_by):
-        found = gusts_in(sides, given, told_by)
-        if told_by == "repeats":
+    def without_pitch(sides, given, instrument_kind):
+        found = gusts_in(sides, given, instrument_kind)
+        if instrument_kind == "repeats":
             found.size[1] = np.nan
         return found
 
     monkeypatch.setattr("cpfls_cli.gap.residual.air.gusts_in", without_pitch)
     found = in_what_is_left(recorded(flown["again"], TRUE.vehicle, setpoints=False))
-    assert found.found.told_by == "repeats"
+    assert found.found.instrument_kind == "repeats"
     assert found.gusts_only.all()
     assert found.split.all()
     tells_sizes(found.found)
@@ -188,7 +188,7 @@ def test_what_the_vehicle_does_is_not_called_gusts_where_nothing_was_asked(flown
     found = in_what_is_left(recorded(flown["calm"], TRUE.vehicle, setpoints=False))
     assert not found.gusts_only.any()
     assert np.isnan(found.found.size).all()
-    assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
+    assert np.all(found.found.predicted[:2] > 3 * found.found.predicted_error[:2])
 
 
 @pytest.mark.parametrize(("kind", "turning"), [("calm", [False, False]), ("damped", [True, True])])
@@ -196,4 +196,4 @@ def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
     found = in_what_is_left(recorded(flown[kind], TRUE.vehicle, setpoints=True))
     # In gusts four fifths of what is left are theirs.
     assert found.gusts_only[:2].tolist() == turning
-    assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
+    assert np.all(found.found.predicted[:2] > 3 * found.found.predicted_error[:2])

@@ -74,7 +74,7 @@ def test_where_nothing_repeats_what_was_before_tells_roll_and_pitch(identified):
     """Least squares finds Ixx 10 % too small; the flights go on showing the loop, so that no verdict is good."""
     result = identified["unlike"]
     freed = result.freed
-    assert freed.told_by == "past"
+    assert freed.instrument_kind == "past"
     assert (np.abs(off(freed.rigid_body)) < freed.half[:2]).all()
     assert (freed.half[:2] < 0.25).all()
     np.testing.assert_allclose(result.rigid_body[:2], freed.rigid_body[:2], rtol=5e-3)

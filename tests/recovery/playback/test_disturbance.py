@@ -82,7 +82,7 @@ def test_sizes_and_memories_are_those_of_the_truth(flights, key):
     memories = np.array([*MEMORY_S, *[SHOVE_MEMORY_S] * 3])
     off = np.log(np.array([found.size / bodies(truth) / sizes, found.memory / memories]))
     half = 0.5 * np.log(np.array([found.high / found.low, found.memory_high / found.memory_low]))
-    assert found.told_by == key[1]
+    assert found.instrument_kind == key[1]
     assert np.abs(off[0]).max() < 0.25
     assert np.abs(off[1]).max() < 0.5
     # Of twelve intervals of 95 % some do not hold the truth at times.
@@ -118,21 +118,21 @@ def test_without_instruments_what_was_before_tells_them(flights):
     """What the model lacks of the motion goes on as it was, and is no gust."""
     known, model = flights["45 g", "setpoints"], VehicleModel(vehicle=SMALL.vehicle)
     found, told = find_gusts(model, alone(known)), find_gusts(model, known)
-    assert found.told_by == "past"
+    assert found.instrument_kind == "past"
     assert np.abs(np.log(found.size[:3] / bodies(SMALL)[:3] / GUSTS)).max() < 0.25
     assert np.abs(np.log(found.memory[:3] / MEMORY_S)).max() < 0.5
     assert found.lack is None
     assert told.lack is not None
     # Nor are they asked where nothing told the body.
     bound = find_gusts(model, known, told=False)
-    assert bound.told_by == "none"
+    assert bound.instrument_kind == "none"
     assert bound.gusts is None
     assert (bound.high[:3] > found.size[:3]).all()
 
 
 def test_without_instruments_nothing_is_told_in_still_air(flights):
     found = find_gusts(VehicleModel(vehicle=SMALL.vehicle), alone(flights["still", "setpoints"]))
-    assert found.told_by == "none"
+    assert found.instrument_kind == "none"
     assert found.gusts is None
 
 
@@ -162,15 +162,15 @@ def test_a_vehicle_simulated_in_its_own_gusts_shows_the_same(flights):
     before = find_gusts(model, flights["45 g", "repeats"])
     flown = [simulated(replace(model, gusts=before.gusts), number) for number in range(4)]
     after = find_gusts(model, instruments(flown))
-    assert after.told_by == "repeats"
+    assert after.instrument_kind == "repeats"
     played = np.log([before.size, before.memory])
     low, high = np.log([after.low, after.memory_low]), np.log([after.high, after.memory_high])
     assert ((low < played) & (played < high)).sum() >= 9
     assert (np.abs(played - 0.5 * (low + high)) < 1.7 * 0.5 * (high - low)).all()
 
 
-@pytest.mark.parametrize(("runs", "told_by"), [("repeats", "repeats"), ("alone", "past")])
-def test_a_vehicle_holds_the_gusts_of_its_flights(flights, runs, told_by):
+@pytest.mark.parametrize(("runs", "instrument_kind"), [("repeats", "repeats"), ("alone", "past")])
+def test_a_vehicle_holds_the_gusts_of_its_flights(flights, runs, instrument_kind):
     """Two runs of two paths tell the body by what was before, and the gusts too. All but the inertia is known."""
     flown = [replace(flight, setpoints={}) for flight in flights["1.5 kg", "repeats"].flown]
     vehicle = replace(LARGE.vehicle, unknown=("inertia",))
@@ -178,7 +178,7 @@ def test_a_vehicle_holds_the_gusts_of_its_flights(flights, runs, told_by):
     known = flown if runs == "repeats" else [flown[0], flown[RUNS]]
     found = find_vehicle(vehicle, known, settings, lambda *_: None)
     assert found.loop.shows_loop
-    assert found.instruments.kind == told_by
+    assert found.instruments.kind == instrument_kind
     assert np.diag(found.model.body.inertia)[:2] == pytest.approx(LARGE.inertia[:2], rel=0.15)
-    assert found.disturbance.told_by == told_by
+    assert found.disturbance.instrument_kind == instrument_kind
     assert found.model.gusts.size[:2] / LARGE.inertia[:2] == pytest.approx(GUSTS[:2], rel=0.25)

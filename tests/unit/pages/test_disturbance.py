@@ -21,10 +21,10 @@ FOUND = FoundGusts(
     memory=np.array([0.4, np.nan, np.nan, 1.0, np.nan, np.nan]),
     memory_low=np.array([0.2, np.nan, np.nan, 0.8, np.nan, np.nan]),
     memory_high=np.array([0.8, np.nan, np.nan, 1.3, np.nan, np.nan]),
-    told_by="repeats",
+    instrument_kind="repeats",
     noise=np.zeros((6, 2)),
-    foretold=np.full(6, 0.1),
-    foretold_without=np.full((9, 6), 0.1),
+    predicted=np.full(6, 0.1),
+    predicted_without=np.full((9, 6), 0.1),
 )
 
 
@@ -52,7 +52,7 @@ def test_sizes_are_told_as_accelerations_with_how_long_they_last():
 
 
 def test_without_instruments_there_is_a_bound():
-    bound = replace(FOUND, size=np.full(6, np.nan), memory=np.full(6, np.nan), told_by="none")
+    bound = replace(FOUND, size=np.full(6, np.nan), memory=np.full(6, np.nan), instrument_kind="none")
     assert bound.gusts is None
     words = said(found_in(bound))
     assert words.startswith("No gusts above 3.6 rad/s² about roll")

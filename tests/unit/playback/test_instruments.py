@@ -115,7 +115,7 @@ def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none
 
 
 def test_flights_that_log_other_setpoints_than_most_have_none():
-    """One answer is foretold of all: four sticks and three places cannot stand in one column."""
+    """One answer is predicted of all: four sticks and three places cannot stand in one column."""
     flights = [_flown(path) for path in (1, 2, 3)]
     asked = [{"position": flight.motion.position} for flight in flights[:2]]
     asked.append({"sticks": np.hstack([flights[2].motion.position, flights[2].motion.position[:, :1]])})
