@@ -94,7 +94,7 @@ def test_in_gusts_what_was_before_tells_the_body(truth):
 
 
 def test_what_was_before_tells_no_body_whose_damping_is_missing():
-    """At 1 Hz the damping takes as much as the rotation; without it no moment about roll explains what is predicted."""
+    """At 1 Hz damping takes as much as the rotation; without it no moment about roll explains what is predicted."""
     damped = SMALL._replace(damping=2e-4)
     assert not _by_what_was_before(damped, tuple(CATALOGUE)).identified
     assert _by_what_was_before(damped).identified
