@@ -118,9 +118,9 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     noise of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
     setpoints what the rest of the flights tells of the answer to them. Then ``sum A'^T (tau - A x) = 0``, for what is
     predicted errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and
-    what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body
-    of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know
-    most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
+    what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid
+    body of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they
+    know most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
     Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
     not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the other.
