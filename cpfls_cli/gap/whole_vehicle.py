@@ -138,16 +138,23 @@ def has_effects(model: VehicleModel) -> bool:
 def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
     """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
 
+    A vehicle that was found may have no effects, and other numbers than the config.
+
     Raises InputError if a flight lacks a signal that the model needs.
     """
     if not has_effects(model):
-        return list(recordings)
+        return [_with_vehicle(recording, model.vehicle) for recording in recordings]
     given = []
     for recording in of_vehicle(recordings, model):
         signals = recording.signals
         known = model.wrench_along(model.acting(signals)) - signals.wrench
         given.append(replace(recording, signals=replace(signals, known_wrench=known)))
     return given
+
+
+def _with_vehicle(recording: Recording, vehicle: VehicleSettings) -> Recording:
+    same = recording.signals.vehicle == vehicle
+    return recording if same else replace(recording, signals=replace(recording.signals, vehicle=vehicle))
 
 
 def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:

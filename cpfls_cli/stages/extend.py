@@ -20,7 +20,7 @@ from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
-from cpfls_cli.gap.whole_vehicle import has_effects, on_top_of, require_body, whole_vehicle, with_known_wrench
+from cpfls_cli.gap.whole_vehicle import on_top_of, require_body, whole_vehicle, with_known_wrench
 from cpfls_cli.pages.effects import intervals_drawn
 from cpfls_cli.pages.gap import sizes_drawn
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
@@ -87,7 +87,7 @@ def extended(
     gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
     named = named_effects(diagnosis), diagnosis.audit
     extension = refitted(training, held, *named, study.gap, base.fuzzy, gusty_floor)
-    stated = base.vehicle if has_effects(base) else study.vehicle
+    stated = base.vehicle
     whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
     if diagnosis.air is not None and diagnosis.gusts:
         whole = replace(whole, gusts=diagnosis.air.gusts)

@@ -200,8 +200,8 @@ def _flights(
 ) -> tuple[Recordings, FlightSplit]:
     """Read all flights together, so that one battery is full in all of them, and split them."""
     read = read_flights([*flights, *held_out], run.study)
-    flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
     balanced = with_known_wrench(read.recordings, base)
+    flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else tuple(balanced)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
     refuse_seen(files[: len(split.training)], files[len(split.training) :])

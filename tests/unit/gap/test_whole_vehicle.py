@@ -13,7 +13,7 @@ from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
 from cpfls_cli.gap.before_after import left_out
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
-from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
+from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects, with_known_wrench
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
@@ -183,3 +183,13 @@ def test_a_flight_has_to_have_what_the_model_depends_on(model, lacking, needed):
         return
     with pytest.raises(InputError, match=f"^flight: {needed} which the model of the whole vehicle needs$"):
         of_vehicle([recording], model)
+
+
+def test_flights_are_compared_with_the_numbers_of_a_vehicle_that_was_found_without_effects():
+    flown = signals()
+    found = replace(QUAD, rotors=tuple(replace(each, thrust_factor_n_s2=1e-5) for each in QUAD.rotors))
+    (given,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=found))
+    expected = 1e-5 / QUAD.rotors[0].thrust_factor_n_s2 * flown.wrench[:, 5]
+    np.testing.assert_allclose(given.signals.wrench[:, 5], expected)
+    (same,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=QUAD))
+    assert same.signals is flown
