@@ -189,7 +189,7 @@ def test_flights_are_compared_with_the_numbers_of_a_vehicle_that_was_found_witho
     flown = signals()
     found = replace(QUAD, rotors=tuple(replace(each, thrust_factor_n_s2=1e-5) for each in QUAD.rotors))
     (given,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=found))
-    expected = 1e-5 / QUAD.rotors[0].thrust_factor_n_s2 * flown.wrench[:, 5]
+    expected = 1e-5 * (flown.rotor_speed**2).sum(axis=1)
     np.testing.assert_allclose(given.signals.wrench[:, 5], expected)
     (same,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=QUAD))
     assert same.signals is flown
