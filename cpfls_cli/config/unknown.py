@@ -35,12 +35,12 @@ _OFF: Final[dict[Unknown, str]] = {
 }
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.9 of the largest speed."""
 
-_TAKEN = frozenset({"import", "config", "vehicle", "report", "export", "trajectory", "changed", "trend"})
+_TAKEN = frozenset({"import", "config", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
 _GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
 _OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend", "tune"})
 _TAKEN |= _OF_MODELS
-"""Commands that work with guesses; a report and an export are of a model, which has its own numbers.
+"""Commands, and `Model.predict`, that work with guesses; a report and an export are of a model with its own numbers.
 
 `changed` and `trend` compare flights of one vehicle, in which its numbers cancel. Those of models do with those of a
 whole vehicle, and ask `require_known` where theirs is another; `trajectory` where torque or effects choose

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -134,6 +134,7 @@ class Effect:
     # ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
     quantity: Quantity | None = None  # Of a simulator's model, which its coefficients are.
+    rotorpy: Mapping[str, str] = field(default_factory=dict)  # RotorPy's numbers, by coefficients with its formula.
     holds: frozenset[str] = frozenset()  # Effects that are special cases of this one, which is then not their rival.
     # Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     rate_derivative: bool = False

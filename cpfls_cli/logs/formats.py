@@ -182,18 +182,18 @@ def _reader(path: Path) -> ModuleType:
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
-    from cpfls_cli.flightlog.stated_vehicle import refuse_other_vehicle
-    from cpfls_cli.flightlog.topics import REBUILT, on_one_clock, stamped_rates
-
-    rebuilds = any(column.startswith(f"{REBUILT}.") for column in settings.mapped_columns)
+    # Who asks for the name of a format alone does not wait for these.
+    clocks = import_module("cpfls_cli.flightlog.topics")
+    stated = import_module("cpfls_cli.flightlog.stated_vehicle")
+    rebuilds = any(column.startswith(f"{clocks.REBUILT}.") for column in settings.mapped_columns)
     contents = log_contents(path, None if rebuilds else settings.mapped_columns)
     topics, notes = contents.topics, ()
     with about(path, InputError):
-        refuse_other_vehicle(topics, contents.parameters, contents.system)
+        stated.refuse_other_vehicle(topics, contents.parameters, contents.system)
         if rebuilds:
             with_topic = import_module("cpfls_cli.flightlog.rebuilt").with_topic
             topics, notes = with_topic(topics, contents.parameters, contents.system, settings)
-        columns, chosen, warnings = on_one_clock(topics, contents.units, settings)
+        columns, chosen, warnings = clocks.on_one_clock(topics, contents.units, settings)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
     return LogColumns(
         columns,
@@ -203,7 +203,7 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
         begins,
         contents.parameters,
         contents.system,
-        stamped_rates(topics, chosen),
+        clocks.stamped_rates(topics, chosen),
     )
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.document import Stated
 from cpfls_cli.simulators.literals import Numbers, python_numbers
@@ -19,13 +20,6 @@ from cpfls_cli.simulators.model import Rotor, SimulatorModel, of_one_body
 
 CANNOT = ("its centre of mass: rotor_pos is from there", "what differs between its rotors: it has one number for all")
 _ENTRIES = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
-_EFFECTS = {
-    "inflow": {"k_z": "k_z"},
-    "translational_lift": {"k_h": "k_h"},
-    "flapping_moment": {"k_f": "k_flap"},
-    "parasitic_drag": {f"c_{axis}": f"c_D{axis}" for axis in "xyz"},
-}
-"""Effects whose formulas are RotorPy's own: its numbers by coefficients."""
 
 
 def read_rotorpy(file: Path) -> SimulatorModel:
@@ -50,7 +44,9 @@ def read_rotorpy(file: Path) -> SimulatorModel:
         "rotor_pos is from the centre of mass: move all rotors by as much the other way",
     )
     effects = {
-        effect: {own: _or_zero(numbers, name, key) for own, key in keys.items()} for effect, keys in _EFFECTS.items()
+        effect: {own: _or_zero(numbers, name, key) for own, key in known.rotorpy.items()}
+        for effect, known in CATALOGUE.items()
+        if known.rotorpy
     }
     return SimulatorModel(name, "rotorpy", (body,), _rotors(numbers, name), CANNOT, (), (file,), effects=effects)
 

@@ -16,6 +16,7 @@ EFFECT = Effect(
     name="flapping_moment",
     order=50,
     title="flapping hub moment",
+    rotorpy={"k_f": "k_flap"},
     kind="wrench",
     formula="M = -k_f sum w_i (u_iy, -u_ix, 0)",
     sentence="In forward flight the blades flap and tilt the nose up or down, without a force of their own.",

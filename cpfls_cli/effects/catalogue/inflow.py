@@ -13,6 +13,7 @@ EFFECT = Effect(
     name="inflow",
     order=70,
     title="inflow (thrust falls with axial speed)",
+    rotorpy={"k_z": "k_z"},
     kind="wrench",
     formula="dT_i = -k_z w_i u_iz,  M = sum r_i x dT_i z",
     sentence="A rotor that moves up through the air pulls less, one that moves down pulls more.",

@@ -34,6 +34,7 @@ EFFECT = Effect(
     name="parasitic_drag",
     order=90,
     title="parasitic drag of the fuselage",
+    rotorpy={f"c_{axis}": f"c_D{axis}" for axis in "xyz"},
     kind="wrench",
     formula="F = -|v| (c_x v_x, c_y v_y, c_z v_z),  M = cr x (-|v| v)",
     sentence="The drag of the fuselage grows with the square of the air speed, and turns the vehicle if it acts off "

@@ -14,6 +14,7 @@ EFFECT = Effect(
     name="translational_lift",
     order=80,
     title="translational lift",
+    rotorpy={"k_h": "k_h"},
     kind="wrench",
     formula="dT_i = k_h (u_ix^2 + u_iy^2),  M = sum r_i x dT_i z",
     sentence="Rotors pull more in fast level flight, because they meet fresh air.",
