@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, OFF, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 from cpfls_cli.result import about, part, result
 
 BODY = "body (FLU)"
@@ -291,16 +291,18 @@ def gap_remains(
 ) -> bool:
     """Decide whether a gap remains beside what is named: the one gate between NAMED and PARTIAL.
 
-    A gap is above `CLEAR` floors. It remains where a channel keeps more of it than names may leave; with several
-    effects wherever there is one, because one may fill in for what the formula of another is off by. A residual that
-    depends on a signal, or has a narrow band, is a second cause where that part of it counts.
+    A gap is above `CLEAR` floors. It remains where a channel keeps more of it than names may leave, or several times
+    that limit and more than a formula may be off by; with several effects wherever there is one, because one may fill
+    in for what the formula of another is off by. A residual that depends on a signal, or has a narrow band, is a second
+    cause where that part of it counts.
 
     `before`, `after`, shape (6,), floors: on held-out flights, with the vehicle's own parameters refitted, and with so
     many named effects.
     `remainder`: residuals of the training flights.
     `named_share`: of the gap above the floor that has to go.
     """
-    kept = (effects > 1) | (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0))
+    large = (after > ERRORS * CLEAR) & (after > OFF * before)
+    kept = (effects > 1) | large | (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0))
     return bool(((after > CLEAR) & kept).any()) or any(_second_cause(each, before) for each in remainder)
 
 
