@@ -130,11 +130,12 @@ def run_of(
     study = common.study(config, sweep=own.name in ("sweep", "config")) if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
+    run.open_numbers = "guessed" if common.accept_guesses else "refused"
     if config:
         reads(config)
         run.inputs.append(config)
         run.data = partial(common.data, config)
-        run.config, run.open_numbers = config, "guessed" if common.accept_guesses else "refused"
+        run.config = config
         if common.numbers is not None:
             run = import_module("cpfls_cli.stages._numbers").with_numbers_of(run, common.numbers)
         require_numbers(run, own.name)

@@ -204,8 +204,10 @@ def decode(
     length, width = len(content), max(map(len, fields.values()))
     # Beyond its end a frame that is cut is read as 0.
     data = content + bytes(8 * width + _LONGEST_FRAME)
-    readers = {ord(kind): reader(own, constants) for kind, own in fields.items()}
-    markers, main, between, slow, event_marker = {*map(ord, KINDS), ord("E")}, *map(ord, "IPSE")
+    # A kind that the header has no fields of is in no frame.
+    readers = {ord(kind): reader(own, constants) for kind, own in fields.items() if own}
+    main, between, slow, event_marker = map(ord, "IPSE")
+    markers = {*readers, event_marker}
     rows: list[tuple[int, ...]] = []
     changes: list[tuple[int, ...]] = []
     # Tuples of numbers take several times as much as arrays do.

@@ -195,7 +195,7 @@ class Choice:
 
 
 Progress = Callable[[Sequence[Judged], int], None]
-"""GivenKind the structures judged so far, and about how many there will be, after each new one; may raise the next."""
+"""Takes the structures judged so far, and about how many there will be, after each new one; may raise the next."""
 
 
 class SearchStoppedError(Exception):

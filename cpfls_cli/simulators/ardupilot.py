@@ -28,6 +28,7 @@ from cpfls_cli.vehicle_limits import room_between
 
 KEYS = ("hoverThrOut", "diagonal_size", "propExpo", "refRotRate")
 """Of which such a file has some."""
+_FASTEST = 1e5  # Of a rotor, rad/s: no propeller turns so fast.
 _GRAVITY, _YAW_SHARE, _AIR, _THRUST_NUMBER = 9.80665, 0.05, 1.2, 0.025
 """The last is that of usual propellers which fit between the motors."""
 _MOST_MOTORS = 32
@@ -58,7 +59,7 @@ def read_ardupilot(file: Path) -> SimulatorModel:
     notes = list[str]()
     mass, size, motors = (_or_usual(numbers, key) for key in ("mass", "diagonal_size", "num_motors"))
     for each in (mass, size, motors):
-        if not each.value > 0:
+        if not each.value > 0 or (each is size and each.value > _FASTEST):
             raise InputError(f"{each.where} is {each.value:g}; write a number above 0")
     if motors.value not in range(1, _MOST_MOTORS + 1):
         raise InputError(f"{motors.where} is {motors.value:g}; write a number of motors, at most {_MOST_MOTORS}")
@@ -112,6 +113,8 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
     room = _THRUST_NUMBER * _AIR * room_between(hubs) ** 4 / (4 * pi**2)
     words = "Commands of 0 to 1 count as speeds of 0 to this, as propellers of this size turn; any number will do"
     speed = numbers.get("rotor_speed_max_rad_s") or Stated(float(f"{sqrt(lift / room) / share:.2g}"), words)
+    if not 0 < speed.value < _FASTEST:
+        raise InputError(f"{speed.where} is {speed.value:g}; write the largest speed of a rotor in rad/s")
     turning = share * speed.value
     factor = lift / turning**2
     # Torques of rotors cancel in hover, so their slope counts, and not their value.

@@ -101,6 +101,8 @@ _NOT_STATED = {
     "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
     "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
     "crazyflie": "thrust follows the volts of a motor; scale VMOTOR2THRUST0 to VMOTOR2THRUST3 by it",
+    "rotorpy": "k_eta and k_m are others; write them there",
+    "crazyflow": "rpm2thrust and rpm2torque are others; write them there",
 }
 """Why thrust or yaw torque of rotors is not put in, and what would do it."""
 
@@ -584,8 +586,19 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     return True
 
 
+def _hangs_on_hover(made: _Corrections, what: str) -> bool:
+    """Leave a number that the file states at the hover speed where this is corrected too."""
+    changed = [change.element for change, _ in made.changes.values()]
+    if made.of.model.format != "crazyflow" or not any("rpm2thrust" in element for element in changed):
+        return False
+    made.unchanged.append(f"{what}: it hangs on the hover speed, which the thrust changes; run this on the new file")
+    return True
+
+
 def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     tau = numbers["time_constant_s"]
+    if _hangs_on_hover(made, f"time constant {tau.value:.4g} s"):
+        return True
     up, down = ([getattr(rotor, kind) for rotor in made.rotors] for kind in ("lag_up", "lag_down"))
     if None in up or None in down or "lag_up" not in _TAGS[made.of.model.format]:
         return False
@@ -602,6 +615,8 @@ def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
 
 
 def _drag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
+    if _hangs_on_hover(made, f"drag of rotors {numbers['k_d'].value:.4g}"):
+        return True
     return made.of_rotors("drag", [_Found.of(numbers["k_d"])] * len(made.rotors), "drag of {whom} is {share}")
 
 

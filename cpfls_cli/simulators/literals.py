@@ -333,7 +333,10 @@ def toml_numbers(file: Path) -> Numbers:
 
 def _at(held: Any, key: Key) -> Any:
     for each in key:
-        held = held.get(each) if isinstance(held, dict) else held[int(each)] if isinstance(held, list) else None
+        if isinstance(held, list):
+            held = held[each] if isinstance(each, int) and each < len(held) else None
+        else:
+            held = held.get(each) if isinstance(held, dict) else None
     return held
 
 

@@ -60,6 +60,8 @@ def _rotors(numbers: Numbers, name: str) -> tuple[Rotor, ...]:
     keys = numbers.below(name, "rotor_pos")
     directions = numbers.row(name, "rotor_directions", count=len(keys))
     thrust, lag = numbers.need(name, "k_eta"), numbers.need(name, "tau_m")
+    if lag.value < 0:
+        raise InputError(f"{lag.where} is {lag.value:g}; write a time constant in s, 0 for none")
     if not thrust.value > 0:
         raise InputError(f"{thrust.where} is {thrust.value:g}; write a number above 0")
     found = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from os.path import commonpath
+from os.path import abspath, commonpath
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -258,26 +258,35 @@ def _speed(model: SimulatorModel, proposal: Proposal | None) -> tuple[float | No
 def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> SimulatorModel:
     """Read a model again with corrected files, by their names in the output; that it hovers is not asked."""
     names = model.output_names
-    folder = Path(commonpath([file.resolve().parent for file in model.files]))
+    # Includes are beside a file where it is named, and not where a link leads.
+    folder = Path(commonpath([abspath(file.parent) for file in model.files]))
     with TemporaryDirectory() as copied:
         for file in model.files:
-            copy = copied / file.resolve().relative_to(folder)
+            copy = copied / Path(abspath(file)).relative_to(folder)
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(texts.get(names[file]) or file.read_bytes())
-        main = copied / model.file.resolve().relative_to(folder)
+        main = copied / Path(abspath(model.file)).relative_to(folder)
         return as_stated(main.with_name(f"{main.name}:{model.section}") if model.section else main)
 
 
+def _times(new: Stated | None, before: Stated | None) -> float:
+    """Tell how many times a number is what it was, 1 where it is not stated."""
+    return new.value / before.value if new is not None and before is not None and before.value else 1.0
+
+
 def _settings(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> VehicleSettings:
-    rotors = []
-    for index, own, line in zip(of.order, stated.rotors, of.rotors, strict=True):
-        # Where controls are thrusts, a file states by how much they are changed.
-        most, before = (each.model.rotors[index].most for each in (of, given))
-        more = most.value / before.value if most is not None and before is not None else 1.0
+    """Give the vehicle of a file, `stated` being that of the file as given; of one without rotors those of the log."""
+    rotors = list(stated.rotors) if not of.order else []
+    for index, own, line in zip(of.order, stated.rotors, of.rotors, strict=False):
+        new, before = (each.model.rotors[index] for each in (of, given))
+        # Where controls are thrusts or shares, a file states by how much they are changed.
+        more = _times(new.most, before.most)
+        turn = more * _times(new.ratio, before.ratio)
+        absolute = not of.model.of_commands
         known = {
-            "spin": of.model.rotors[index].spin,
-            "thrust_factor_n_s2": line.thrust or more * own.thrust_factor_n_s2,
-            "drag_factor_n_m_s2": line.drag or more * own.drag_factor_n_m_s2,
+            "spin": new.spin,
+            "thrust_factor_n_s2": line.thrust if line.thrust and absolute else more * own.thrust_factor_n_s2,
+            "drag_factor_n_m_s2": line.drag if line.drag and absolute else turn * own.drag_factor_n_m_s2,
         }
         numbers = {key: value for key, value in known.items() if value}
         rotors.append(RotorSettings(**{**vars(own), **numbers, "position_m": tuple(line.position_m)}))
@@ -291,7 +300,7 @@ def vehicle_of(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehi
     A lag acts where a log has commands; measured speeds have it already. `given` is what `stated` was made of.
     """
     rotors = [of.model.rotors[index] for index in of.order]
-    shares = {name: float(np.mean([own(rotor) for rotor in rotors])) for name, own in _FLOWN.items()}
+    shares = {name: float(np.mean([own(rotor) for rotor in rotors] or [0.0])) for name, own in _FLOWN.items()}
     found = [(each.name, shares.get(str(each.quantity), 0.0)) for each in CATALOGUE.values()]
     effects = [ModelEffect(name, {}, np.array([share])) for name, share in found if share]
     for name, numbers in of.model.effects.items():

@@ -163,7 +163,8 @@ def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
         said["thrust_scale"] += f" (as the ratio of {shows} to the rotor torque shows too)"
     for name, words in said.items():
         quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
-        by_place.setdefault(taken if quantity in source.vehicle.unknown else "the config", []).append(words)
+        found_before = quantity in source.vehicle.unknown or r.base.vehicle != source.vehicle
+        by_place.setdefault(taken if found_before else "the config", []).append(words)
     return len(said), [f"{joined(words)} against {place}" for place, words in by_place.items()]
 
 
@@ -240,8 +241,8 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
     compared, origin = read_result_of_vehicle(disagreement, Disagreement, run.study)
     if not compared.is_base(run.study.vehicle):
         raise InputError(
-            f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
-            "misses, so compare without --model, or with an identified model"
+            f"{disagreement}: was made with a model that has effects already, or numbers of its own; `cpfls diagnose` "
+            "names what a base model misses, so compare without --model, or with an identified model"
         )
     flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
     learned = compared.learned

@@ -18,7 +18,7 @@ from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.learned import as_inputs, joined_flights
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import parse_config, stored_study, validate
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
@@ -36,7 +36,6 @@ from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -121,7 +120,8 @@ def gap(
         run.caution(caution)
     check_ignored(run.study)
     warn_of_no_body(run)
-    base = read_base(model, run.study)
+    # Of a simulator's file the numbers are those that it states, and a model gives those that it leaves open.
+    base = read_base(model if of_file is None else None, run.study)
     given, split = _flights(run, flights, held_out, base, [*(inputs[role] for role in trained), *unseen.values()])
     learned = learned_by(model)
     given = with_seen(given, model, learned, known_by(trained, inputs))
@@ -136,7 +136,7 @@ def gap(
         run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
     )
     if of_file is not None:
-        found = _with_file(run, found, of_file, base.vehicle, split)
+        found = _with_file(run, found, of_file, split)
     run.progress(0.85, 1, "extend")
     extension, refused = None, ""
     try:
@@ -187,11 +187,16 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     return made.vehicle
 
 
-def _with_file(run: Run, found: Diagnosis, of: VehicleOf, vehicle: VehicleSettings, split: FlightSplit) -> Diagnosis:
+def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) -> Diagnosis:
     """Put what was found into the simulator's file, and play held-out flights back in it."""
-    said, files = corrected(of, run.study.vehicle, found, split.training)
+    vehicle = run.study.vehicle
+    said, files = corrected(of, vehicle, found, split.training)
     run.texts.update({run.output / name: text for name, text in files.items()})
-    before_after = flown(of, files, vehicle, split.training, split.held_out, run.study.gap)
+    try:
+        before_after = flown(of, files, vehicle, split.training, split.held_out, run.study.gap)
+    except InputError as error:
+        run.note(f"{of.model.file.name} as corrected is not played back: {visible(str(error))}")
+        return replace(found, corrected=said)
     return replace(found, corrected=replace(said, flown=before_after))
 
 

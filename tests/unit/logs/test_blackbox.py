@@ -111,6 +111,13 @@ def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):
     assert contents.warnings == ("1 frames are broken; everything up to the next whole frame is missing",)
 
 
+def test_a_stray_letter_of_frames_that_the_log_has_none_of_is_no_frame(read):
+    whole = [part for part in frames(flight()) if part[:1] == b"I"]
+    named = b"\n".join(line for line in header().split(b"\n") if not line.startswith(b"H Field P"))
+    topic = read(named + whole[0] + b"P" + b"".join(whole)).topics[""]
+    assert {len(column) for column in topic.values()} == {len(whole)}
+
+
 def test_a_jump_in_time_is_a_broken_frame_unless_the_recorder_paused(read):
     rows = flight(begin_us=1_000_000)
     rows[32:, 1] += 30_000_000

@@ -490,23 +490,23 @@ def test_a_curve_is_corrected_in_proportion(tmp_path):
     path = tmp_path / "params.toml"
     path.write_text(SECTION.format(name="a"))
     before = read_model(path)
-    said, new = correct(
-        path,
-        effect("parameter_error", inertia_x=0.0, thrust_scale=-0.17),
-        effect("motor_lag", time_constant_s=(0.2, 0.002)),
-        effect("rotor_drag", k_d=(1e-6, 1e-8)),
-    )
+    beside = effect("motor_lag", time_constant_s=(0.2, 0.002)), effect("rotor_drag", k_d=(1e-6, 1e-8))
+    said, new = correct(path, effect("parameter_error", inertia_x=0.0, thrust_scale=-0.17), *beside)
     changes = {change.element: (change.before, change.after) for change in said.changes}
     assert changes["a.rpm2thrust[2]"] == (2.5e-10, 2.075e-10)
     assert changes["a.rpm2thrust[1]"] == (-5.4e-7, -4.482e-7)
+    # What the file states at its hover speed waits for the thrust.
+    assert not [element for element in changes if "drag" in element or "rotor_dyn" in element]
+    assert [each for each in said.unchanged if "the hover speed" in each]
+    said, new = correct(path, *beside)
+    changes = {change.element: (change.before, change.after) for change in said.changes}
     assert changes["a.rotor_dyn_coef[0]"] == (7.4, 5.0)
     assert new.rotors[0].lag_up.value == pytest.approx(0.2, rel=1e-3)
     (slower,) = [change.sentence for change in said.changes if change.element == "a.rotor_dyn_coef[0]"]
     assert slower == "time constant of M1 to M4 is 48 % more"
     assert new.rotors[0].lag_down.value == pytest.approx(0.2, rel=0.1)
     assert changes["a.drag_matrix[0][0]"][1] == changes["a.drag_matrix[1][1]"][1]
-    assert new.rotors[0].drag.value == pytest.approx(1e-6, rel=0.1)
-    # At the same speed the new curve lifts 17 % less.
+    assert new.rotors[0].drag.value == pytest.approx(1e-6, rel=1e-3)
     assert len(before.rotors) == len(new.rotors)
     assert path.parent.joinpath("new", "params.toml").read_text().startswith("# Corrected by cpfls gap")
 

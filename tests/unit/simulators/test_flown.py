@@ -67,3 +67,25 @@ def test_included_files_are_read_as_corrected(tmp_path):
     new = as_corrected(before, {before.output_names[span.file]: raw[: span.start] + b"2.5" + raw[span.end :]})
     assert new.bodies[0].mass.value == 2.5
     assert base.read_bytes() == raw
+
+
+def test_a_file_without_rotors_flies_those_of_the_log(tmp_path):
+    body = """<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="1.5"
+        diaginertia="0.018 0.02 0.034"/></body></worldbody></mujoco>"""
+    (tmp_path / "v.xml").write_text(body)
+    of = of_log(read_model(tmp_path / "v.xml"), None, None)
+    assert not of.model.rotors
+    flies = vehicle_of(of, of, STATED)
+    assert flies.vehicle.rotors == STATED.rotors
+    assert flies.vehicle.mass_kg == 1.5
+
+
+def test_a_frame_of_ardupilot_flies_the_thrust_that_is_corrected(tmp_path):
+    frame = """{"mass": 1.5, "diagonal_size": 0.45, "hoverThrOut": HOVER, "propExpo": 0.5, "num_motors": 4}"""
+    models = []
+    for name, hover in (("a", 0.3), ("b", 0.36)):
+        (tmp_path / f"{name}.json").write_text(frame.replace("HOVER", str(hover)))
+        models.append(of_log(read_model(tmp_path / f"{name}.json"), None, None))
+    given, new = models
+    before, after = (vehicle_of(each, given, STATED).vehicle.rotors[0] for each in (given, new))
+    assert after.thrust_factor_n_s2 == pytest.approx(before.thrust_factor_n_s2 * 0.3 / 0.36, rel=1e-9)

@@ -158,6 +158,7 @@ def test_a_section_of_toml(mine):
         ("params.toml", lambda text: text, "has the vehicles a, b; name one of them, as .*params.toml:a"),
         ("params.toml:c", lambda text: text, "has the vehicles a, b"),
         ("params.toml:a", lambda text: text.replace("L =", "L"), "is no valid TOML"),
+        ("params.toml:a", lambda text: text.replace("[a]", "[[a]]").replace("[b]", "[[b]]"), "params.toml"),
         (
             "params.toml:a",
             lambda text: text.replace("L = ", 'L = "', 1).replace("0.0325", '0.0325"', 1),
