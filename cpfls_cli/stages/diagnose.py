@@ -156,6 +156,7 @@ def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
     guessed = any(map(is_of_guesses, source.header.cautions))
     taken = "the guess" if guessed else "the vehicle that was found"
     found, by_place = wrong_numbers(r.effects), dict[str, list[str]]()
+    of_model = "model" in source.header.inputs and r.base.vehicle != source.vehicle
     follow = [name for name in of_thrust(r.effects) if name in found]
     said = {name: words for name, words in found.items() if name not in follow}
     if follow:
@@ -163,7 +164,7 @@ def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
         said["thrust_scale"] += f" (as the ratio of {shows} to the rotor torque shows too)"
     for name, words in said.items():
         quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
-        found_before = quantity in source.vehicle.unknown or r.base.vehicle != source.vehicle
+        found_before = quantity in source.vehicle.unknown or of_model
         by_place.setdefault(taken if found_before else "the config", []).append(words)
     return len(said), [f"{joined(words)} against {place}" for place, words in by_place.items()]
 
