@@ -249,6 +249,8 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
     rows = np.concatenate(columns, axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
     length = found.settings.block_s / windows.period
+    # Blocks of a run have consecutive numbers in time, as errors by neighbouring blocks take it.
+    most = 1 + max(len(flown) for flown in given.flown) // length
     for number, run in enumerate(given.runs):
         begins = windows.hop * np.arange((there.flight_index == run.flight).sum())
         inside = (begins >= run.part.start) & (begins + len(windows.weight) <= run.part.stop)
@@ -256,8 +258,8 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
         middles.append(begins[inside] - run.part.start + len(windows.weight) // 2)
         path, place = given.repeats.path(number, len(given.flown[number]))
         # Runs of one path know of each other, but not of what was before.
-        of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
-        of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
+        of_path.append(path * most + place[middles[-1]] // length)
+        of_run.append((number - len(given.runs)) * most + middles[-1] // length)
     known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
     new, predicted, _ = innovations(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
     return _predicted(own, known, of_path), _predicted(new, predicted, of_run)

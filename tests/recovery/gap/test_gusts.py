@@ -1,6 +1,7 @@
 """Gusts called gusts where instruments tell, names and numbers beside them, in flights of known truth."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
+from cpfls_cli.gap.naming.by_instruments import _windows_of_runs
+from cpfls_cli.gap.naming.estimate import fitted
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
@@ -109,6 +112,24 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert effect.name == "motor_lag"
     # The gyroscope's noise is inside of the loop.
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
+
+
+@pytest.mark.parametrize("kind", ["asked", "again"])
+def test_blocks_of_a_run_follow_each_other_in_time(flown, kind):
+    """Errors by neighbouring blocks compare blocks of one run: numbers of several runs may not alternate."""
+    recordings = recorded(flown[kind], TRUE.vehicle, setpoints=kind == "asked")
+    windows = common_windows(recordings, FEW)
+    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    found = fitted(flights, [], np.ones(6), FEW)
+    of_paths, of_runs = _windows_of_runs(found, known_motion(recordings))
+    for runs in (of_runs, of_paths):
+        blocks = [run.block for run in runs]
+        assert all(np.isin(np.diff(each), [0, 1]).all() for each in blocks)
+        # Runs of one path share their blocks; others have none between those of another.
+        ranges = sorted({(each.min(), each.max()) for each in blocks})
+        assert kind == "again" or all(last < first for (_, last), (first, _) in pairwise(ranges))
+    ranges = sorted((run.block.min(), run.block.max()) for run in of_runs)
+    assert all(last < first for (_, last), (first, _) in pairwise(ranges))
 
 
 @pytest.mark.parametrize(("setpoints", "instrument_kind"), [(True, "setpoints"), (False, "past")])
