@@ -40,6 +40,7 @@ class Truth(NamedTuple):
     drag: float
     gyro_noise: float = 0.01
     speed_noise: float = 0.001
+    rotor_drag: float = 0.0
 
     @property
     def places(self):
@@ -172,7 +173,7 @@ def _flown(flights, path, pushes, shoves, noise):
     logs = np.empty((-(-len(path) // EVERY), len(flights), 29))
     for number, (truth, *_, bandwidth) in enumerate(flight[:5] for flight in flights):
         hover, outer = truth.mass * GRAVITY / 4 / truth.thrust_factor, min(2.0, bandwidth / 6)
-        body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia])
+        body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia, truth.rotor_drag])
         pilot = np.array([outer**2, 1.6 * outer, 0.05 * hover, 4 * hover, *(bandwidth * np.array([1.0, 1.0, 0.4]))])
         told = (np.ascontiguousarray(each[:, number]) for each in (path, pushes, shoves, noise))
         _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *told, logs[:, number])
@@ -186,7 +187,7 @@ def _integrated(body, pilot, mixer, unmix, hover, path, pushes, shoves, noise, l
     """Fly one flight into its log."""
     position, velocity, turn = path[0, :3].copy(), path[0, 3:6].copy(), np.eye(3)
     rate, measured, wanted, wrench = np.zeros(3), np.empty(3), np.empty(3), np.empty(4)
-    speed, command, squared = np.full(4, hover), np.empty(4), np.empty(4)
+    speed, command, squared, hubs = np.full(4, hover), np.empty(4), np.empty(4), np.empty(4)
     for now in range(len(path)):
         for axis in range(3):
             measured[axis] = rate[axis] + noise[now, axis]
@@ -206,7 +207,8 @@ def _integrated(body, pilot, mixer, unmix, hover, path, pushes, shoves, noise, l
             wrench[row] = 0.0
             for rotor in range(4):
                 wrench[row] += mixer[row, rotor] * squared[rotor]
-        _move(body, wrench, pushes[now], shoves[now], position, velocity, turn, rate)
+        _hubs(body, mixer, squared, hubs)
+        _move(body, wrench, hubs, pushes[now], shoves[now], position, velocity, turn, rate)
 
 
 @part
@@ -232,10 +234,23 @@ def _ask(body, pilot, path, position, velocity, turn, measured, up, wrench):
 
 
 @part
-def _move(body, wrench, push, shove, position, velocity, turn, rate):
+def _hubs(body, mixer, squared, hubs):
+    """Sum what hubs drag in proportion to the speed of their rotors: alone, times x, times y, times x^2 + y^2."""
+    hubs[:] = 0.0
+    for rotor in range(4):
+        x, y = -mixer[2, rotor] / mixer[0, rotor], mixer[1, rotor] / mixer[0, rotor]
+        drag = body[7] * np.sqrt(squared[rotor])
+        hubs[0] += drag
+        hubs[1] += drag * x
+        hubs[2] += drag * y
+        hubs[3] += drag * (x**2 + y**2)
+
+
+@part
+def _move(body, wrench, hubs, push, shove, position, velocity, turn, rate):
     """Take one step; force and air are those in the middle of it."""
     mass, damping, drag = body[0], body[2], body[3]
-    midway, once, twice, spun = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    midway, once, twice, spun, air = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(2)
     for row in range(3):
         _cross(turn[row], rate, midway[row])
         for axis in range(3):
@@ -243,8 +258,11 @@ def _move(body, wrench, push, shove, position, velocity, turn, rate):
     for axis in range(3):
         force = midway[axis, 2] * wrench[0]
         for level in range(2):
-            air = midway[0, level] * velocity[0] + midway[1, level] * velocity[1] + midway[2, level] * velocity[2]
-            force -= midway[axis, level] * drag * air
+            air[level] = (
+                midway[0, level] * velocity[0] + midway[1, level] * velocity[1] + midway[2, level] * velocity[2]
+            )
+            force -= midway[axis, level] * drag * air[level]
+            force -= midway[axis, level] * (hubs[0] * air[level] + rate[2] * (hubs[1] if level else -hubs[2]))
         once[axis] = force / mass + shove[axis]
     once[2] -= GRAVITY
     for axis in range(3):
@@ -252,7 +270,8 @@ def _move(body, wrench, push, shove, position, velocity, turn, rate):
         velocity[axis] += STEP_S * once[axis]
         one, other = (axis + 1) % 3, (axis + 2) % 3
         gyroscopic = (body[4 + other] - body[4 + one]) * rate[one] * rate[other]
-        spun[axis] = (wrench[1 + axis] - damping * rate[axis] - gyroscopic) / body[4 + axis] + push[axis]
+        own = hubs[1] * air[1] - hubs[2] * air[0] + hubs[3] * rate[2] if axis == 2 else 0.0
+        spun[axis] = (wrench[1 + axis] - damping * rate[axis] - own - gyroscopic) / body[4 + axis] + push[axis]
     for axis in range(3):
         begun = rate[axis]
         rate[axis] += STEP_S * spun[axis]
