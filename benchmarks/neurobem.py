@@ -17,7 +17,7 @@ accelerations and the stated mass and inertia; a model with another inertia ente
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,8 @@ COLUMNS = (
     *(f"RMSE F_{axis} N" for axis in "xyz"),
 )
 UNKNOWN = ("",) * 6
+PARTS = {"F_xy": [3, 4], "F_z": [5], "M_xy": [0, 1], "M_z": [2]}
+"""Axes of the wrench that NeuroBEM prints one error of."""
 
 
 def row(name: str, test: Segment, runs: Runs, reference: float, wrench: Array | None) -> list[object]:
@@ -91,11 +93,26 @@ def main(data: Path, *, unknown: bool = False, held_out: list[str] | None = None
             write_flight(write, each.flight, each.wrench[:, 3:] / MASS)
         return
     stated, rows = constants_unknown(VEHICLE) if unknown else VEHICLE, []
+    off: dict[str, list[Array]] = {}
     for test in [each for each in found if not held_out or each.flight.name in held_out]:
         training = [other.flight for other in found if other is not test]
         models = {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(stated, training, baselines=False)}
         rows += rows_of(test, models)
-    table("neurobem_unknown" if unknown else "neurobem", COLUMNS, rows)
+        off.setdefault("nothing acts", []).append(test.wrench)
+        off.setdefault("BEM+NN", []).append(test.hybrid - test.wrench)
+        for name, model in models.items():
+            kind = "vehicle found" if name.startswith("vehicle") else name
+            off.setdefault(kind, []).append(wrench_of(model, test.flight) - test.wrench)
+    name = "neurobem_unknown" if unknown else "neurobem"
+    table(name, COLUMNS, rows)
+    print("\nAll segments together, as NeuroBEM prints it: root mean square, N and N m.\n")
+    columns = ("model", *(f"RMSE {part}" for part in PARTS))
+    table(f"{name}_published", columns, [[each, *_by_part(errors)] for each, errors in off.items()])
+
+
+def _by_part(errors: Sequence[Array]) -> Iterator[float]:
+    flat = np.concatenate(errors)
+    yield from (float(np.sqrt(np.mean(flat[:, axes] ** 2))) for axes in PARTS.values())
 
 
 def rows_of(test: Segment, models: Mapping[str, VehicleModel]) -> list[list[object]]:

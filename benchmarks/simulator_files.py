@@ -44,13 +44,17 @@ NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 
 
 class Hidden(NamedTuple):
-    """What flies, what the right file and the wrong one hold, and the name; commands alone may be logged."""
+    """What flies, what the right file and the wrong one hold, and the name; commands alone may be logged.
+
+    A centre of mass, m, is where the wrong file's link has to have it.
+    """
 
     truth: Truth
     right: VehicleModel
     wrong: VehicleModel
     name: str
     commands: bool = False
+    centre: tuple[float, float] = (0.0, 0.0)
 
 
 class Answer(NamedTuple):
@@ -84,7 +88,8 @@ def _hidden() -> Iterator[tuple[str, Hidden]]:
         flown = VehicleModel(vehicle=truth.vehicle, response=RotorResponse(lag_s=truth.lag_s))
         moved = [replace(each, position_m=(*np.add(each.position_m[:2], offset), 0.0)) for each in truth.vehicle.rotors]
         size = f"centre of mass {1e3 * np.hypot(*offset):.1f} mm, {truth.mass:.2g} kg"
-        yield size, Hidden(truth, flown, _of(flown, replace(truth.vehicle, rotors=tuple(moved))), "com_offset")
+        wrong = replace(truth.vehicle, rotors=tuple(moved))
+        yield size, Hidden(truth, flown, _of(flown, wrong), "com_offset", centre=offset)
     late = true._replace(lag_s=0.03)
     wrong, slow = (VehicleModel(vehicle=true.vehicle, response=RotorResponse(lag_s=lag)) for lag in (0.001, 0.03))
     yield "lag of 30 ms", Hidden(late, slow, wrong, "motor_lag", commands=True)
@@ -136,7 +141,7 @@ def _answer(hidden: Hidden, draw: int) -> Answer:
             of = of_log(read_model(wrong), None, None)
             of = replace(of, spins=tuple(each.spin for each in stated.rotors))
             said, _ = corrected(of, stated, found, flights[:-1])
-            formats[form] = _compared(right, wrong, said.changes)
+            formats[form] = _compared(right, wrong, said.changes, hidden.centre)
     return Answer(found.verdict, tuple(each.name for each in found.effects), formats)
 
 
@@ -147,7 +152,9 @@ def _written(folder: Path, form: str, model: VehicleModel) -> Path:
     return path
 
 
-def _compared(right: Path, wrong: Path, changes: Sequence[Change]) -> tuple[list[bool], int]:
+def _compared(
+    right: Path, wrong: Path, changes: Sequence[Change], centre: tuple[float, float]
+) -> tuple[list[bool], int]:
     """Tell of each hidden number that is written whether its interval holds the truth, and count the others."""
     wrongs, rights = (path.read_text().splitlines() for path in (wrong, right))
     # A gear is written where the gain of the same actuator is wrong.
@@ -161,6 +168,7 @@ def _compared(right: Path, wrong: Path, changes: Sequence[Change]) -> tuple[list
         numbers = zip(*(map(float, NUMBER.findall(lines[place])) for lines in (wrongs, rights)), strict=True)
         before, true = min(numbers, key=lambda pair: abs(pair[0] - change.before))
         true = before * true_gain / before_gain if change.element == "gear z" else true
+        true = dict(zip(("pose x", "pose y"), centre, strict=True)).get(change.element, true) if any(centre) else true
         if abs(true - before) > 1e-3 * abs(before):
             within.append(change.low <= true <= change.high)
         elif change.element not in FOLLOWS:
