@@ -166,7 +166,8 @@ def _compared(
         # Comments in front of the vehicle may be longer in one of them, so lines are counted from the end.
         place = int(line[1]) - 1 - len(wrongs)
         numbers = zip(*(map(float, NUMBER.findall(lines[place])) for lines in (wrongs, rights)), strict=True)
-        before, true = min(numbers, key=lambda pair: abs(pair[0] - change.before))
+        # Of equal numbers in a line the one that differs is meant.
+        before, true = min(numbers, key=lambda pair: (abs(pair[0] - change.before), pair[0] == pair[1]))
         true = before * true_gain / before_gain if change.element == "gear z" else true
         true = dict(zip(("pose x", "pose y"), centre, strict=True)).get(change.element, true) if any(centre) else true
         if abs(true - before) > 1e-3 * abs(before):

@@ -196,7 +196,7 @@ HoldOption = Annotated[
 ]
 
 TimeOrder = StrEnum("TimeOrder", "date name given")
-"""What tells which flight came first."""
+"""What shows which flight came first."""
 AutopilotChoice = StrEnum("AutopilotChoice", "px4 ardupilot betaflight crazyflie")
 """Whose control law is meant."""
 

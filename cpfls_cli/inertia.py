@@ -15,8 +15,8 @@ INERTIA_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Row and column of each of the six."""
 
 EXPLAINED = 0.9
-"""Share of a rotation that torque has to explain for its moment of inertia to be told: two regressions agree to a tenth
-then, less than a fifth of the usual gain margin of 6 dB."""
+"""Share of a rotation that torque has to explain for its moment of inertia to be identified: two regressions agree to a
+tenth then, less than a fifth of the usual gain margin of 6 dB."""
 
 KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia, or what is positive like it, is not known."""

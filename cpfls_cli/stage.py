@@ -214,7 +214,7 @@ class Stage:
     fills : Filled or None
         Whether its output is a folder with one answer.
     study : bool or callable
-        Whether it takes a config; or what tells it from what else was given, of one that declares its ``config``.
+        Whether it takes a config; or what separates it from what else was given, of one that declares its ``config``.
     output : object
         Option of its output where it is another than usual; may be left out. False of one that only answers.
     several : bool

@@ -30,7 +30,7 @@ _MOST_UNITS = 3
 """Numbers that are taken to be in a wrong unit at once; each counts as much as a number at the end of what is usual."""
 
 _CLOSE, _MOST_READINGS = 1.0, 3
-"""How much less likely another reading may be to be told too, and how many are."""
+"""How much less likely another reading may be to be listed too, and how many are."""
 
 
 class Limit(NamedTuple):
@@ -274,7 +274,7 @@ def beyond_any_vehicle(figures: Figures) -> tuple[Beyond, ...]:
     readings = _readings(figures)
     if not readings:
         first = {limit.of[0]: limit for limit in reversed(broken)}
-        return tuple(Beyond(name, f"{_told(limit, figures)}{_look(limit)}") for name, limit in first.items())
+        return tuple(Beyond(name, f"{_stated(limit, figures)}{_look(limit)}") for name, limit in first.items())
     best, *others = readings
     found = [_in_another_unit(figures, name, best) for name in best]
     also = "".join(f"; or {_in_words(figures, units)}" for units in others[:_MOST_READINGS])
@@ -309,7 +309,7 @@ def _read(figures: Figures, changed: Mapping[str, str]) -> dict[str, float]:
     return read
 
 
-def _told(limit: Limit, figures: Figures) -> str:
+def _stated(limit: Limit, figures: Figures) -> str:
     value, unit = limit.value(figures), f" {limit.unit}" if limit.unit else ""
     bound = f"less than {limit.possible[0]:g}" if value < limit.possible[0] else f"more than {limit.possible[1]:g}"
     return f"the {limit.what} is {value:.3g}{unit}, and no vehicle has {bound}"
@@ -325,10 +325,10 @@ def _in_another_unit(figures: Figures, name: str, best: Mapping[str, str]) -> Be
     read = _read(figures, others)
     concerned = next((limit for limit in broken_limits(read) if name in limit.of), None)
     given = "with the others right, " if concerned is None or others.keys() & {*concerned.of} else ""
-    told = "" if concerned is None else f"{_told(concerned, read)}: "
+    stated = "" if concerned is None else f"{_stated(concerned, read)}: "
     quantity, value = _QUANTITIES[name], figures[name]
     meant = f"{value * quantity.units[unit]:.4g} {quantity.unit}? {value:.4g} is {quantity.words} in {unit}"
-    return Beyond(name, f"{given}{told}{meant}")
+    return Beyond(name, f"{given}{stated}{meant}")
 
 
 def _in_words(figures: Figures, units: Mapping[str, str]) -> str:

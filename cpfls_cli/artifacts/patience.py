@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 _WATCH = """
 import os, queue, signal, sys, threading, time
 
-told = queue.Queue()
+received = queue.Queue()
 
 def listen():
     while chunk := os.read(0, 65536):
-        told.put(chunk)
+        received.put(chunk)
     os._exit(0)
 
 threading.Thread(target=listen, daemon=True).start()
 wait, path, rest = None, "", b""
 while True:
     try:
-        chunk = told.get(timeout=wait)
+        chunk = received.get(timeout=wait)
     except queue.Empty:
         break
     # A handler of signals that finds the interpreter held leaves the number of the signal here.

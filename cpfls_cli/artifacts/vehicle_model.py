@@ -93,15 +93,19 @@ class Vehicle(FoundVehicle, AnyModel):
         Where they rest on instruments, by what they explain of the repeatable motion; else by playback, as far as they
         are identified at all. No word is good where the frequency response about roll or pitch is off.
         """
-        told = self.identifies_turning and not set(FOUND_AS.values()) & set(self.on_bound)
+        identified = self.identifies_turning and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
-            told = told and self.identifies_yaw and not self.loop.misses
+            identified = identified and self.identifies_yaw and not self.loop.misses
             return capped(
-                self._by_playback, self.contradictions, loop=self.loop.shows_loop, lacks=self.responses_off, told=told
+                self._by_playback,
+                self.contradictions,
+                loop=self.loop.shows_loop,
+                lacks=self.responses_off,
+                identified=identified,
             )
         lacks = self.responses_off or self.instruments.lacks
         word = Trust.SIMULATION if lacks or self.responses_judged else Trust.NOT_JUDGED
-        return capped(word, self.contradictions, lacks=lacks, told=told)
+        return capped(word, self.contradictions, lacks=lacks, identified=identified)
 
     @property
     def forecast_verdict(self) -> Trust:

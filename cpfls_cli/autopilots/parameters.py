@@ -116,7 +116,7 @@ class Firmware:
         return version is not None and version < oldest
 
     def of(self, system: str) -> str:
-        """Name the version that a file is for: that of a log where it tells one."""
+        """Name the version that a file is for: that of a log where it states one."""
         return system if system and version_of(system) is not None else self.title
 
     def names(self, system: str) -> Mapping[str, str]:

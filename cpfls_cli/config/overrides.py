@@ -39,7 +39,7 @@ def _override_key(data: dict[str, Any], key: str, value: Any) -> None:
         raise SettingError(key, _MALFORMED)
     *parents, last = parts
     node: Any = data
-    # A vehicle has no defaults: what its config leaves out is told as missing.
+    # A vehicle has no defaults: what its config leaves out is reported as missing.
     default: Any = {section: values for section, values in resolved(Study()).items() if section != "vehicle"}
     for parent, following in itertools.pairwise(parts):
         default = default.get(parent) if isinstance(default, dict) else None

@@ -60,7 +60,7 @@ Wrenches = Callable[[Instant], Mapping[str, Wrench]]
 def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbers:
     """Arrange the numbers of a simulator whose rotors give thrust and yaw torque by their squared speeds.
 
-    `wrenches` tells what it knows beside these; `alike` asks for one thrust and one torque factor of all rotors.
+    `wrenches` is what it knows besides these; `alike` asks for one thrust and one torque factor of all rotors.
     """
     rotors, hubs = model.rotors, places(model, alike=alike)
     moved = tuple(replace(rotor, position_m=tuple(hub)) for rotor, hub in zip(model.vehicle.rotors, hubs, strict=True))

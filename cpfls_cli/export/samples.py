@@ -63,17 +63,17 @@ class Samples:
 
     Attributes
     ----------
-    untold : tuple of str
-        Numbers that the flights do not tell.
+    not_determined : tuple of str
+        Numbers that the flights do not identify.
     held : tuple of str
-        Guesses, which no flight tells anything of: they do not differ.
+        Guesses, of which flights say nothing: they do not differ.
     """
 
     sheet: Sheet
     spread: Spread
     numbers: Mapping[str, FoundNumber]
     seed: int
-    untold: tuple[str, ...]
+    not_determined: tuple[str, ...]
     held: tuple[str, ...]
 
     @property
@@ -89,7 +89,7 @@ class Samples:
         ends = np.percentile(self.spread.values, _ENDS, axis=0).T.tolist() if self.spread.names else []
         centre = self.spread.centre.tolist()
         for name, value, (low, high) in zip(self.spread.names, centre, ends, strict=True):
-            found[name] = Range(self.numbers[name].unit, value, low, high, name not in self.untold)
+            found[name] = Range(self.numbers[name].unit, value, low, high, name not in self.not_determined)
         return found | dict(_gust_ranges(self.sheet.model, self.spread))
 
     @property
@@ -143,7 +143,7 @@ class Samples:
             "seed": self.seed,
             "verdict": self.sheet.verdict,
             "cautions": list(self.sheet.cautions),
-            "not_determined": list(self.untold),
+            "not_determined": list(self.not_determined),
             "held_at_guesses": list(self.held),
             "vehicles": len(self.spread.models),
             "drawn": self.spread.tried,
@@ -244,7 +244,7 @@ def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, R
 
 
 def require_ending(name: str, suffix: str) -> str:
-    """Refuse a file whose ending tells no form."""
+    """Refuse a file whose ending names no form."""
     if suffix not in ENDINGS:
         raise InputError(f"{name}: its suffix names no form; give the name one of the suffixes {', '.join(ENDINGS)}")
     return suffix

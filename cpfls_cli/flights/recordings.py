@@ -253,11 +253,11 @@ def _actuated(
     if speed is not None:
         command = _command_beside(flight, known, study)
         return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command), ()
-    told = _by_wrench(known, study.vehicle)
-    if told is None:
+    by_wrench = _by_wrench(known, study.vehicle)
+    if by_wrench is None:
         torque, thrust = known["body_torque"], known.get("thrust")
         return replace(signals, stated_torque=torque, stated_thrust=thrust, commanded=True), ()
-    speed, backward = told
+    speed, backward = by_wrench
     notes = ["rotor commands are those that give its thrust and torque by the four rotors of the config"]
     if backward:
         notes.append(f"a rotor would have to push down at {backward} of {len(speed)} samples, and stands still there")

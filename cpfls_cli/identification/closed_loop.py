@@ -1,4 +1,4 @@
-"""What an autopilot's loop does to the torque of flights: freed of it where something tells, else bounded.
+"""What an autopilot's loop does to the torque of flights: freed of it where instruments identify it, else bounded.
 
 An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
 Another run of the same path has the same motion asked for, and another gust, and a setpoint from outside of the loop
@@ -95,16 +95,16 @@ class FreedTorque:
     setpoints: tuple[str, ...] = ()
 
     @property
-    def told(self) -> BoolArray:
-        """Axes, shape (3,), whose moment of inertia the instruments tell to a factor of two."""
-        return _told(self.half)
+    def identified(self) -> BoolArray:
+        """Axes, shape (3,), whose moment of inertia the instruments identify to a factor of two."""
+        return _known_to_two(self.half)
 
     @property
     def contradicts(self) -> bool:
         """Whether instruments find another body than least squares: off by their interval, and visibly."""
         with np.errstate(invalid="ignore", divide="ignore"):
             off = np.abs(np.log(self.least_squares[:3] / self.rigid_body[:3]))
-        return bool((~(off <= np.maximum(self.half, VISIBLE)) & self.told).any())
+        return bool((~(off <= np.maximum(self.half, VISIBLE)) & self.identified).any())
 
 
 def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
@@ -116,7 +116,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
     ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
     noise of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
-    setpoints what the rest of the flights tells of the answer to them. Then ``sum A'^T (tau - A x) = 0``, for what is
+    setpoints the first-stage fit of the other flights. Then ``sum A'^T (tau - A x) = 0``, for what is
     predicted errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and
     what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid
     body of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they
@@ -133,8 +133,8 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     Returns
     -------
     FreedTorque or None
-        None where nothing tells roll and pitch to a factor of two, or finds no body; where no instruments, for long
-        enough, are there and the flights do not show the loop; and of flights that stay in their files.
+        None where nothing identifies roll and pitch to a factor of two, or finds no body; where no instruments, for
+        long enough, are there and the flights do not show the loop; and of flights that stay in their files.
 
     References
     ----------
@@ -166,7 +166,7 @@ def _by_instruments(
     if _share_known(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs, period) > _MOSTLY:
         return None
     rigid_body, half = _solved(crossed)
-    if not _told(half)[2]:
+    if not _known_to_two(half)[2]:
         # What is hardly known would shake what is: about yaw the body stays as least squares has it.
         runs = [run.without_yaw() for run in runs]
         rigid_body, beside = _solved(_crossed(runs, repeated=repeated), least_squares)
@@ -191,7 +191,7 @@ def _by_instruments(
         instrument_kind=given.kind,
         setpoints=() if repeated else given.names,
     )
-    if not (found.told[:2].all() and len(found.learned)):
+    if not (found.identified[:2].all() and len(found.learned)):
         return None
     taken = (repeated and not found.alone) or found.contradicts or _shows_loop(training, least_squares)
     return found if taken else None
@@ -354,8 +354,8 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
             own = values[number].reshape(len(setpoint), -1)
             known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
     width = asked[0].shape[1] if asked else 0
-    told, every = sum(int(there.sum()) for there in known.values()), sum(len(values[number]) for number in known)
-    if told <= FOLDS * width or every * width > _MOST:
+    rows_known, every = sum(int(there.sum()) for there in known.values()), sum(len(values[number]) for number in known)
+    if rows_known <= FOLDS * width or every * width > _MOST:
         return {}
     there_asked = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
     predicted = first_stage_fit_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
@@ -412,7 +412,7 @@ def _solved(crossed: Array, held: Array | None = None) -> tuple[Array, Array]:
     return found, np.nan_to_num(half_width(error[:3], len(crossed)) / moments, nan=np.inf)
 
 
-def _told(half: Array) -> BoolArray:
+def _known_to_two(half: Array) -> BoolArray:
     return np.asarray(2 * half <= np.log(KNOWN))
 
 

@@ -68,7 +68,7 @@ class FitDiagnostics:
     freed : FreedTorque or None
         What the parameters were learned from, where instruments tell the vehicle from the loop.
     loop : LoopBounds or None
-        How far the loop may have misled the model, where nothing from outside tells it from the vehicle.
+        How far the loop may have misled the model, where nothing from outside separates it from the vehicle.
     """
 
     fit: Fit
@@ -149,9 +149,11 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         little, without = "too little of yaw comes again", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
-        if told
+        if identified
         else f"{name} not determined because {little}, so the value of least squares is kept"
-        for name, value, half, told in zip(INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.told, strict=False)
+        for name, value, half, identified in zip(
+            INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.identified, strict=False
+        )
     )
     rest = f"; {freed.alone} of the training flights {without} and contribute nothing" if freed.alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
@@ -162,7 +164,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _loop(diagnostics: FitDiagnostics) -> Iterator[str]:
-    """Say where the flights show the loop and nothing tells it from the vehicle."""
+    """Say where the flights show the loop and nothing separates it from the vehicle."""
     loop = diagnostics.loop
     if loop is not None and loop.shows_loop and diagnostics.freed is None:
         yield loop_in_words(loop)
@@ -179,7 +181,7 @@ def loop_in_words(loop: LoopBounds, *, by_past: bool = False) -> str:
         " or log the setpoint of position or velocity, or the sticks"
     )
     if by_past:
-        return f"{shown}. What was before tells roll and pitch, but nothing judges the model. {fly}"
+        return f"{shown}. The past identifies roll and pitch, but nothing judges the model. {fly}"
     bounds = " and ".join(
         f"{name} from {low:.2g} to {high:.2g}"
         for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    # What effects are called is told of models that are read without a gap.
+    # Names of effects are given of models that are read without a gap.
     from cpfls_cli.arrays import Array
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 

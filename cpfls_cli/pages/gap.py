@@ -60,7 +60,7 @@ def channel_unit(channel: str) -> str:
 
 
 def marked(points: int) -> dict[str, Any]:
-    """Put circles on the curve after, of so many points, so that it is told from the others without colour."""
+    """Put circles on the curve after, of so many points, so that it differs from the others without colour."""
     every = max(1, points // _MARKS)
     return {**AFTER, "marker": "o", "markersize": 3.6, "markerfacecolor": "white", "markevery": every}
 

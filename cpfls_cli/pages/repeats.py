@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
-"""Plans what tells the vehicle from the loop, and a missing effect from gusts."""
+"""Plans of flights that separate the vehicle from the loop, and a missing effect from gusts."""
 BY_HAND = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
 """The same without a mission."""
 FLOWN_BY_HAND = frozenset({"bbl", "bfl"})

@@ -74,7 +74,7 @@ def spread(
             spread=drawn(sheet.model, known, count, np.random.default_rng(seed)),
             numbers={number.name: number for number in known.numbers},
             seed=seed,
-            untold=found.not_determined,
+            not_determined=found.not_determined,
             held=found.guessed,
         )
     run.texts[run.output] = text = samples.written(ending)

@@ -270,7 +270,7 @@ def _rotation(job: Run, settings: TrajectorySettings) -> tuple[RotationPath, Exc
 def _read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
     """Read the points of a path from a CSV with the columns ``x_m, y_m, z_m`` and, if wanted, ``yaw_rad, pause_s``.
 
-    Errors name the file and the column or the row that is wrong. `paused` tells whether the points may have pauses.
+    Errors name the file and the column or the row that is wrong. `paused` says whether the points may have pauses.
     """
     columns = read_csv(path, {*_POSITION_COLUMNS, *_OPTIONAL_COLUMNS})
     _check_columns(path, columns)

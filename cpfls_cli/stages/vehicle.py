@@ -491,7 +491,7 @@ def _grouped(
 
 
 def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlight]) -> None:
-    """Refuse groups that no flight tells anything of."""
+    """Refuse groups that no flight identifies."""
     flown = {flight.group for flight in training}
     for group in groups:
         if group.name not in flown:

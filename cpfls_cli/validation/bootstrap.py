@@ -173,7 +173,7 @@ def bootstrap(
     x_1 its parameters, z and u standard normal. P_1 is the mean squared residual of a row: it takes fuzzy parameters
     for normal numbers of variance 1, each of which alone would make a torque as large as the flight has. The first
     term is what that leaves open: of directions that the samples do not determine the whole of it, of determined
-    ones nothing. The second is the bias of the model, as far as the flight tells it.
+    ones nothing. The second is the bias of the model, as far as the flight shows it.
 
     Partitions and ridge weight are held at the model's. Without a ridge, what the samples do not determine stays where
     it is, at the smallest norm: there a band is what the structure does at attitudes that were not visited, not what

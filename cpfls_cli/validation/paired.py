@@ -198,8 +198,8 @@ def compare_torque(
     both = [np.concatenate(errors) / scale for errors in zip(*chunks, strict=True)]
     samples = len(both[0])
     # What one of both leaves of an exact flight is rounding, and how long that remembers itself says nothing.
-    told = [errors for errors in both if np.sum(errors**2) > _ROUNDING * errors.size] or both
-    block = contiguous(samples, block_count(np.hstack(told)))
+    above = [errors for errors in both if np.sum(errors**2) > _ROUNDING * errors.size] or both
+    block = contiguous(samples, block_count(np.hstack(above)))
     own, rival = (_block_means(np.sum(errors**2, axis=1), block) for errors in both)
     # Each of three axes has a mean square of 1 after scaling.
     return compare_errors(own, rival, size=3.0)

@@ -22,7 +22,7 @@ _SMALLEST_P = 1e-16
 DEFINITE_SHARE = 0.975
 """Share of the bootstrap draws that are to be positive definite wherever training was."""
 
-# A constant torque is told from a quarter of the noise on, that errors are judged beside, if it is a hundredth of all.
+# A constant torque is reported from a quarter of the noise of errors on, if it is a hundredth of all torque.
 _LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 
@@ -110,7 +110,7 @@ def _band(grounds: Grounds) -> Iterator[Reason]:
     freed = grounds.identification.freed
     if freed is not None:
         # Draws know the scatter of the torque that was freed, not that of what freed it.
-        widest = max(widest, *(2 * np.sinh(freed.half[freed.told])).tolist())
+        widest = max(widest, *(2 * np.sinh(freed.half[freed.identified])).tolist())
     text = f"the widest 95 % band of a moment of inertia is {100 * widest:.3g} % of the inertia itself"
     # A band as wide as its value leaves open by more than a factor of two how hard the body is to turn.
     yield Reason(text, FOR if widest < 1 else AGAINST)

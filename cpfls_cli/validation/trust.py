@@ -33,16 +33,16 @@ def worse(*words: Trust) -> Trust:
 
 
 def capped(
-    trust: Trust, contradictions: Sequence[str], *, loop: bool = False, lacks: bool = False, told: bool = True
+    trust: Trust, contradictions: Sequence[str], *, loop: bool = False, lacks: bool = False, identified: bool = True
 ) -> Trust:
     """Take back the word on a model whose flights contradict themselves: it repeats what is wrong with them.
 
     Where they show the loop, a forecast, judged or not, is one of vehicle and autopilot together, and says nothing of
-    the vehicle; one that lacks an effect is no vehicle either, and neither is one whose constants are not told.
+    the vehicle; one that lacks an effect is no vehicle either, and neither is one whose constants are not identified.
     """
     if contradictions:
         return Trust.DO_NOT_USE
-    if trust is not Trust.DO_NOT_USE and (loop or not told):
+    if trust is not Trust.DO_NOT_USE and (loop or not identified):
         return Trust.LOOP if loop else worse(trust, Trust.NOT_DETERMINED)
     return Trust.LACKING if lacks and trust in GOOD else trust
 

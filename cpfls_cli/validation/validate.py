@@ -96,13 +96,13 @@ def validate(
     part, source = next(iter(held_out.items()), (TRAINING, training))
     drawing, examining, simulating = rng.spawn(3)
     tell("compares structures")
-    told = source_of(result.freed, training, learned)
-    structures = compare_structures(*told, settings) if asked.structures else None
+    freed_data = source_of(result.freed, training, learned)
+    structures = compare_structures(*freed_data, settings) if asked.structures else None
     tell("draws bands")
-    draws = bootstrap(model_evaluator(*told, settings), told[0], model, result.fit, asked, drawing)
+    draws = bootstrap(model_evaluator(*freed_data, settings), freed_data[0], model, result.fit, asked, drawing)
     drawn = curves(model, draws, result.rigid_body, training)
     tell("identifies its own simulation")
-    again = round_trip(*told, settings, model, drawn, simulating)
+    again = round_trip(*freed_data, settings, model, drawn, simulating)
     tell("replays measured torques")
     predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)

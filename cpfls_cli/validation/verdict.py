@@ -48,7 +48,7 @@ def verdict(grounds: Grounds) -> Verdict:
        determine every coefficient beyond their noise, D(q) is positive definite at every roll and pitch, and R2
        confirms every axis; otherwise *good-inside-region*: nothing is known outside.
 
-    An unfinished search, wide bands, residuals that are not white and a few windows that were lost are told as
+    An unfinished search, wide bands, residuals that are not white and a few windows that were lost are reported as
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
     """
     label, decisive = _decided(grounds)
@@ -79,9 +79,9 @@ def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = Fals
     Parameters
     ----------
     loop : LoopBounds or None
-        None where something from outside tells the vehicle from its autopilot.
+        None where something from outside separates the vehicle from its autopilot.
     by_past : bool
-        Whether what was before tells it.
+        Whether the past identifies it.
     """
     if loop is None or not loop.shows_loop:
         return found

@@ -64,7 +64,7 @@ def test_no_model_of_flights_that_show_the_loop_is_good(label, by_past):
     found = beside_loop(Verdict(label, "", (Reason("better", 1),)), LOOP, by_past=by_past)
     assert found.label == Trust.LOOP
     assert "50 % of roll, 80 % of pitch" in found.reasons[0].text
-    assert ("What was before tells roll and pitch" in found.reasons[0].text) is by_past
+    assert ("The past identifies roll and pitch" in found.reasons[0].text) is by_past
     assert [each.speaks for each in found.reasons] == [-1, 1]
 
 
@@ -80,7 +80,7 @@ def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
 
 
 def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
-    told = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), told=np.array([True, True, False]))
+    told = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), identified=np.array([True, True, False]))
     known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=told))
     (reason,) = _band(known)
     assert "20 %" in reason.text
