@@ -19,7 +19,7 @@ from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
 
 RPM = 30 / np.pi
-_GRAVITY = 9.8
+GRAVITY = 9.8
 """Of gym-pybullet-drones, in whose weight `thrust2weight` counts."""
 _PROPELLER = re.compile(r"prop(\d+)_link")
 _SPINS = (1, -1, 1, -1)
@@ -136,10 +136,7 @@ def _rotors(file: Path, root: Node, properties: Node, bodies: tuple[Body, ...]) 
         share = properties.number("thrust2weight")
         # Mass of the first link, as BaseAviary takes it.
         most = (
-            share.value
-            * next((each.mass.value for each in bodies if each.mass.value > 0), 0.0)
-            * _GRAVITY
-            / len(_SPINS)
+            share.value * next((each.mass.value for each in bodies if each.mass.value > 0), 0.0) * GRAVITY / len(_SPINS)
         )
         words = f"{share.where}: from kf, mass and 9.8 m/s^2"
         speed = Stated(float(np.sqrt(max(most, 0.0) / thrust.value)), words)

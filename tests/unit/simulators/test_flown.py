@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import probe_flight
 from cpfls_cli.export.registry import exported
+from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.formats import read_model

@@ -1,9 +1,10 @@
-"""Courses that an exported vehicle is flown along: where runs start, and the commands of its rotors between samples."""
+"""Courses that a simulator flies along: where runs start, and the commands of rotors between samples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.motion import MeasuredMotion, State
 from cpfls_cli.playback.player import less_measured
 from cpfls_cli.playback.rotors import RotorResponse
+
+_ROUNDING = 1e-9
+"""Share of a step."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,16 @@ class Course:
         own = MeasuredMotion(position, velocity, rotation, rate, self.period)
         stretches = tuple(slice(finer * part.start, finer * part.stop) for part in self.flight.stretches)
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
+
+    def steps(self, longest_s: float) -> int:
+        """Count the equal steps in a step of the course, none of them longer than this but for rounding."""
+        return max(1, ceil(self.period / longest_s - _ROUNDING))
+
+    @property
+    def unknown(self) -> State:
+        """States of all runs at the samples behind their starts, NaN until they are known."""
+        vector = len(self.starts), self.horizon, 3
+        return State(*(np.full(shape, np.nan) for shape in (vector, vector, (*vector, 3), vector)))
 
     def errors(self, states: State) -> Array:
         """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
