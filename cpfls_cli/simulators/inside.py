@@ -50,7 +50,7 @@ def _pybullet(file: Path, _of: VehicleOf, _thrusts: Array) -> Flies:
     return lambda course, _lags: fly_pybullet(text, model, course)
 
 
-class _Simulator(NamedTuple):
+class Simulator(NamedTuple):
     """A simulator that a package brings.
 
     Attributes
@@ -71,11 +71,11 @@ class _Simulator(NamedTuple):
 
 
 _EXTRA = install_command("simulators")
-_SIMULATORS = {
-    "mjcf": _Simulator("MuJoCo", "mujoco", _EXTRA, 100_000, _mujoco),
-    "rotorpy": _Simulator("RotorPy", "rotorpy", _EXTRA, 5_000, _rotorpy),
+SIMULATORS = {
+    "mjcf": Simulator("MuJoCo", "mujoco", _EXTRA, 100_000, _mujoco),
+    "rotorpy": Simulator("RotorPy", "rotorpy", _EXTRA, 2_500, _rotorpy),
     # It is compiled where there is no wheel for this Python, so that the extra leaves it out there.
-    "urdf": _Simulator("PyBullet", "pybullet", "pip install pybullet", 50_000, _pybullet),
+    "urdf": Simulator("PyBullet", "pybullet", "pip install pybullet", 50_000, _pybullet),
 }
 """By the format of the file."""
 
@@ -140,7 +140,7 @@ def in_simulator(
     InSimulator or None
         None of a format whose simulator no package brings.
     """
-    known = _SIMULATORS.get(of.model.format)
+    known = SIMULATORS.get(of.model.format)
     if known is None:
         return None
     why = ""

@@ -101,7 +101,7 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     inertial = link.first("inertial")
     mass_node, inertia_node = (None if inertial is None else inertial.first(tag) for tag in ("mass", "inertia"))
     if inertial is None or mass_node is None:
-        notes.append(f"{link.where} states no mass, and counts as none")
+        notes.append(f"{link.where} states no mass, and counts as none; PyBullet takes 1 kg: write a mass of 0")
         nothing = Stated(0.0, f"{link.where}: states no mass")
         return Body(link.name, nothing, placed[:3, 3], np.zeros((3, 3)), placed[:3, :3], placed[:3, :3])
     mass = mass_node.number("value")

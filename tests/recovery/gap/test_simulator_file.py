@@ -9,7 +9,7 @@ from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
-from tests.builders.simulator_files import rotorpy_of, sdf_of, write_log
+from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of, write_log
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
@@ -24,21 +24,6 @@ def logs(tmp_path_factory):
     for path, flight in zip(paths, gusty_flights(asked, SECONDS), strict=True):
         write_log(path, flight)
     return paths
-
-
-MJCF = """<mujoco model="mine"><custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>
-  <worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
-  {sites}</body></worldbody><actuator>{motors}</actuator></mujoco>
-"""
-
-
-def mjcf_of(truth, spins):
-    """MJCF of what flies, whose controls are squared speeds."""
-    sites = "\n  ".join(f'<site name="s{i}" pos="{x:.9g} {y:.9g} 0"/>' for i, (x, y) in enumerate(truth.places))
-    gears = [f"0 0 {truth.thrust_factor:g} 0 0 {-spin * truth.drag_factor:g}" for spin in spins]
-    motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
-    inertia = " ".join(f"{each:g}" for each in truth.inertia)
-    return MJCF.format(mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
 
 
 def corrected(folder, logs, text="", ending="sdf", **wrong):
