@@ -156,8 +156,8 @@ def in_simulator(
     rotors = np.argsort(of.order)
     thrusts = np.array([stated.rotors[place].thrust_factor_n_s2 for place in rotors])
     try:
-        with corrected_files(of.model, {}) as before, corrected_files(of.model, texts) as after:
-            flies = {STATED: known.loaded(before, of, thrusts), MODEL: known.loaded(after, of, thrusts)}
+        with corrected_files(of.model, texts) as after:
+            flies = {STATED: known.loaded(of.model.file, of, thrusts), MODEL: known.loaded(after, of, thrusts)}
         flown = [
             _Flown(**vars(pair), flies=flies, rotors=rotors, lags=recording.signals.commanded)
             for pair, recording in zip(pairs, held, strict=True)
