@@ -67,8 +67,3 @@ class Body(NamedTuple):
 
 FASTEST = 300.0
 """Body rate in rad/s, and speed in m/s, at which a run is called diverged and stays as it was."""
-
-
-def ran_away(rate: Array) -> bool:
-    """Tell whether a body rate is that of a run that diverged, or no number."""
-    return not bool((np.abs(rate) < FASTEST).all())

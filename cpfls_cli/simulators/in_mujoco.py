@@ -5,6 +5,7 @@ Contact is left out, for a log does not say where the ground of the file is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.course import Course
-from cpfls_cli.playback.motion import State, ran_away
+from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.model import Rotor, SimulatorModel
 
@@ -39,20 +40,9 @@ def compiled(file: Path, folder: Path) -> Any:
 
 
 def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) -> State:
-    """Fly the body with a free joint of a compiled MJCF, with controls kept from sample to sample.
+    """Fly the body with a free joint of a compiled MJCF (`mujoco.MjModel`); see `cpfls_cli.playback.course.Flies`.
 
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    course : Course
-        Its rotors are those that `controls` counts.
-    lags : bool
-        Whether filters of actuators act; else they are at their controls at once.
-
-    Returns
-    -------
-    State
-        Of the centre of mass, shape (run, horizon, ...); NaN from where a run ran away.
+    Where rotors do not lag, filters of actuators are at their controls at once.
     """
     import mujoco
 
@@ -60,41 +50,39 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
     model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_AUTORESET)
     steps = course.steps(model.opt.timestep)
     model.opt.timestep = course.period / steps
-    data, body = mujoco.MjData(model), _Body.of(model)
-    asked = controls.of(course.commands)
-    limited = model.actuator_ctrllimited.astype(bool)
+    data, body, start = mujoco.MjData(model), _Body.of(model), course.start
+    asked, limited = controls.of(course.commands), model.actuator_ctrllimited.astype(bool)
     asked[..., limited] = np.clip(asked[..., limited], *model.actuator_ctrlrange[limited].T)
-    filtered = np.flatnonzero(model.actuator_actadr >= 0)
-    begun = _begun(model, course, controls, filtered) if lags else asked[:, 0, filtered]
-    start, states = course.start, course.unknown
-    # MuJoCo writes a file into the working folder of one that ran away.
+    filtered = np.flatnonzero(model.actuator_actadr >= 0).tolist()
+    begun = asked[:, 0, filtered]
+    for column, own in enumerate(filtered if lags else ()):
+        lagging = RotorResponse(lag_s=float(model.actuator_dynprm[own, 0]))
+        power, rotor = int(controls.power[own]), controls.rotor[own]
+        begun[:, column] = controls.factor[own] * course.lagged(lagging, power)[:, rotor]
+
+    def along(run: int) -> Iterator[State]:
+        mujoco.mj_resetData(model, data)
+        body.put(data, State(*(part[run] for part in start)))
+        data.act[:] = begun[run]
+        for control in asked[run]:
+            data.ctrl[:] = control
+            data.act[:] = data.act if lags else control[filtered]
+            mujoco.mj_step(model, data, nstep=steps)
+            yield body.taken(data)
+
+    # MuJoCo writes a file into the working folder of a run that ran away.
     mujoco.set_mju_user_warning(lambda _: None)
     try:
-        for run, row in enumerate(asked):
-            mujoco.mj_resetData(model, data)
-            body.put(data, State(*(part[run] for part in start)))
-            data.act[:] = begun[run]
-            for step, control in enumerate(row, 1):
-                data.ctrl[:] = control
-                data.act[:] = data.act if lags else control[filtered]
-                mujoco.mj_step(model, data, nstep=steps)
-                if step % course.finer:
-                    continue
-                now = body.taken(data)
-                if ran_away(now.rate):
-                    break
-                for part, own in zip(states, now, strict=True):
-                    part[run, step // course.finer - 1] = own
+        return course.collected(map(along, range(len(asked))))
     finally:
         mujoco.set_mju_user_warning(None)
-    return states
 
 
 class _Body(NamedTuple):
     """Where the body with the free joint is in the arrays of MuJoCo, and its centre of mass in its frame, m."""
 
-    place: int
-    move: int
+    place: slice
+    move: slice
     centre: Array
 
     @classmethod
@@ -104,39 +92,29 @@ class _Body(NamedTuple):
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         (joint,) = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-        body = model.jnt_bodyid[joint]
+        body, place, move = (int(own[joint]) for own in (model.jnt_bodyid, model.jnt_qposadr, model.jnt_dofadr))
         centre = data.xmat[body].reshape(3, 3).T @ (data.subtree_com[body] - data.xpos[body])
-        return cls(int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), centre)
+        return cls(slice(place, place + 7), slice(move, move + 6), centre)
 
     def put(self, data: Any, state: State) -> None:
         """Start from a state of the centre of mass."""
         import mujoco
 
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, state.rotation.ravel())
+        mujoco.mju_mat2Quat(quaternion := np.empty(4), state.rotation.ravel())
         velocity = state.velocity - state.rotation @ np.cross(state.rate, self.centre)
-        data.qpos[self.place : self.place + 7] = *(state.position - state.rotation @ self.centre), *quaternion
-        data.qvel[self.move : self.move + 6] = *velocity, *state.rate
+        data.qpos[self.place] = *(state.position - state.rotation @ self.centre), *quaternion
+        data.qvel[self.move] = *velocity, *state.rate
 
     def taken(self, data: Any) -> State:
         """Give the state of the centre of mass."""
         import mujoco
 
-        turned = np.empty(9)
-        mujoco.mju_quat2Mat(turned, data.qpos[self.place + 3 : self.place + 7])
-        rotation, moves = turned.reshape(3, 3), data.qvel[self.move : self.move + 6]
-        position = data.qpos[self.place : self.place + 3] + rotation @ self.centre
-        return State(position, moves[:3] + rotation @ np.cross(moves[3:], self.centre), rotation, moves[3:])
-
-
-def _begun(model: Any, course: Course, controls: Controls, filtered: IntArray) -> Array:
-    """Give what filters of actuators are at the starts, shape (run, actuator with a filter)."""
-    found = []
-    for own in filtered.tolist():
-        response = RotorResponse(lag_s=float(model.actuator_dynprm[own, 0]))
-        along = course.lagged(response, int(controls.power[own]))
-        found.append(controls.factor[own] * along[:, controls.rotor[own]])
-    return np.stack(found, axis=1) if found else np.empty((len(course.starts), 0))
+        place, moves = data.qpos[self.place], data.qvel[self.move]
+        mujoco.mju_quat2Mat(turned := np.empty(9), place[3:])
+        rotation = turned.reshape(3, 3)
+        velocity, rate = moves[:3], moves[3:]
+        moved = velocity + rotation @ np.cross(rate, self.centre)
+        return State(place[:3] + rotation @ self.centre, moved, rotation, rate)
 
 
 def controls_of(made: Any, model: SimulatorModel, thrusts: Array) -> Controls:

@@ -14,7 +14,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import install_command, visible
 from cpfls_cli.gap.before_after import PlaybackChange, PlayedPair, errors_by_horizon
-from cpfls_cli.playback.course import Course
+from cpfls_cli.playback.course import Course, Flies
 from cpfls_cli.playback.errors import MODEL, STATED
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import Runs
@@ -26,10 +26,6 @@ from cpfls_cli.simulators.results import InSimulator
 from cpfls_cli.simulators.study import VehicleOf, corrected_files
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
-
-Flies = Callable[[Course, bool], State]
-"""From a course whose rotors are in the order of the file, and whether they lag behind its speeds, to states behind
-each start, shape (run, horizon, ...)."""
 
 
 def _mujoco(file: Path, of: VehicleOf, thrusts: Array) -> Flies:

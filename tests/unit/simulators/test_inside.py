@@ -246,11 +246,9 @@ def test_a_file_is_flown_as_given_and_as_corrected(tmp_path, held, ending, monke
 
 def test_a_run_that_ran_away_stays_as_it_was(flight):
     course = Course(flight, np.array([3, 40]), 4)
-    states = course.unknown
-    for part, begin in zip(states, course.start, strict=True):
-        part[:, :2] = begin[:, None]
-        part[1] = begin[1]
-    runs = inside.runs_of(course, states)
+    begins = [State(*(part[run] for part in course.start)) for run in (0, 1)]
+    away = begins[0]._replace(rate=np.array([1e4, 0.0, 0.0]))
+    runs = inside.runs_of(course, course.collected([[begins[0], begins[0], away, begins[1]], [begins[1]] * 4]))
     np.testing.assert_array_equal(runs.diverged, [2, -1])
     stays = course.errors(State(*(np.repeat(begin[:, None], 4, axis=1) for begin in course.start)))
     np.testing.assert_array_equal(runs.errors, stays)
