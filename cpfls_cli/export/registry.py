@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.errors import InputError, about
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, everything, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
@@ -24,6 +23,7 @@ from cpfls_cli.export.simulators.rotorpy import rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.source import c_source
+from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 

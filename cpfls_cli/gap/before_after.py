@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -106,14 +107,15 @@ def left_out(
     return found
 
 
-def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
-    """Play back from every fifth sample of the flights.
+def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float, most: float = np.inf) -> Replay:
+    """Play back from every fifth sample of the flights, or so few that about `most` samples are played back.
 
     `pairs`: of one rate; `horizon_s`, s: at most; one sample at least.
     """
     asked = max(1, round(horizon_s / pairs[0].flight.motion.period))
     longest = min(asked, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
-    return replay(pairs, longest, _EVERY)
+    samples = longest * sum(len(pair.flight) for pair in pairs)
+    return replay(pairs, longest, max(_EVERY, ceil(samples / most)))
 
 
 @result

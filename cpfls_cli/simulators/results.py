@@ -21,6 +21,15 @@ class Change:
 
 
 @result
+class InSimulator:
+    """Held-out flights flown in the simulator itself, by its file as given and as corrected."""
+
+    program: str = about("the simulator, with its version where it is installed")
+    why_not: str = about("why they were not flown there; empty where they were")
+    flown: PlaybackChange | None = part()
+
+
+@result
 class Corrected:
     """A simulator's own file with what flights found put into it, and what it cannot hold."""
 
@@ -31,3 +40,4 @@ class Corrected:
     diff: str = about("unified diff of the files as given and as corrected")
     flown: PlaybackChange | None = part(default=None)
     """Held-out flights played back in the vehicle of the file, as given and as corrected."""
+    in_simulator: InSimulator | None = part(default=None)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import combinations
 from os.path import abspath, commonpath
@@ -16,7 +17,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
-from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, played_pairs, rates_fade
+from cpfls_cli.gap.before_after import PlayedPair, played_pairs, rates_fade
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -255,8 +256,9 @@ def _speed(model: SimulatorModel, proposal: Proposal | None) -> tuple[float | No
     return _short([stated.value])[0], stated.where
 
 
-def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> SimulatorModel:
-    """Read a model again with corrected files, by their names in the output; that it hovers is not asked."""
+@contextmanager
+def corrected_files(model: SimulatorModel, texts: Mapping[str, bytes]) -> Iterator[Path]:
+    """Have the files of a model for a while with corrected texts, by their names in the output; give the main one."""
     names = model.output_names
     # Includes are beside a file where it is named, and not where a link leads.
     folder = Path(commonpath([abspath(file.parent) for file in model.files]))
@@ -265,7 +267,12 @@ def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> Simulator
             copy = copied / Path(abspath(file)).relative_to(folder)
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(texts.get(names[file]) or file.read_bytes())
-        main = copied / Path(abspath(model.file)).relative_to(folder)
+        yield copied / Path(abspath(model.file)).relative_to(folder)
+
+
+def as_corrected(model: SimulatorModel, texts: Mapping[str, bytes]) -> SimulatorModel:
+    """Read a model again with corrected files, by their names in the output; that it hovers is not asked."""
+    with corrected_files(model, texts) as main:
         return as_stated(main.with_name(f"{main.name}:{model.section}") if model.section else main)
 
 
@@ -315,15 +322,15 @@ def vehicle_of(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehi
     )
 
 
-def flown(
+def played(
     of: VehicleOf,
     texts: Mapping[str, bytes],
     stated: VehicleSettings,
     training: Sequence[Recording],
     held: Sequence[Recording],
     settings: GapSettings,
-) -> PlaybackChange:
-    """Play held-out flights back in the vehicle of the file as given and as corrected.
+) -> list[PlayedPair]:
+    """Make held-out flights and the vehicle of the file as given and as corrected ready for playback.
 
     Parameters
     ----------
@@ -336,5 +343,4 @@ def flown(
     """
     before = vehicle_of(of, of, stated)
     after = vehicle_of(replace(of, model=as_corrected(of.model, texts)), of, stated)
-    pairs = played_pairs(held, after, before, rates_fade(training, settings.horizon_s))
-    return PlaybackChange.of_pairs(pairs, errors_by_horizon(pairs, settings.horizon_s))
+    return played_pairs(held, after, before, rates_fade(training, settings.horizon_s))

@@ -19,7 +19,7 @@ from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
 
 RPM = 30 / np.pi
-_GRAVITY = 9.8
+GRAVITY = 9.8
 """Of gym-pybullet-drones, in whose weight `thrust2weight` counts."""
 _PROPELLER = re.compile(r"prop(\d+)_link")
 _SPINS = (1, -1, 1, -1)
@@ -101,7 +101,7 @@ def _body(link: Node, placed: Array, notes: list[str]) -> Body:
     inertial = link.first("inertial")
     mass_node, inertia_node = (None if inertial is None else inertial.first(tag) for tag in ("mass", "inertia"))
     if inertial is None or mass_node is None:
-        notes.append(f"{link.where} states no mass, and counts as none")
+        notes.append(f"{link.where} states no mass, and counts as none; PyBullet takes 1 kg: write a mass of 0")
         nothing = Stated(0.0, f"{link.where}: states no mass")
         return Body(link.name, nothing, placed[:3, 3], np.zeros((3, 3)), placed[:3, :3], placed[:3, :3])
     mass = mass_node.number("value")
@@ -136,10 +136,7 @@ def _rotors(file: Path, root: Node, properties: Node, bodies: tuple[Body, ...]) 
         share = properties.number("thrust2weight")
         # Mass of the first link, as BaseAviary takes it.
         most = (
-            share.value
-            * next((each.mass.value for each in bodies if each.mass.value > 0), 0.0)
-            * _GRAVITY
-            / len(_SPINS)
+            share.value * next((each.mass.value for each in bodies if each.mass.value > 0), 0.0) * GRAVITY / len(_SPINS)
         )
         words = f"{share.where}: from kf, mass and 9.8 m/s^2"
         speed = Stated(float(np.sqrt(max(most, 0.0) / thrust.value)), words)

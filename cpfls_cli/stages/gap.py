@@ -22,6 +22,7 @@ from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
@@ -29,7 +30,8 @@ from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
 from cpfls_cli.simulators.corrected import corrected
 from cpfls_cli.simulators.formats import is_simulator_file
-from cpfls_cli.simulators.study import VehicleOf, flown
+from cpfls_cli.simulators.inside import in_simulator
+from cpfls_cli.simulators.study import VehicleOf, played
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
@@ -192,12 +194,15 @@ def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) ->
     vehicle = run.study.vehicle
     said, files = corrected(of, vehicle, found, split.training)
     run.texts.update({run.output / name: text for name, text in files.items()})
+    held, horizon = split.held_out, run.study.gap.horizon_s
     try:
-        before_after = flown(of, files, vehicle, split.training, split.held_out, run.study.gap)
+        pairs = played(of, files, vehicle, split.training, held, run.study.gap)
+        before_after = PlaybackChange.of_pairs(pairs, errors_by_horizon(pairs, horizon))
     except InputError as error:
         run.note(f"{of.model.file.name} as corrected is not played back: {visible(str(error))}")
         return replace(found, corrected=said)
-    return replace(found, corrected=replace(said, flown=before_after))
+    inside = in_simulator(of, files, vehicle, held, pairs, horizon)
+    return replace(found, corrected=replace(said, flown=before_after, in_simulator=inside))
 
 
 def _flights(

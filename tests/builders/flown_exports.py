@@ -16,13 +16,15 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import runge_kutta_step
-from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.simulators.ardupilot import STEP_S, fly_ardupilot
 from cpfls_cli.export.simulators.sdf import ENTRIES, SHORTEST_S, apart
 from cpfls_cli.export.simulators.urdf import fly_urdf
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulators import in_rotorpy
+from cpfls_cli.simulators.in_mujoco import Controls, fly_mujoco
 
 _ARRAYS = "SCIPY_ARRAY_API"
 _RPM = 30 / np.pi
@@ -34,35 +36,8 @@ def fly_mjcf(text: str, course: Course) -> State:
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text)
-    model.opt.timestep = course.period
-    data = mujoco.MjData(model)
     rotor, power = (model.numeric(f"ctrl_{name}").data.astype(int) for name in ("rotor", "power"))
-    response = RotorResponse(lag_s=float(model.numeric("rotor_lag_s").data[0]))
-    before = np.stack([course.lagged(response, k) for k in (1, 2)])[np.maximum(power, 1) - 1, :, rotor].T
-    start, commands = course.start, course.commands
-    states = _room(len(commands), course.horizon)
-    for run, command in enumerate(commands):
-        mujoco.mj_resetData(model, data)
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, start.rotation[run].ravel())
-        data.qpos[:] = *start.position[run], *quaternion
-        data.qvel[:] = *start.velocity[run], *start.rate[run]
-        data.act[:] = before[run, power > 0] if model.na else []
-        controls = command[:, rotor] ** power
-        for step, control in enumerate(controls, 1):
-            data.ctrl[:] = control
-            mujoco.mj_step(model, data)
-            if step % course.finer == 0:
-                at = run, step // course.finer - 1
-                states.position[at], states.velocity[at], states.rate[at] = data.qpos[:3], data.qvel[:3], data.qvel[3:]
-                mujoco.mju_quat2Mat(turned := np.empty(9), data.qpos[3:7])
-                states.rotation[at] = turned.reshape(3, 3)
-    return states
-
-
-def _room(runs: int, horizon: int) -> State:
-    vector = runs, horizon, 3
-    return State(np.empty(vector), np.empty(vector), np.empty((*vector, 3)), np.empty(vector))
+    return fly_mujoco(model, course, Controls(rotor, power, np.ones(len(rotor))), lags=True)
 
 
 def fly_sdf(text: str, course: Course) -> State:
@@ -166,30 +141,8 @@ def _turned(matrix: Array) -> Array:
 
 def fly_rotorpy(text: str, course: Course) -> State:
     """Fly an exported vehicle in RotorPy."""
-    from rotorpy.vehicles.multirotor import Multirotor
-    from scipy.spatial.transform import Rotation
-
     module = executed(text)
-    parameters = module["quad_params"]
-    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=dict(_INTEGRATOR))
-    lags, start = module["ROTORS_LAG"], course.start
-    before = course.lagged(RotorResponse(lag_s=parameters["tau_m"]))
-    rows = []
-    for run, commands in enumerate(course.commands):
-        now = flown.initial_state | {
-            "x": start.position[run],
-            "v": start.velocity[run],
-            "q": Rotation.from_matrix(start.rotation[run]).as_quat(),
-            "w": start.rate[run],
-            "rotor_speeds": before[run],
-        }
-        for step, speed in enumerate(commands, 1):
-            now["rotor_speeds"] = now["rotor_speeds"] if lags else speed
-            now = flown.step(now, {"cmd_motor_speeds": speed}, course.period)
-            if step % course.finer == 0:
-                rows.append([now["x"], now["v"], Rotation.from_quat(now["q"]).as_matrix(), now["w"]])
-    shape = len(course.starts), course.horizon
-    return State(*(np.array(part).reshape(*shape, *part[0].shape) for part in zip(*rows, strict=True)))
+    return in_rotorpy.fly_rotorpy(module["quad_params"], course, lags=module["ROTORS_LAG"], **_INTEGRATOR)
 
 
 def fly_pegasus(text: str, course: Course) -> State:

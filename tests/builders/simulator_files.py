@@ -76,6 +76,23 @@ def write_log(path, flight):
     np.savetxt(path, np.column_stack([time, *parts]), delimiter=",", header=COLUMNS, comments="", fmt="%.9g")
 
 
+MJCF = """<mujoco model="mine"><option timestep="{step}" integrator="{integrator}"/>
+  <custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>
+  <worldbody><geom type="plane" size="9 9 .1"/>
+  <body name="b"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
+  {sites}</body></worldbody><actuator>{motors}</actuator></mujoco>
+"""
+
+
+def mjcf_of(truth, spins, *, thrust=1.0, step=0.002, integrator="Euler"):
+    """MJCF of what flies, whose controls are squared speeds, with a thrust that is so many times the true one."""
+    sites = "\n  ".join(f'<site name="s{i}" pos="{x:.9g} {y:.9g} 0"/>' for i, (x, y) in enumerate(truth.places))
+    gears = [f"0 0 {thrust * truth.thrust_factor:g} 0 0 {-thrust * spin * truth.drag_factor:g}" for spin in spins]
+    motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
+    inertia = " ".join(f"{each:g}" for each in truth.inertia)
+    return MJCF.format(step=step, integrator=integrator, mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
+
+
 ROTORPY = """#!/usr/bin/env python3
 '''Mine.'''
 import numpy as np

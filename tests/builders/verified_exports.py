@@ -9,9 +9,9 @@ from math import ceil
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import FORMS, Exported, Target
+from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import Player, free_runs, in_the_air

@@ -24,12 +24,12 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.effects.scales import arm
-from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
 from cpfls_cli.export.polynomials import weights_of_model
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines
+from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse

@@ -1,6 +1,7 @@
 """A wrong number in a simulator's own file, named and corrected from flights in gusts, and nothing else touched."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
-from tests.builders.simulator_files import rotorpy_of, sdf_of, write_log
+from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of, write_log
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
@@ -26,21 +27,6 @@ def logs(tmp_path_factory):
     return paths
 
 
-MJCF = """<mujoco model="mine"><custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>
-  <worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
-  {sites}</body></worldbody><actuator>{motors}</actuator></mujoco>
-"""
-
-
-def mjcf_of(truth, spins):
-    """MJCF of what flies, whose controls are squared speeds."""
-    sites = "\n  ".join(f'<site name="s{i}" pos="{x:.9g} {y:.9g} 0"/>' for i, (x, y) in enumerate(truth.places))
-    gears = [f"0 0 {truth.thrust_factor:g} 0 0 {-spin * truth.drag_factor:g}" for spin in spins]
-    motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
-    inertia = " ".join(f"{each:g}" for each in truth.inertia)
-    return MJCF.format(mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
-
-
 def corrected(folder, logs, text="", ending="sdf", **wrong):
     mine = folder / f"mine.{ending}"
     mine.write_text(text or sdf_of(TRUE, **wrong))
@@ -50,6 +36,18 @@ def corrected(folder, logs, text="", ending="sdf", **wrong):
     assert result.exit_code == 0, result.stderr
     assert mine.read_bytes() == before
     return json.loads(result.stdout), read_model(folder / "gap" / mine.name)
+
+
+def require_the_same_in(package, said):
+    """What the simulator flies is as far off as what is played back, where its package is installed."""
+    inside = said["in_simulator"]
+    if find_spec(package) is None:
+        assert "its package is not installed" in inside["why_not"]
+        return
+    for signal, end in said["flown"]["at_end"].items():
+        there = inside["flown"]["at_end"][signal]
+        for which in ("before", "after"):
+            assert there[which] == pytest.approx(end[which], rel=0.15)
 
 
 def test_a_thrust_17_percent_too_large(tmp_path, logs):
@@ -94,6 +92,8 @@ def test_rotors_that_turn_the_other_way(tmp_path, logs, ending, spins):
         assert change["after"] == -change["before"]
         # A share of the mean, which is 1 where all rotors are alike.
         assert change["low"] < change["after"] < change["high"]
+    if ending == "xml":
+        require_the_same_in("mujoco", said["corrected"])
     assert [rotor.spin for rotor in new.rotors] == list(SPINS)
     np.testing.assert_allclose([rotor.drag_factor for rotor in new.rotors], TRUE.drag_factor)
 
@@ -108,10 +108,17 @@ def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
     """RotorPy's dictionary, whose other numbers and text stay as they are."""
     mine = tmp_path / "mine.py"
     mine.write_text(rotorpy_of(TRUE, thrust=1 / 0.83))
-    result = command_line.run("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", tmp_path / "gap", "--json")
+    result = command_line.run("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", tmp_path / "gap")
     assert result.exit_code == 0, result.stderr
-    (change,) = json.loads(result.stdout)["corrected"]["changes"]
+    said = json.loads((tmp_path / "gap" / "gap.json").read_text())["corrected"]
+    (change,) = said["changes"]
     assert change["element"] == "quad_params.k_eta"
+    require_the_same_in("rotorpy", said)
+    # Why it is not flown there is no part of the answer.
+    page, inside = (tmp_path / "gap" / "report.html").read_text(), said["in_simulator"]
+    assert (f"In {inside['program']}  " in result.stdout) == (not inside["why_not"])
+    assert ("Not flown in RotorPy" in page) == bool(inside["why_not"])
+    assert "Not flown" not in result.stdout
     assert change["low"] < TRUE.thrust_factor < change["high"]
     before, after = mine.read_text().splitlines(), (tmp_path / "gap" / "mine.py").read_text().splitlines()
     assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")

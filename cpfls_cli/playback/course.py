@@ -1,18 +1,22 @@
-"""Courses that an exported vehicle is flown along: where runs start, and the commands of its rotors between samples."""
+"""Courses that a simulator flies along: where runs start, and the commands of rotors between samples."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion, State
+from cpfls_cli.playback.motion import FASTEST, MeasuredMotion, State
 from cpfls_cli.playback.player import less_measured
 from cpfls_cli.playback.rotors import RotorResponse
+
+_ROUNDING = 1e-9
+"""Share of a step."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +79,32 @@ class Course:
         stretches = tuple(slice(finer * part.start, finer * part.stop) for part in self.flight.stretches)
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
 
+    def steps(self, longest_s: float) -> int:
+        """Count the equal steps in a step of the course, none of them longer than this but for rounding."""
+        return max(1, ceil(self.period / longest_s - _ROUNDING))
+
+    def collected(self, runs: Iterable[Iterable[State]]) -> State:
+        """Collect what runs pass through after each step; see `Flies`."""
+        vector = len(self.starts), self.horizon, 3
+        states = State(*(np.full(shape, np.nan) for shape in (vector, vector, (*vector, 3), vector)))
+        for run, path in enumerate(runs):
+            for step, now in enumerate(path, 1):
+                if not (np.abs(now.rate) < FASTEST).all():
+                    break
+                if step % self.finer == 0:
+                    for part, own in zip(states, now, strict=True):
+                        part[run, step // self.finer - 1] = own
+        return states
+
     def errors(self, states: State) -> Array:
         """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
+
+Flies = Callable[[Course, bool], State]
+"""From a course whose rotors are in the order of a file, and whether they lag behind its speeds, which are kept from
+step to step, to states of the centre of mass at the samples behind each start, shape (run, horizon, ...); NaN from
+where a run ran away."""
 
 Wrench = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
 """From rotor speeds, velocity through the air, body rate and attitude (body to world) of each run to torque and force,

@@ -1,0 +1,295 @@
+"""A simulator's file flown in the simulator itself: what a playback by other code says of the same file and flight.
+
+Both hold what drives the rotors from sample to sample, so that they differ by their integrators alone: a playback takes
+one step of second order from sample to sample, RotorPy and MuJoCo's RK4 many of fourth order or more, MuJoCo's Euler
+and PyBullet steps of first order, whose error halves with them.
+"""
+
+import re
+from dataclasses import replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cpfls_cli.export.registry import exported
+from cpfls_cli.export.simulators.urdf import order_of
+from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.course import Course
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulators import in_pybullet, inside
+from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.study import of_log, played, vehicle_of
+from cpfls_cli.weak_form.windows import Recording
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights, logged
+from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of
+
+TRUE = SMALL._replace(drag=0.0, damping=0.0)
+HORIZON = 50
+AGREE = 0.005
+"""Share of the errors after half a second: of a step of second order as long as a sample, 0.15 %."""
+PACKAGES = {"xml": "mujoco", "py": "rotorpy", "urdf": "pybullet"}
+
+
+def require(ending):
+    if find_spec(PACKAGES[ending]) is None:
+        pytest.skip(f"needs the package {PACKAGES[ending]}, of the extra simulators")
+
+
+def flight_of(seconds, **more):
+    return next(iter(gusty_flights([Flight(TRUE, GUSTS, reach=3.0, swing=0.3, **more)], seconds)))
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return flight_of(12.0)
+
+
+@pytest.fixture(scope="module")
+def commanded():
+    return replace(flight_of(12.0, commands=True), hold="previous")
+
+
+def given(folder, ending, text=""):
+    """A file of what flies, with its rotors as in the flight."""
+    order = (0, 1, 2, 3)
+    if ending == "urdf":
+        text = exported(sheet_of_vehicle(VehicleModel(vehicle=TRUE.vehicle)), "urdf", "v.urdf").text
+        order = tuple(np.argsort(order_of(TRUE.vehicle)).tolist())
+    file = folder / f"v.{ending}"
+    file.write_text(text or {"xml": mjcf_of(TRUE, SPINS, integrator="RK4"), "py": rotorpy_of(TRUE)}[ending])
+    return replace(of_log(read_model(file), None, None), order=order, spins=tuple(SPINS.tolist()))
+
+
+def starts(flight):
+    return np.arange(0, len(flight) - HORIZON, 50)
+
+
+def flown(of, flight, lags=False):
+    """Errors of the playback and of the simulator, shape (run, horizon, 4, 3)."""
+    model = vehicle_of(of, of, TRUE.vehicle)
+    model = model if lags else replace(model, response=RotorResponse())
+    course = Course(flight, starts(flight), HORIZON)
+    own = free_runs(player_of(model, flight), flight, course.starts, HORIZON).errors
+    flies = inside.SIMULATORS[of.model.format].loaded(of.model.file, of, np.full(4, TRUE.thrust_factor))
+    turned = replace(course, flight=replace(flight, speed=flight.speed[:, np.argsort(of.order)]))
+    return own, inside.runs_of(turned, flies(turned, lags)).errors
+
+
+def apart(own, theirs):
+    """How far runs are from each other at most, as shares of the largest errors, shape (4,)."""
+    return np.abs(theirs - own).max(axis=(0, 1, 3)) / np.abs(own).max(axis=(0, 1, 3))
+
+
+@pytest.mark.parametrize("ending", ["xml", "py"])
+def test_a_simulator_says_what_a_playback_says(tmp_path, flight, ending):
+    require(ending)
+    assert (apart(*flown(given(tmp_path, ending), flight)) < AGREE).all()
+
+
+def test_two_simulators_agree_where_their_steps_are_short(tmp_path, flight):
+    """MuJoCo and RotorPy know nothing of each other: what is left is their tolerance."""
+    require("xml")
+    require("py")
+    (_, one), (_, other) = (flown(given(tmp_path, ending), flight) for ending in ("xml", "py"))
+    assert (apart(one, other) < 1e-5).all()
+
+
+def test_the_error_of_first_order_steps_halves_with_them(tmp_path, flight):
+    require("xml")
+    found = []
+    for step in (0.002, 0.001):
+        own, theirs = flown(given(tmp_path, "xml", mjcf_of(TRUE, SPINS, step=step)), flight)
+        _, exact = flown(given(tmp_path, "xml"), flight)
+        found.append(apart(exact, theirs))
+        assert (apart(own, theirs) < 0.05).all()
+    np.testing.assert_allclose(found[0] / found[1], 2.0, rtol=0.05)
+
+
+def test_pybullet_says_what_a_playback_says(tmp_path, flight, monkeypatch):
+    """Without its damping, which no file states; its gravity of 9.8 m/s^2 is 5 mm/s off after half a second."""
+    require("urdf")
+    of, found = given(tmp_path, "urdf"), []
+    own, damped = flown(of, flight)
+    monkeypatch.setattr(inside, "fly_pybullet", partial(in_pybullet.fly_pybullet, damping=0.0))
+    # Three and ten steps from sample to sample.
+    for step in (1 / 240, 1 / 1000):
+        monkeypatch.setattr(in_pybullet, "_STEP_S", step)
+        found.append(apart(own, flown(of, flight)[1]))
+    np.testing.assert_allclose(found[0] / found[1], 10 / 3, rtol=0.1)
+    assert (found[1] < 0.02).all()
+    assert (apart(own, damped) > found[0]).all()
+
+
+def test_rotors_lag_behind_commands(tmp_path, commanded):
+    require("py")
+    of = given(tmp_path, "py")
+    own, theirs = flown(of, commanded, lags=True)
+    assert (apart(own, theirs) < AGREE).all()
+    assert (apart(own, flown(of, commanded)[1]) > 0.3).all()
+
+
+def test_filters_of_actuators_lag_behind_commands(tmp_path, commanded):
+    """They filter the squared speed, a playback the speed."""
+    require("xml")
+    text = mjcf_of(TRUE, SPINS, integrator="RK4").replace("<motor", '<general dyntype="filterexact" dynprm="0.02"')
+    of = given(tmp_path, "xml", text)
+    own, theirs = flown(of, commanded, lags=True)
+    assert (apart(own, theirs) < 0.05).all()
+    assert (apart(own, flown(of, commanded)[1]) > 0.3).all()
+    # Measured speeds have the lag already.
+    assert (apart(*flown(of, replace(commanded, hold="linear"))) < AGREE).all()
+
+
+def newtons(file, *, top=None, shift=(0.0, 0.0, 0.0), flipped=False):
+    """The same vehicle with thrusts for controls, its centre of mass elsewhere, and its sites upside down."""
+    text = mjcf_of(TRUE, SPINS, integrator="RK4")
+    text = re.sub(r"<custom>.*?</custom>", "", text)
+    moved = np.array(shift)
+    text = re.sub(
+        'pos="([^"]*)"', lambda own: 'pos="{} {} {}"'.format(*(np.array(own[1].split(), dtype=float) + moved)), text
+    )
+    ratio, sign = TRUE.drag_factor / TRUE.thrust_factor, -1 if flipped else 1
+    limit = f' ctrllimited="true" ctrlrange="0 {top}"' if top else ""
+    for index, spin in enumerate(SPINS):
+        text = re.sub(
+            rf'name="m{index}" site="s{index}" gear="[^"]*"',
+            f'site="s{index}" gear="0 0 {sign * 2:g} 0 0 {-sign * spin * 2 * ratio:.12g}"{limit}',
+            text,
+        )
+    file.write_text(text.replace("<site ", '<site quat="0 1 0 0" ') if flipped else text)
+    return replace(of_log(read_model(file), None, None), spins=tuple(SPINS.tolist()))
+
+
+@pytest.mark.parametrize("changed", [{}, {"shift": (0.05, -0.02, 0.03)}, {"flipped": True}], ids=str)
+def test_controls_are_thrusts_where_the_file_says_nothing_else(tmp_path, flight, changed):
+    """Wherever the frame of the body is, a flight is of its centre of mass."""
+    require("xml")
+    _, squared = flown(given(tmp_path, "xml"), flight)
+    _, thrusts = flown(newtons(tmp_path / "n.xml", **changed), flight)
+    assert (apart(squared, thrusts) < 1e-6).all()
+
+
+def test_limits_of_controls_hold(tmp_path, flight):
+    require("xml")
+    hover = TRUE.mass * 9.81 / 4
+    free, limited = (flown(newtons(tmp_path / "n.xml", top=top), flight)[1] for top in (None, 0.52 * hover))
+    assert apart(free, limited)[3] > 0.05
+
+
+def test_what_an_export_says_of_controls_holds(tmp_path, flight):
+    """All actuators, and rotors in the order of the log."""
+    require("xml")
+    model = VehicleModel(vehicle=TRUE.vehicle, effects=(ModelEffect("rotor_drag", {}, np.array([1e-5])),))
+    (tmp_path / "v.xml").write_text(exported(sheet_of_vehicle(model), "mjcf", "v.xml").text)
+    order = (2, 0, 3, 1)
+    of = replace(of_log(read_model(tmp_path / "v.xml"), None, None), order=order)
+    own = free_runs(player_of(model, flight), flight, starts(flight), HORIZON).errors
+    mixed = replace(flight, speed=flight.speed[:, order])
+    _, theirs = flown(of, mixed)
+    assert (apart(own, theirs) < AGREE).all()
+
+
+MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+
+
+@pytest.fixture(scope="module")
+def held():
+    (signals,) = logged(flight_of(4.0), TRUE.vehicle).parts
+    return [Recording("held.csv", signals)]
+
+
+def both(of, held, texts, horizon_s=0.3):
+    """Playback and simulator along held-out flights, the file as given and as corrected."""
+    settings = GapSettings(horizon_s=horizon_s)
+    pairs = played(of, texts, TRUE.vehicle, held, held, settings)
+    replayed = PlaybackChange.of_pairs(pairs, errors_by_horizon(pairs, horizon_s))
+    return replayed, inside.in_simulator(of, texts, TRUE.vehicle, held, pairs, horizon_s)
+
+
+@pytest.mark.parametrize("ending", ["xml", "py"])
+def test_a_file_is_flown_as_given_and_as_corrected(tmp_path, held, ending, monkeypatch):
+    """With meshes that are beside the file and not beside its copy."""
+    require(ending)
+    made = {
+        "xml": lambda thrust: mjcf_of(TRUE, SPINS, thrust=thrust),
+        "py": lambda thrust: rotorpy_of(TRUE, thrust=thrust),
+    }
+    wrong, right = (made[ending](thrust) for thrust in (1.2, 1.0))
+    if ending == "xml":
+        (tmp_path / "parts").mkdir()
+        (tmp_path / "parts" / "m.obj").write_text(MESH)
+        seen = ("<worldbody>", '<asset><mesh file="m.obj"/></asset><worldbody><geom type="mesh" mesh="m"/>')
+        wrong, right = (
+            text.replace("<option", '<compiler meshdir="parts"/><option').replace(*seen) for text in (wrong, right)
+        )
+    monkeypatch.chdir(tmp_path)
+    of = given(Path(), ending, wrong)
+    played_back, found = both(of, held, {f"v.{ending}": right.encode()})
+    assert found.program.startswith({"xml": "MuJoCo ", "py": "RotorPy "}[ending])
+    assert found.why_not == ""
+    for name in ("before", "after"):
+        own, theirs = (each.models[name] for each in (played_back, found.flown))
+        for signal, errors in own.signals.items():
+            # Of other windows, and by MuJoCo's own step.
+            assert theirs.signals[signal].mae[-1] == pytest.approx(errors.mae[-1], rel=0.15)
+    assert found.flown.at_end["velocity"].after < 0.8 * found.flown.at_end["velocity"].before
+    assert found.flown.windows <= played_back.windows
+
+
+def test_a_run_that_ran_away_stays_as_it_was(flight):
+    course = Course(flight, np.array([3, 40]), 4)
+    begins = [State(*(part[run] for part in course.start)) for run in (0, 1)]
+    away = begins[0]._replace(rate=np.array([1e4, 0.0, 0.0]))
+    runs = inside.runs_of(course, course.collected([[begins[0], begins[0], away, begins[1]], [begins[1]] * 4]))
+    np.testing.assert_array_equal(runs.diverged, [2, -1])
+    stays = course.errors(State(*(np.repeat(begin[:, None], 4, axis=1) for begin in course.start)))
+    np.testing.assert_array_equal(runs.errors, stays)
+
+
+def test_what_runs_away_in_mujoco_writes_nothing(tmp_path, flight, monkeypatch, capfd):
+    require("xml")
+    monkeypatch.chdir(tmp_path)
+    of = given(tmp_path, "xml", mjcf_of(TRUE, SPINS, thrust=1e12))
+    flies = inside.SIMULATORS["mjcf"].loaded(of.model.file, of, np.ones(4))
+    course = Course(flight, np.array([3, 40]), 4)
+    assert (inside.runs_of(course, flies(course, False)).diverged >= 0).all()
+    assert [path.name for path in tmp_path.iterdir()] == ["v.xml"]
+    assert capfd.readouterr() == ("", "")
+
+
+LOOSE = """<link name="loose"/>
+<joint name="j" type="fixed"><parent link="base_link"/><child link="loose"/></joint></robot>"""
+
+
+def test_pybullet_prints_nothing(tmp_path, flight, capfd):
+    """It warns of a link without inertia, and says by itself when it was built."""
+    require("urdf")
+    of = given(tmp_path, "urdf")
+    of.model.file.write_text(of.model.file.read_text().replace("</robot>", LOOSE))
+    flown(of, flight)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_why_a_file_is_not_flown(tmp_path, held, monkeypatch):
+    require("xml")
+    body = """<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="0.045"
+        diaginertia="3.7e-5 4.2e-5 6.6e-5"/></body></worldbody></mujoco>"""
+    without = replace(given(tmp_path, "xml", body), order=(), spins=())
+    assert both(without, held, {})[1].why_not == "v.xml states no rotors"
+    of = given(tmp_path, "xml", mjcf_of(TRUE, SPINS).replace("<body ", '<body colour="red" '))
+    _, refused = both(of, held, {})
+    assert refused.why_not.startswith("it refuses v.xml: ")
+    assert "colour" in refused.why_not
+    assert refused.flown is None
+    monkeypatch.setattr(inside, "find_spec", lambda _: None)
+    assert both(of, held, {})[1].why_not == 'its package is not installed; pip install "cpfls[simulators]" does'
+    (tmp_path / "v.sdf").write_text(sdf_of(TRUE))
+    assert both(of_log(read_model(tmp_path / "v.sdf"), None, None), held, {})[1] is None
