@@ -273,10 +273,10 @@ def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
     assert line == (
         f"{tmp_path / 'm.h'}: its suffix names no form; give the name one of the suffixes .json (json), .c (c), "
-        ".xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .mcap (mcap), .csv (csv)"
+        ".xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .proto (webots), .mcap (mcap), .csv (csv)"
     )
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.py")
-    assert line == f"{tmp_path / 'm.py'}: rotorpy, casadi and jax write Python; name one of them with --format"
+    assert line == f"{tmp_path / 'm.py'}: rotorpy, pegasus, casadi and jax write Python; name one of them with --format"
 
 
 @pytest.mark.parametrize(
