@@ -26,7 +26,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_vehicles import sheet_of_vehicle
-from tests.builders.flown_exports import FLYING
+from tests.builders.flown_exports import FLYING, text_of
 from tests.builders.playback_flights import MIDDLING, ROTORPY, ROTORPY_HIDDEN, flown, rotorpy_flight, truth
 from tests.builders.recorded_flights import FLIGHTS
 from tests.builders.verified_exports import verified
@@ -89,7 +89,7 @@ def steps() -> None:
         call = in_c(model, Path(folder))
         count = 100_000
         for form in FLYING:
-            text = exported(sheet_of_vehicle(model), form, "v.py").text
+            text = text_of(form, exported(sheet_of_vehicle(model), form, "v.py"))
             # The second flight less the first: what does not grow with the steps is left out.
             short = Course(flight, course.starts, 100)
             FLYING[form].fly(text, short)

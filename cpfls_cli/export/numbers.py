@@ -8,7 +8,8 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.polynomials import TERMS, motion_terms, weights_of, weights_of_model
 from cpfls_cli.playback.model import VehicleModel
@@ -101,6 +102,13 @@ def places(model: VehicleModel, *, alike: bool) -> Array:
 def spins(vehicle: VehicleSettings) -> Array:
     """Give the sign of the yaw torque of each rotor, shape (rotor,)."""
     return np.asarray(np.sign(allocation_matrix(vehicle)[3]), dtype=float)
+
+
+def cross_order(vehicle: VehicleSettings, autopilot: str) -> IntArray | None:
+    """Give the rotor of the config that is each motor of an autopilot's X; None where rotors are not in an X."""
+    sides = [tuple(np.sign(np.round(rotor.position_m[:2], 4)).astype(int).tolist()) for rotor in vehicle.rotors]
+    wanted = [each[:2] for each in AUTOPILOTS[autopilot].cross]
+    return np.array([sides.index(each) for each in wanted]) if sorted(sides) == sorted(wanted) else None
 
 
 def _squares(vehicle: VehicleSettings, alike: bool) -> dict[str, Array]:

@@ -13,8 +13,15 @@ from cpfls_cli.tuning.vehicle import ParameterRow
 Rows = Mapping[str, ParameterRow]
 """Parameters by name."""
 
-_FLOAT = 9
-"""Type of MAVLink, as QGroundControl writes it."""
+_INTEGER, _FLOAT = 6, 9
+"""Types of MAVLink, as QGroundControl writes them."""
+
+QGROUNDCONTROL_HEAD = "# Vehicle-Id Component-Id Name Value Type"
+
+
+def qgroundcontrol_line(name: str, value: float) -> str:
+    """Write a parameter for QGroundControl; whole numbers are those that come as integers."""
+    return f"1\t1\t{name}\t{value:.9g}\t{_INTEGER if isinstance(value, int) else _FLOAT}"
 
 
 def parameter_file(autopilot: Autopilot, version: str, about: str, rows: Rows) -> tuple[str, str]:
@@ -67,8 +74,8 @@ def _comment(row: ParameterRow) -> str:
 
 
 def _qgroundcontrol(rows: Rows) -> Iterator[str]:
-    yield "# Vehicle-Id Component-Id Name Value Type"
-    yield from _comments(rows, lambda name, row: f"1\t1\t{name}\t{_value(row)}\t{_FLOAT}")
+    yield QGROUNDCONTROL_HEAD
+    yield from _comments(rows, lambda name, row: qgroundcontrol_line(name, float(row.proposed)))
 
 
 def _mission_planner(rows: Rows) -> Iterator[str]:

@@ -13,15 +13,16 @@ from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, everything, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.simulators import ardupilot
+from cpfls_cli.export.simulators import ardupilot, betaflight, crazyflie, px4
 from cpfls_cli.export.simulators.crazyflow import crazyflow_held, crazyflow_text
 from cpfls_cli.export.simulators.functions import casadi_text, jax_text
 from cpfls_cli.export.simulators.mjcf import mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.pegasus import pegasus_held, pegasus_text
-from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
+from cpfls_cli.export.simulators.pyflyt import NUMBERS, pyflyt_held, pyflyt_text
 from cpfls_cli.export.simulators.rotorpy import rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
+from cpfls_cli.export.simulators.webots import webots_held, webots_text
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import VehicleModel
@@ -43,6 +44,8 @@ class Form:
         From a vehicle to what the form holds of it, and to how it takes weights.
     also : str
         Ending of a file that the other one needs; empty for none.
+    lacks : str
+        What no file of this form can state, whatever the vehicle.
     """
 
     title: str
@@ -50,6 +53,7 @@ class Form:
     held: Callable[[VehicleModel], tuple[Held, Holds]]
     write: Write
     also: str = ""
+    lacks: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +93,7 @@ FORMS: dict[str, Form] = {
     "c": Form("C", ".c", _whole, _c, also=".h"),
     "mjcf": Form("MuJoCo", ".xml", mjcf_held, mjcf_text),
     "sdf": Form("Gazebo's motor model", ".sdf", sdf_held, sdf_text),
-    "px4": Form("PX4's Gazebo", ".sdf", sdf_held, px4_text, AIRFRAME),
+    "px4": Form("PX4's Gazebo", ".sdf", sdf_held, px4.px4_text, px4.AIRFRAME),
     "crazyflow": Form("crazyflow", ".toml", crazyflow_held, crazyflow_text),
     "urdf": Target(
         "gym-pybullet-drones",
@@ -113,6 +117,15 @@ FORMS: dict[str, Form] = {
     ),
     "rotorpy": Form("RotorPy", ".py", rotorpy_held, rotorpy_text),
     "pegasus": Form("Pegasus Simulator", ".py", pegasus_held, pegasus_text),
+    "pyflyt": Form("PyFlyt", ".urdf", pyflyt_held, pyflyt_text, NUMBERS),
+    "webots": Form("Webots", ".proto", webots_held, webots_text),
+    "crazyflie": Form(
+        "the Crazyflie's header", ".h", crazyflie.crazyflie_held, crazyflie.crazyflie_text, lacks=crazyflie.LACKS
+    ),
+    "betaflight": Form(
+        "Betaflight's mixer", ".txt", betaflight.betaflight_held, betaflight.betaflight_text, lacks=betaflight.LACKS
+    ),
+    "px4params": Form("PX4's geometry", ".params", px4.px4_held, px4.px4_parameters, lacks=px4.LACKS),
     "casadi": Form("CasADi", ".py", _whole, casadi_text),
     "jax": Form("JAX", ".py", _whole, jax_text),
 }
@@ -157,7 +170,7 @@ def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Mis
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
     otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) else []
     left = (*about_hover, *otherwise, *sheet.outside)
-    remarks = tuple(each.sentence for each in left)
+    remarks = (*([form.lacks] if form.lacks else []), *(each.sentence for each in left))
     if len(about_hover) - any(sheet.wind) > 1:
         off = together(sheet.model, held).sentence
         remarks = (*remarks, f"In all, {form.title} ends {off} off after half a second about hover.")

@@ -1,7 +1,7 @@
 """Which columns drive the rotors or say how fast they turn, in which unit, and which of them are connected."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -88,7 +88,8 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     if speed is None and command is None:
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = None if command is None or command.columns.unit != "1" else command
-    command_is = None if shares is None else _meaning(shares, parameters, system)
+    beside = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
+    command_is = None if shares is None else _meaning(shares, beside, parameters, system)
     return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
 
 
@@ -392,17 +393,20 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     return None
 
 
-def _meaning(command: Guess, parameters: Parameters, system: str) -> KeyChoice:
-    """Tell whether a command is a share of thrust or of speed."""
+def _meaning(command: Guess, beside: Collection[str], parameters: Parameters, system: str) -> KeyChoice:
+    """Tell whether a command is a share of thrust or of speed, by what other columns of commands there are too."""
 
     def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> KeyChoice:
         return KeyChoice("rotor_command_is", value, reason, sure, rivals)
 
     if command.kind == CRAZYFLIE:
-        if "motor.m" in command.columns.columns[0]:
-            older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
-            return choose("thrust", "motor.m* of a Crazyflie are thrusts, before it compensates for the battery", older)
-        return choose("speed", "pwm.* of a Crazyflie is what the motors get")
+        if "motor.m" not in command.columns.columns[0]:
+            return choose("speed", "pwm.* of a Crazyflie is what the motors get")
+        if any("pwm.m" in name for name in beside):
+            said = "motor.m* of a Crazyflie that logs pwm.m* too are thrusts, before it compensates for the battery"
+            return choose("thrust", said)
+        older = Rival("rotor_command_is: thrust", "of firmware of 2022, which logged what was asked for")
+        return choose("speed", "motor.m* of a Crazyflie are what the motors get", older)
     if parameters.get("THR_MDL_FAC") is not None:
         value = float(parameters["THR_MDL_FAC"])
         said = f"THR_MDL_FAC is {value:g}"

@@ -91,7 +91,7 @@ _TAGS = {
         "lag_down": "rotor_dyn_coef",
         "drag": "drag_matrix",
     },
-    "crazyflie": {"ratio": "THRUST2TORQUE"},
+    "crazyflie": {"ratio": "THRUST2TORQUE", "curve": "VMOTOR2THRUST"},
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
 _NOT_STATED = {
@@ -100,7 +100,8 @@ _NOT_STATED = {
     "forces and torques that you apply",
     "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
     "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
-    "crazyflie": "thrust follows the volts of a motor; scale VMOTOR2THRUST0 to VMOTOR2THRUST3 by it",
+    "crazyflie": "the header has thrust by the volts of a motor, and that by speed is the model's; logs with motor.m1 "
+    "to m4 and pm.vbat, without speeds, show it",
     "rotorpy": "k_eta and k_m are others; write them there",
     "crazyflow": "rpm2thrust and rpm2torque are others; write them there",
 }
@@ -488,8 +489,10 @@ def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: s
         {"thrust": k, "torque": b, "ratio": b / k}[kind]
         for k, b in ((each.thrust_factor_n_s2, each.drag_factor_n_m_s2) for each in made.vehicle.rotors)
     ]
+    if kind == "thrust" and made.of.lift is not None:
+        kind, known = "curve", [rotor.curve.value for rotor in made.rotors if rotor.curve is not None]
     stated = [own.value for rotor in made.rotors if (own := getattr(rotor, kind)) is not None]
-    if len(stated) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
+    if len(stated) == len(factors) == len(known) and np.allclose(stated, known, rtol=_SAME, atol=0.0):
         found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
         if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
             return
@@ -527,6 +530,12 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
     for index, axis in enumerate("xyz"):
         if f"inertia_{axis}" in numbers:
             factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
+            if axis == "z" and not made.of.model.states_inertia and made.of.states_ratio:
+                # Of the two whose ratio shows, the file has this one.
+                other = _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low)))
+                words = "yaw torque over thrust of {whom} is {share}, by its ratio to the inertia about z of the model"
+                _as_found(made, "ratio", [other] * len(made.rotors), words, other)
+                continue
             _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
 
 
@@ -535,6 +544,12 @@ def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
     whole, own = made.of.model.inertia, made.of.model.heaviest
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
+        if own.node is None and not made.of.model.states_inertia:
+            made.elsewhere.append(
+                f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] kg m^2: the "
+                "file states none"
+            )
+            continue
         if not own.entries or not _straight(own.turned):
             if found.contradicts(total, made.wider):
                 made.elsewhere.append(

@@ -2,12 +2,14 @@
 
 As its ``power_distribution_quadrotor.c`` has it, motors lift along z at ``ARM_LENGTH`` from the middle on the
 diagonals, motor 1 in front on the right, motor 2 behind it, and turn the body by ``THRUST2TORQUE`` times their thrust,
-motors 1 and 3 counter-clockwise. Thrust follows the volts of a motor by ``VMOTOR2THRUST``, and commands are shares of
-``THRUST_MAX``, so the header states no thrust by speed, and no inertia.
+motors 1 and 3 counter-clockwise. By ``motors.c`` a motor lifts by ``VMOTOR2THRUST0 + VMOTOR2THRUST1 v + VMOTOR2THRUST2
+v^2 + VMOTOR2THRUST3 v^3`` at v volts, its share of the battery's. So the header states thrust where a log has these
+shares and the volts of the battery: that of hover counts. It states no thrust by speed, and no inertia.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 
@@ -44,7 +46,9 @@ def read_crazyflie(file: Path, option: str) -> SimulatorModel:
             f"{file}: states no {' and no '.join(absent)}; give platform_defaults_cf2.h or another header that does"
         )
     side = sqrt(0.5) * numbers.need("ARM_LENGTH").value
-    most = numbers.get("THRUST_MAX")
+    curve = [own for power in range(4) if (own := numbers.get(f"VMOTOR2THRUST{power}")) is not None]
+    sized = sorted((own for own in curve if own.value), key=lambda own: -abs(own.value))
+    of_volts = replace(sized[0], also=tuple(sized[1:])) if sized else None
     rotors = tuple(
         Rotor(
             f"motor {index}",
@@ -53,7 +57,8 @@ def read_crazyflie(file: Path, option: str) -> SimulatorModel:
             np.array([0.0, 0.0, 1.0]),
             turn,
             ratio=numbers.get("THRUST2TORQUE"),
-            most=most,
+            most=numbers.get("THRUST_MAX"),
+            curve=of_volts,
         )
         for index, (forward, left, turn) in enumerate(AUTOPILOTS["crazyflie"].cross, 1)
     )
@@ -63,4 +68,5 @@ def read_crazyflie(file: Path, option: str) -> SimulatorModel:
         f"options CONFIG_{option} and {_ALWAYS} count as set, and no other; {file.name}:CRAZYFLIE_THRUST_UPGRADE_KIT "
         "reads it with that one in place of the first",
     )
-    return SimulatorModel(file.stem, "crazyflie", (body,), rotors, CANNOT, notes, (file,))
+    volts = tuple(own.value for own in curve) if len(curve) == 4 else ()
+    return SimulatorModel(file.stem, "crazyflie", (body,), rotors, CANNOT, notes, (file,), by_volts=volts)

@@ -78,6 +78,8 @@ class Rotor:
         Yaw torque over squared speed, where that is what the file states.
     most : Stated or None, N
         Largest thrust, where controls are thrusts.
+    curve : Stated or None
+        Of thrust by the volts of a motor: a coefficient of it, with which the others go.
     turn : Stated or None
         Where its spin stands.
     node : Node or None
@@ -94,6 +96,7 @@ class Rotor:
     torque: Stated | None = None
     speed_max: Stated | None = None
     most: Stated | None = None
+    curve: Stated | None = None
     lag_up: Stated | None = None
     lag_down: Stated | None = None
     drag: Stated | None = None
@@ -135,6 +138,8 @@ class SimulatorModel:
         Numbers of effects by their coefficients, where the format has their very formulas.
     of_commands : bool
         Whether speeds are commands times the largest speed, so that logged speeds are others.
+    by_volts : tuple of float
+        Thrust of a motor, N, by powers of its volts, from the constant on; empty where the file has none.
     section : str
         Which vehicle of a file with several.
     """
@@ -148,6 +153,7 @@ class SimulatorModel:
     files: tuple[Path, ...]
     effects: Mapping[str, Mapping[str, Stated]] = field(default_factory=dict)
     of_commands: bool = False
+    by_volts: tuple[float, ...] = ()
     section: str = ""
 
     @property

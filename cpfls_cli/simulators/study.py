@@ -44,6 +44,9 @@ _BESIDES = {
 }
 _KNOWN = ("stated", "data")
 """How sure a log has to be of its rotors to say in which order the columns are."""
+_LEAST_VOLTS = 1.0  # Below are shares of a full battery.
+_ALIKE = 0.1
+"""Share by which the mean thrust by a curve over volts differs between flights of one vehicle."""
 _DIRECTION, _SPIN = 0.7, 0.1
 """Cosine from which two directions are the same, of rotors that are 45 degrees apart; what an equal spin counts."""
 
@@ -90,6 +93,8 @@ class VehicleOf:
     warnings: tuple[str, ...]
     by_speed: bool = True
     """Whether the speeds of the log are those that the file's thrust goes by."""
+    lift: float | None = None
+    """Thrust of a motor at the largest speed, N, by the volts that the log shows; None where nothing says so."""
 
     @property
     def program(self) -> str:
@@ -132,11 +137,29 @@ class VehicleOf:
             rotor = self.model.rotors[index]
             thrust = rotor.thrust.value if rotor.thrust is not None and self.by_speed else None
             drag = rotor.drag_factor if self.by_speed else None
+            if self.lift is not None and self.speed_max:
+                thrust = self.lift / self.speed_max**2
+                drag = None if rotor.ratio is None else rotor.ratio.value * thrust
             thrust, drag = (None if each is None else _short([each])[0] for each in (thrust, drag))
             comment = f"{rotor.name}, {rotor.where}"
             comment += "; it turns the other way there" if spin * rotor.spin < 0 else ""
             found.append(RotorLine(_short(hubs[index].tolist()), spin, thrust, drag, comment))
         return found
+
+    @property
+    def states_ratio(self) -> bool:
+        """Whether the yaw torque follows from the thrust, which another may give."""
+        return self.by_speed and all(self.model.rotors[index].ratio is not None for index in self.order)
+
+    def filled(self, vehicle: VehicleSettings) -> VehicleSettings:
+        """Give rotors whose thrust a model states the yaw torque over thrust of the file."""
+        rotors = list(vehicle.rotors)
+        for at, (index, line) in enumerate(zip(self.order, self.rotors, strict=False)):
+            ratio = self.model.rotors[index].ratio
+            if line.thrust is None and ratio is not None and self.by_speed:
+                own = rotors[at]
+                rotors[at] = replace(own, drag_factor_n_m_s2=ratio.value * own.thrust_factor_n_s2)
+        return replace(vehicle, rotors=tuple(rotors))
 
     def where_of(self, quantity: str) -> str:
         """Say where a quantity of the first rotor stands."""
@@ -144,6 +167,8 @@ class VehicleOf:
         if quantity == "thrust":
             if not self.by_speed:
                 return "by command, and the log has speeds"
+            if self.lift is not None and rotor.curve is not None:
+                return f"that of hover, by the volts of the log and {rotor.curve.where}"
             return "not stated by speed" if rotor.thrust is None else rotor.thrust.where
         stated = rotor.torque or rotor.ratio
         ratio = f", {rotor.ratio.value:g} m times the thrust" if rotor.ratio is not None else ""
@@ -168,8 +193,13 @@ def _short(values: list[float]) -> list[float]:
     return [float(f"{value:.12g}") + 0.0 for value in values]
 
 
-def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | None) -> VehicleOf:
+def of_log(
+    model: SimulatorModel, proposal: Proposal | None, mass_kg: float | None, like: VehicleSettings | None = None
+) -> VehicleOf:
     """Make the vehicle of a study; a log says in which order its rotors are, and how fast they turned.
+
+    What hangs on the log, the largest speed and thrust by volts, is that of a vehicle made of this file with other
+    logs, where one is given.
 
     Raises
     ------
@@ -192,11 +222,32 @@ def of_log(model: SimulatorModel, proposal: Proposal | None, mass_kg: float | No
             notes.append("rotors are in the order of the log, whose motors are numbered another way than the file's")
         spins, turned = _spins(model, airframe, order)
         warnings += turned
-    speed, where = _speed(model, proposal)
+    if like is None or model.speed_max is not None:
+        speed, where = _speed(model, proposal)
+    else:
+        speed, where = like.rotor_speed_max_rad_s, "Of the model that gives what the file leaves open"
     mass = model.mass_kg if mass_kg is None else mass_kg
     by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
     given, short = mass_kg is not None, _short([mass])[0]
-    return VehicleOf(model, given, short, speed, where, order, spins, tuple(notes), tuple(warnings), by_speed)
+    lift = _lift(model, proposal) if model.by_volts and proposal is not None else None
+    if lift is not None and like is not None and "thrust_factor" not in like.unknown:
+        before = like.rotors[0].thrust_factor_n_s2 * like.rotor_speed_max_rad_s**2
+        lift = before if abs(lift / before - 1) < _ALIKE else lift
+    return VehicleOf(model, given, short, speed, where, order, spins, tuple(notes), tuple(warnings), by_speed, lift)
+
+
+def _lift(model: SimulatorModel, proposal: Proposal) -> float | None:
+    """Give the thrust of a motor at the largest speed, N, that lifts on average as the volts of the log do."""
+    first, shares = proposal.first, proposal.first.speeds
+    choices = {each.key: each.value for each in proposal.choices}
+    if not proposal.share_of_speed or choices.get("rotor_command_is") != "speed":
+        return None
+    volts = np.nan if first.load is None else first.load.voltage
+    if shares is None or not volts > _LEAST_VOLTS:
+        return None
+    flown = shares[np.isfinite(shares).all(axis=1)]
+    lifts = float(np.polynomial.polynomial.polyval(volts * flown, model.by_volts).mean() / (flown**2).mean())
+    return lifts if lifts > 0 else None
 
 
 def _order(model: SimulatorModel, airframe: Airframe) -> tuple[tuple[int, ...], str]:
@@ -287,9 +338,9 @@ def _settings(of: VehicleOf, given: VehicleOf, stated: VehicleSettings) -> Vehic
     for index, own, line in zip(of.order, stated.rotors, of.rotors, strict=False):
         new, before = (each.model.rotors[index] for each in (of, given))
         # Where controls are thrusts or shares, a file states by how much they are changed.
-        more = _times(new.most, before.most)
+        more = _times(new.most, before.most) * _times(new.curve, before.curve)
         turn = more * _times(new.ratio, before.ratio)
-        absolute = not of.model.of_commands
+        absolute = not (of.model.of_commands or of.model.by_volts)
         known = {
             "spin": new.spin,
             "thrust_factor_n_s2": line.thrust if line.thrust and absolute else more * own.thrust_factor_n_s2,

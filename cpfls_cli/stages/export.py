@@ -27,7 +27,11 @@ from cpfls_cli.result import about, part, plain, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.stages._sheets import sheet_of
 
-Formats = StrEnum("Formats", "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy pegasus casadi jax mcap csv")
+Formats = StrEnum(
+    "Formats",
+    "json c sdf px4 crazyflow urdf ardupilot mjcf rotorpy pegasus pyflyt webots crazyflie betaflight px4params casadi "
+    "jax mcap csv",
+)
 ModelArgument = Annotated[
     Path,
     typer.Argument(
@@ -43,9 +47,10 @@ FormatOption = Annotated[
         help="json: every parameter, with names and units; c: C99 source and header, no dependencies; "
         "sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
         "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
-        "pegasus (Isaac Sim), casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv "
-        "(PlotJuggler): what a flight, replay, gap or response holds, on the log's own clock; default: by the "
-        "suffix of FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
+        "pegasus (Isaac Sim), pyflyt, webots, casadi, jax: the vehicle for a simulator or a library; crazyflie "
+        "(lines of its header), betaflight (mmix), px4params (CA_ROTOR): what an autopilot states of it; mcap "
+        "(Foxglove), csv (PlotJuggler): what a flight, replay, gap or response holds, on the log's own clock; default: "
+        "by the suffix of FILE (.json, .c, .xml, .sdf, .urdf, .toml, .proto, .mcap, .csv).",
     ),
 ]
 NameOption = Annotated[
@@ -57,6 +62,8 @@ NameOption = Annotated[
 VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
 """What is drawn by other programs, which is no model."""
 ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
+# What an autopilot states is no whole vehicle, so it is asked for by name.
+_BY_SUFFIX = {form: ending for form, ending in ENDINGS.items() if form in VIEWERS or not FORMS[form].lacks}
 # What the module imports beside the standard library: under such a name it would import itself.
 _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
@@ -202,12 +209,12 @@ def _written(run: Run, form: str, model: Model | None = None, view: View | None 
 def _form_of(output: Path) -> str:
     """Choose a form by the suffix of a file."""
     if output.suffix == ".py":
-        raise InputError(f"{output}: rotorpy, casadi and jax write Python; name one of them with --format")
-    for form, ending in ENDINGS.items():
+        raise InputError(f"{output}: rotorpy, pegasus, casadi and jax write Python; name one of them with --format")
+    for form, ending in _BY_SUFFIX.items():
         if output.suffix == ending:
             return form
     first: dict[str, str] = {}
-    for form, ending in ENDINGS.items():
+    for form, ending in _BY_SUFFIX.items():
         if ending != ".py":
             first.setdefault(ending, form)
     endings = ", ".join(f"{ending} ({form})" for ending, form in first.items())

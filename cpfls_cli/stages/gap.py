@@ -38,6 +38,7 @@ from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
+from cpfls_cli.words import joined
 
 PARTS = {
     "disagreement": ("compare", ""),
@@ -52,8 +53,8 @@ ConfigArgument = Annotated[
     Path,
     typer.Argument(
         metavar="CONFIG",
-        help="Study config (YAML); a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow), which is "
-        "corrected; or vehicle.h5.",
+        help="Study config (YAML); a simulator's own file (SDF, URDF, MJCF, RotorPy, ArduPilot, crazyflow, a "
+        "Crazyflie's header), which is corrected; or vehicle.h5.",
         show_default=False,
     ),
 ]
@@ -107,8 +108,12 @@ def gap(
     held_out = held_out or []
     if is_found(config):
         model = _study_in(run, config, model)
-    of_file = _study_of(run, config, [*flights, *held_out]) if is_simulator_file(config) else None
+    of_file = _study_of(run, config, [*flights, *held_out], model) if is_simulator_file(config) else None
+    if of_file is not None and model is None and run.open_numbers != "guessed":
+        _require_stated(run, config, of_file)
     with_numbers(run, "gap", model)
+    if of_file is not None:
+        run.study = run.study.model_copy(update={"vehicle": of_file.filled(run.study.vehicle)})
     why = "" if run.found is None else why_no_body_found(run, run.found)
     if why:
         raise InputError(
@@ -167,9 +172,11 @@ def _study_in(run: Run, file: Path, model: Path | None) -> Path:
     return file
 
 
-def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
+def _study_of(run: Run, file: Path, flights: Sequence[Path], model: Path | None) -> VehicleOf:
     """Make the study of a simulator's file and the logs that it is compared with."""
-    stated = Stated(model=taken(run, file, "simulator"))
+    found = model if model is not None and is_found(model) else None
+    like = None if found is None else stored_study(read_origin(found).config, found).vehicle
+    stated = Stated(model=taken(run, file, "simulator"), like=like)
     # Files that it includes may lie in the output folder, and none of them may be written over.
     assert stated.model is not None, "it was just read"
     names = stated.model.output_names.values()
@@ -187,6 +194,18 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path]) -> VehicleOf:
     for warning in (*made.vehicle.warnings, *made.contradictions):
         run.note(warning)
     return made.vehicle
+
+
+def _require_stated(run: Run, file: Path, of: VehicleOf) -> None:
+    """Refuse a simulator's file that leaves numbers open where no model is there to give them."""
+    open_ = [name for name in run.study.vehicle.unknown if name != "drag_factor" or not of.states_ratio]
+    if open_:
+        names = joined([name.replace("_", " ") for name in open_])
+        raise InputError(
+            f"{file}: does not state {names}, which a gap needs: `cpfls init --from {file} LOG... -o study.yaml`, then "
+            f"`cpfls vehicle study.yaml LOG... -o vehicle.h5` with flights of this vehicle, then this command with "
+            "--model vehicle.h5; or --accept-guesses for guesses from mass and arms"
+        )
 
 
 def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) -> Diagnosis:

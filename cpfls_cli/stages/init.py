@@ -104,6 +104,7 @@ class Stated:
     thrust_factor_n_s2: float | None = None
     drag_factor_n_m_s2: float | None = None
     model: SimulatorModel | None = None
+    like: VehicleSettings | None = None  # Made of the same file with other logs.
 
     @property
     def knows_constants(self) -> bool:
@@ -334,7 +335,7 @@ def proposed(
     mass, model = stated.mass_kg, stated.model
     mass = model.mass_kg if mass is None and model is not None else mass
     proposal = propose(known, mass, stated.arm_m, scale_to_arm=scale_to_arm) if known else None
-    vehicle = None if model is None else of_log(model, proposal, stated.mass_kg)
+    vehicle = None if model is None else of_log(model, proposal, stated.mass_kg, stated.like)
     made = Proposed(
         proposal=proposal,
         stated=stated,

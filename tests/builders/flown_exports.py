@@ -6,16 +6,19 @@ Targets that nobody can install are flown by their published equations.
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Callable
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+import yaml
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import runge_kutta_step
+from cpfls_cli.export.registry import Exported
 from cpfls_cli.export.simulators.ardupilot import STEP_S, fly_ardupilot
 from cpfls_cli.export.simulators.sdf import ENTRIES, SHORTEST_S, apart
 from cpfls_cli.export.simulators.urdf import fly_urdf
@@ -161,6 +164,69 @@ def fly_pegasus(text: str, course: Course) -> State:
     return fly_body(course, module["MASS"], axes @ np.diag(module["MOMENTS"]) @ axes.T, wrench, 0.0)
 
 
+def fly_webots(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the published equations of Webots' propellers."""
+
+    def vectors(field: str) -> Array:
+        return np.array([[float(word) for word in own.split()] for own in re.findall(rf"{field} (.*)", text)])
+
+    hubs, thrust, torque = vectors("centerOfThrust"), vectors("thrustConstants"), vectors("torqueConstants")
+    rows = re.search(r"inertiaMatrix \[\s*(.*)\s*(.*)\s*\]", text)
+    assert rows is not None
+    inertia = symmetric([float(word) for row in rows.groups() for word in row.split()])
+    assert not thrust[:, 1].any()
+    assert not torque[:, 1].any()
+    # The example of Webots turns rotors that have a negative thrust constant backwards.
+    ways = np.sign(thrust[:, 0])
+    assert (np.abs(torque[:, 0]) * vectors("maxVelocity")[:, 0] ** 2 < vectors("maxTorque")[:, 0]).all()
+
+    def wrench(speed: Array, _air: Array, _rate: Array, _rotation: Array) -> tuple[Array, Array]:
+        signed = (ways * speed) * np.abs(speed)
+        lifts = (thrust[:, 0] * signed)[..., None] * [0.0, 0.0, 1.0]
+        moment = rotations.cross(hubs, lifts).sum(axis=1)
+        moment[:, 2] -= signed @ torque[:, 0]
+        return moment, lifts.sum(axis=1)
+
+    return fly_body(course, float(vectors(" mass")[0, 0]), inertia, wrench, 0.0)
+
+
+def fly_pyflyt(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the published equations of PyFlyt; the text is that of both files."""
+    numbers, urdf = text.split("<?xml")
+    given = yaml.safe_load(numbers)
+    motor, drag = given["motor_params"], given["drag_params"]
+    root = ElementTree.fromstring(urdf.split("?>", 1)[1])
+    links = [link.find("inertial") for link in root.iter("link")]
+    assert [joint.get("type") for joint in root.iter("joint")] == ["fixed"] * 5
+    body, *points = [link for link in links if link is not None]
+    entries = {entry: float(value) for entry, value in body.find("inertia").attrib.items()}  # type: ignore[union-attr]
+    mass = float(body.find("mass").get("value"))  # type: ignore[union-attr, arg-type]
+    # Links of motors are 0 to 3, in the order of the file, and that which drag acts on is 4.
+    hubs = np.array([[float(word) for word in each.find("origin").get("xyz").split()] for each in points[:4]])  # type: ignore[union-attr]
+    order = [int(rotor) - 1 for rotor in re.findall(r"motor\s+\d\s+is\s+rotor\s+(\d)", numbers.replace("#", ""))]
+    most = np.sqrt(motor["total_thrust"] / (4 * motor["thrust_coef"]))
+    turns = motor["torque_coef"] * np.array([-1.0, -1.0, 1.0, 1.0])
+    assert drag["drag_coef_xyz"] == motor["noise_ratio"] == 0.0
+    fastest = most / _RPM
+
+    def wrench(speed: Array, _air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
+        throttle = speed[:, order] / fastest
+        squares = (throttle * most) ** 2
+        lifts = (motor["thrust_coef"] * squares)[..., None] * [0.0, 0.0, 1.0]
+        torque = rotations.cross(hubs, lifts).sum(axis=1) - np.sign(rate) * drag["drag_coef_pqr"] * rate**2
+        torque[:, 2] += squares @ turns
+        return torque, lifts.sum(axis=1)
+
+    # A time constant as long as its step has throttles at their commands at once.
+    lag = 0.0 if motor["tau"] == 1 / 240 else motor["tau"]
+    return fly_body(course, mass, symmetric([entries[name] for name in ENTRIES]), wrench, lag)
+
+
+def text_of(form: str, made: Exported) -> str:
+    """Give the text that a vehicle flies by: of PyFlyt that of both files."""
+    return "".join(made.texts.values()) if form == "pyflyt" else made.text
+
+
 def fly_casadi(text: str, course: Course) -> State:
     """Fly an exported vehicle in CasADi."""
     module, flight = executed(text), course.flight
@@ -248,6 +314,8 @@ FLYING = {
     "ardupilot": Flying(fly_ardupilot, step_s=STEP_S),
     "rotorpy": Flying(fly_rotorpy, "rotorpy"),
     "pegasus": Flying(fly_pegasus, step_s=1e-3),
+    "pyflyt": Flying(fly_pyflyt, step_s=1e-3),
+    "webots": Flying(fly_webots, step_s=1e-3),
     "casadi": Flying(fly_casadi, "casadi", levels=0),
     "jax": Flying(fly_jax, "jax", levels=0),
 }

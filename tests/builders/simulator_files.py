@@ -1,8 +1,9 @@
 """Files of simulators for a vehicle that flies in `gusty_flights`, and its flights as logs."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from cpfls_cli.rotations import euler_angles
+from cpfls_cli.rotations import euler_angles, rotation_matrix
 
 COLUMNS = (
     "t,x,y,z,vx,vy,vz,roll,pitch,yaw,wx,wy,wz,rpm_1,rpm_2,rpm_3,rpm_4,"
@@ -91,6 +92,49 @@ def mjcf_of(truth, spins, *, thrust=1.0, step=0.002, integrator="Euler"):
     motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
     inertia = " ".join(f"{each:g}" for each in truth.inertia)
     return MJCF.format(step=step, integrator=integrator, mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
+
+
+QUARTER = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Axes of a Crazyflie in those of the vehicle that flies: forward is to its right, where rotors turn as its own do."""
+MOVING = ("x", "y", "z", "vx", "vy", "vz")
+VOLTS, FASTEST = 4.0, 4000.0
+"""Of the battery, and speed in rad/s that it turns rotors at."""
+
+
+def write_crazyflie_log(path, flight, *, speeds):
+    """Write a flight as a Crazyflie logs it, with speeds or with what its motors get and the volts of its battery."""
+    motion = flight.motion
+    asked = np.degrees(euler_angles(rotation_matrix(flight.setpoints["attitude"]) @ QUARTER)) * [1, -1, 1]
+    parts = [motion.position, motion.velocity, Rotation.from_matrix(motion.rotation @ QUARTER).as_quat()]
+    parts += [np.degrees(motion.rate @ QUARTER), flight.setpoints["position"], flight.setpoints["velocity"], asked]
+    # Front right, rear right, rear left, front left are a quarter turn on.
+    speed, time = flight.speed[:, [1, 2, 3, 0]], motion.period * np.arange(len(flight))
+    volts = np.random.default_rng(0).normal(VOLTS, 0.01, len(time))
+    parts += [30 / np.pi * speed] if speeds else [65536 / FASTEST * speed, volts]
+    names = ["t", *(f"stateEstimate.{name}" for name in (*MOVING, "qx", "qy", "qz", "qw"))]
+    names += [*(f"gyro.{axis}" for axis in "xyz"), *(f"ctrltarget.{name}" for name in MOVING)]
+    names += [f"controller.{name}" for name in ("roll", "pitch", "yaw")]
+    names += [f"{'rpm' if speeds else 'motor'}.m{motor}" for motor in (1, 2, 3, 4)] + ["pm.vbat"] * (not speeds)
+    table = np.column_stack([time, *parts])
+    np.savetxt(path, table, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+    return speed
+
+
+CURVE = np.array([-0.02, 0.06, -0.02, 0.006])
+"""Of thrust in N by powers of volts, as motors with brushes have it."""
+
+
+def header_of(truth, speed, *, thrust=1.0, ratio=1.0):
+    """Header of what flies, by whose volts rotors lift on average as they do at these speeds, times factors."""
+    lifts = np.polynomial.polynomial.polyval(VOLTS / FASTEST * speed, CURVE).mean()
+    scale = thrust * truth.thrust_factor * (speed**2).mean() / lifts
+    curve = "".join(f"    #define VMOTOR2THRUST{at} {scale * own:.9g}f\n" for at, own in enumerate(CURVE))
+    arm, torque = float(np.linalg.norm(truth.places[0])), ratio * truth.drag_factor / truth.thrust_factor
+    return (
+        f"// Mine.\n#define ARM_LENGTH {arm:.9g}f\n#define CF_MASS {truth.mass:.9g}f  // kg\n"
+        f"#ifdef CONFIG_ENABLE_THRUST_BAT_COMPENSATED\n{curve}    #define THRUST_MAX 0.3f\n"
+        f"    #define THRUST2TORQUE {torque:.9g}f // m\n#endif\n#define PID_ROLL_KP 6.0\n"
+    )
 
 
 ROTORPY = """#!/usr/bin/env python3

@@ -16,7 +16,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import Player, free_runs, in_the_air
 from cpfls_cli.rounding import less
-from tests.builders.flown_exports import FLYING
+from tests.builders.flown_exports import FLYING, text_of
 
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""
@@ -80,16 +80,17 @@ def verified(
     replayed = free_runs(model[1], model[0], starts, horizon).errors
     same = held.errors(flight, starts, horizon)
     otherwise = np.zeros_like(same)
+    text = text_of(form, exported)
     if not target.levels:
-        flown = limit = course.errors(target.fly(exported.text, course))
+        flown = limit = course.errors(target.fly(text, course))
         fine = same
     else:
         finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
-        flown, limit = _limit(form, exported.text, course, finer)
+        flown, limit = _limit(form, text, course, finer)
         fine = _fine(held, course)
         if isinstance(described, Target):
             # What no sum of weights is counts as not held, and not as a fault of the equations.
-            otherwise = course.errors(target.fly(exported.text, replace(course, finer=finer))) - flown
+            otherwise = course.errors(target.fly(text, replace(course, finer=finer))) - flown
     for errors in (replayed, same, flown, limit, fine, otherwise):
         errors[:, :, ~flight.shown] = 0.0
     step = _largest(flown - limit)

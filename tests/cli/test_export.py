@@ -15,6 +15,8 @@ import cpfls_cli
 from cpfls_cli.validation.verdict import Reason, Verdict
 from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
+from tests.builders.playback_flights import truth
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
 ENDINGS = {"json": "json", "c": "c"}
@@ -273,10 +275,10 @@ def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
     assert line == (
         f"{tmp_path / 'm.h'}: its suffix names no form; give the name one of the suffixes .json (json), .c (c), "
-        ".xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .mcap (mcap), .csv (csv)"
+        ".xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .proto (webots), .mcap (mcap), .csv (csv)"
     )
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.py")
-    assert line == f"{tmp_path / 'm.py'}: rotorpy, casadi and jax write Python; name one of them with --format"
+    assert line == f"{tmp_path / 'm.py'}: rotorpy, pegasus, casadi and jax write Python; name one of them with --format"
 
 
 @pytest.mark.parametrize(
@@ -393,8 +395,9 @@ def test_the_controller_of_the_page_compiles_and_asks_for_the_torque_of_the_mode
 def test_the_commands_of_the_page_run(cpfls, pipeline, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(pipeline.model, tmp_path / "model.h5")
-    first, self_test, _ = blocks("sh")
-    for line in first.splitlines():
+    write_vehicle(tmp_path / "vehicle.h5", vehicle_of(truth()))
+    first, self_test, autopilots, _ = blocks("sh")
+    for line in [*first.splitlines(), *autopilots.splitlines()]:
         words = line.split("#")[0].split()
         assert cpfls(*words[1:], "--force").exit_code == 0
     assert "uav_torque" in (tmp_path / "quad.h").read_text()

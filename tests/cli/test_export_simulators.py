@@ -37,6 +37,12 @@ def read(form, output):
         compile(output.read_text(), str(output), "exec")
     elif FORMS[form].ending == ".json":
         return json.loads("\n".join(line for line in output.read_text().splitlines() if not line.startswith("#")))
+    elif FORMS[form].ending == ".proto":
+        # Quotes and braces of the words of others stay behind the signs of comments.
+        lines = output.read_text().splitlines()
+        assert lines[0] == "#VRML_SIM R2023b utf8"
+        plain = "\n".join(line for line in lines if not line.startswith("#"))
+        assert all(plain.count(one) == plain.count(other) for one, other in ("{}", "[]"))
     elif FORMS[form].ending == ".toml":
         return tomllib.loads(output.read_text())
     else:

@@ -174,7 +174,6 @@ ONE_OF_A_KIND = ("autopilots/catalogue/", "effects/catalogue/", "export/simulato
 SMALL_ALL_THE_SAME = {
     "cli/command_lines.py": "reads sources",
     "cli/main.py": "runs before anything heavy is loaded",
-    "export/parameter_files.py": "forms of an export",
     "gap/next_flight/search.py": "what the room is for",
     "workers/compatibility.py": "loads without Dask",
 }

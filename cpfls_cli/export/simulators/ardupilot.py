@@ -22,10 +22,9 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
-from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
+from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins
 from cpfls_cli.export.polynomials import weights_of_model
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines
@@ -34,7 +33,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
-from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import scaled, times
 
 STEP_S = 1 / 1200
@@ -111,26 +109,18 @@ def _hover_speed(numbers: Mapping[str, float], mass: float, rotors: int) -> floa
     return float((np.sqrt(linear**2 + 4 * numbers["thrust"] * lift) - linear) / (2 * numbers["thrust"]))
 
 
-def _order(vehicle: VehicleSettings) -> tuple[IntArray, bool]:
-    """Give the rotor of the config that is each motor, and whether ArduPilot's own X says so."""
-    sides = [tuple(np.sign(np.round(rotor.position_m[:2], 4)).astype(int)) for rotor in vehicle.rotors]
-    wanted = [each[:2] for each in AUTOPILOTS["ardupilot"].cross]
-    if sorted(sides) == sorted(wanted):
-        return np.array([sides.index(each) for each in wanted]), True
-    return np.arange(len(sides)), False
-
-
 def _density(altitude: float) -> float:
     return float(_SEA_LEVEL * (1 - _LAPSE * altitude) ** _POWER)
 
 
 def ardupilot_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle as JSON of a frame, in comments what it does not hold; ArduPilot takes comments out."""
-    vehicle, (order, crossed) = sheet.model.vehicle, _order(sheet.model.vehicle)
+    vehicle, crossed = sheet.model.vehicle, cross_order(sheet.model.vehicle, "ardupilot")
+    order = np.arange(len(vehicle.rotors)) if crossed is None else crossed
     known = all(rotor.radius_m for rotor in vehicle.rotors)
     words = {
         "file": file,
-        "order": "ArduPilot's X" if crossed else "the config, which the frame has to have too",
+        "order": "ArduPilot's X" if crossed is not None else "the config, which the frame has to have too",
         "radius": "" if known else ", whose rotors are taken for half as long as the arm, for no config says",
     }
     said = [*sheet.facts, "", *remarks, "", *(each.format(**words) for each in _USE)]

@@ -71,17 +71,21 @@ def urdf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> s
     root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", *_use(order)])))
     rotors = " ".join(str(rotor + 1) for rotor in order.tolist())
     ElementTree.SubElement(root, "properties", _properties(sheet, held) | {"rotors": rotors})
+    add_body(root, held, arm(sheet.model.vehicle))
+    for propeller, rotor in enumerate(order.tolist()):
+        add_point(root, f"prop{propeller}", hubs[rotor])
+    add_point(root, "center_of_mass", np.zeros(3))
+    return written(root)
+
+
+def add_body(root: ElementTree.Element, held: Held, length: float) -> None:
+    """Add the link with mass and inertia, a flat cylinder of arms of a length in m."""
     body = _link(root, "base_link", np.zeros(3), held.body.mass, held.body.inertia)
-    length = arm(sheet.model.vehicle)
     size = {"radius": number(length), "length": number(_HEIGHT_SHARE * length)}
     for part in ("visual", "collision"):
         shape = ElementTree.SubElement(body, part)
         ElementTree.SubElement(shape, "origin", rpy="0 0 0", xyz="0 0 0")
         ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "cylinder", size)
-    for propeller, rotor in enumerate(order.tolist()):
-        _fixed(root, f"prop{propeller}", hubs[rotor])
-    _fixed(root, "center_of_mass", np.zeros(3))
-    return written(root)
 
 
 def _use(order: IntArray) -> tuple[str, ...]:
@@ -125,8 +129,8 @@ def _link(root: ElementTree.Element, name: str, place: Array, mass: float, inert
     return link
 
 
-def _fixed(root: ElementTree.Element, name: str, place: Array) -> None:
-    """Add a link without mass where a force acts: gym-pybullet-drones takes the centre of its mass."""
+def add_point(root: ElementTree.Element, name: str, place: Array) -> None:
+    """Add a link without mass where a force acts: PyBullet pushes at the centre of its mass."""
     _link(root, f"{name}_link", place, 0.0, np.zeros((3, 3)))
     joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
     ElementTree.SubElement(joint, "parent", link="base_link")

@@ -238,6 +238,22 @@ def test_outputs_without_a_motor_are_left_out(own):
     assert guess.columns.columns == tuple(names[:4])
 
 
+PWM = [f"pwm.m{motor}_pwm" for motor in range(1, 5)]
+
+
+@pytest.mark.parametrize(("beside", "meant"), [((), "speed"), (PWM, "thrust")])
+def test_commands_of_a_crazyflie_are_what_its_motors_get_unless_it_logs_these_too(own, beside, meant):
+    """Its firmware of 2022 alone logs what was asked for, with the PWM in columns of their own."""
+    commands, rate = 65.536 * own.speed, np.degrees(own.rate)
+    columns = named(commands, *(f"motor.m{motor}" for motor in range(1, 5)))
+    columns |= named(1.1 * commands, *beside) if beside else {}
+    log = flat_log(own, speed=columns, rate=named(rate, "gyro.x", "gyro.y", "gyro.z"))
+    recognition = seen(log)
+    assert recognition.signal("rotor_command").columns.columns[0] == "motor.m1"
+    (choice,) = [each for each in recognition.choices if each.key == "rotor_command_is"]
+    assert choice.value == meant
+
+
 def test_commands_that_blow_up_are_said_with_the_moment(own):
     commands = 65.536 * own.speed
     commands[1500:, 1] = 1.25e6

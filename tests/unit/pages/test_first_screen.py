@@ -8,6 +8,7 @@ import pytest
 from cpfls_cli import page
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
 from cpfls_cli.result import plain
+from cpfls_cli.simulators.results import Corrected
 from tests.builders import gap_artifacts as made
 from tests.builders.vehicle_search import CONFIG
 
@@ -139,6 +140,14 @@ def test_what_speaks_against_the_model_stands_in_the_box():
     box, *_ = screen(diagnosis(), cautions=(GUESSED, "vehicle.h5: DO NOT USE: predicts no better.", "more"))
     assert box.sentences[0] == "The gap is that of vehicle.h5: DO NOT USE: predicts no better."
     assert "The gap is that of" not in "".join(screen(diagnosis())[0].sentences)
+    # Of a simulator's file the numbers are its own, and a model gives what it leaves open.
+    of_file = replace(
+        diagnosis(), corrected=Corrected(files=("mine.sdf",), changes=(), unchanged=(), elsewhere=(), diff="")
+    )
+    box, *_ = screen(of_file, cautions=("vehicle.h5: DO NOT USE: predicts no better.",))
+    assert box.sentences[0] == (
+        "What the simulator's file leaves open is that of vehicle.h5: DO NOT USE: predicts no better."
+    )
 
 
 @pytest.mark.parametrize("verdict", ["NAMED", "PARTIAL", "AMBIGUOUS"])
