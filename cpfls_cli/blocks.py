@@ -29,6 +29,12 @@ def contiguous(samples: int, blocks: int) -> IntArray:
     return np.arange(samples, dtype=np.int64) * blocks // max(samples, 1)
 
 
+def blocks_of_time(samples: int, period: float) -> IntArray:
+    """Cut evenly spaced samples, a period in s apart, into blocks as long as these have to be, and enough of them."""
+    seconds = samples * period
+    return contiguous(samples, min(max(FEWEST_BLOCKS, round(seconds / block_length(seconds))), max(samples, 1)))
+
+
 def leaving_out(compute: Callable[[BoolArray], Array], samples: int, blocks: int) -> tuple[Array, Array]:
     """Compute numbers from the samples that are kept: from all, and without each of so many contiguous blocks."""
     block = contiguous(samples, blocks)
