@@ -10,13 +10,15 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 FEWEST_BLOCKS = 4
 """That give an error, if a wide one: Student's t of three is 4.3."""
-
-_CONFIDENCE = 0.975
-"""Two-sided 95 %."""
-
-
+ENOUGH_BLOCKS = 8
+"""Whose scatter decides: fewer leave the error itself open by more than a quarter."""
+MOST_COMPARED, MOST_BLOCKS = 20, 24
+"""Of predictions that are compared, and of estimates: the work grows with them, longer ones are surer independent, and
+intervals by Student's t are 6 % wider than for infinitely many."""
 BLOCK_S = 4.0
 """Length of blocks: longer than what noise, gusts and motion remember."""
+_CONFIDENCE = 0.975
+"""Two-sided 95 %."""
 
 
 def block_length(seconds: float, longest: float = BLOCK_S, shortest: float = 2.0, wanted: int = 9) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.blocks import contiguous, jackknife_error, leaving_out
+from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_error, leaving_out
 from cpfls_cli.consistency.check import flown
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
@@ -61,7 +61,6 @@ KINDS: dict[str, Kind] = {
 """By the first word of a number's name; chance is drawn in this order."""
 
 _SHORTEST_S = 4.0  # Of flight, below which it has no numbers.
-_BLOCKS = 8  # Of a flight, for errors.
 _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
@@ -290,9 +289,9 @@ def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Itera
 def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[Array], Array]) -> _Numbers:
     """Compute numbers of means over a flight, with their errors by blocks of it left out."""
     flown = values[flies]
-    block = contiguous(len(flown), _BLOCKS)
-    sums = np.array([flown[block == number].sum(axis=0) for number in range(_BLOCKS)])
-    count = np.bincount(block, minlength=_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
+    block = contiguous(len(flown), ENOUGH_BLOCKS)
+    sums = np.array([flown[block == number].sum(axis=0) for number in range(ENOUGH_BLOCKS)])
+    count = np.bincount(block, minlength=ENOUGH_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         left_out = np.array([of(mean) for mean in (sums.sum(axis=0) - sums) / (count.sum() - count)])
         return names, of(flown.mean(axis=0)), jackknife_error(left_out)
@@ -339,7 +338,7 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     alike = np.einsum("btr,bts->brs", weighed, turned.conj().reshape(count, length, -1))
     flown = np.asarray(flies[whole].reshape(count, length).all(axis=1))
     names = [f"unbalance M{index + 1}" for index in range(signals.speed.shape[1])]
-    if flown.sum() < _BLOCKS:
+    if flown.sum() < ENOUGH_BLOCKS:
         return [], np.zeros(0), np.zeros(0)
     power = 4 * (np.abs(np.linalg.solve(alike + _ALIKE * np.eye(len(names)), parts)) ** 2).sum(axis=2)
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
@@ -430,7 +429,7 @@ def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array) -> 
         driven = own.average(delayed(drives, delay / own.period))[inside, None]
         return np.broadcast_to(driven, (*there.shape, driven.shape[2])), there
 
-    return fit_delay(_DELAYS, moved, contiguous(len(there), _BLOCKS), each=True)
+    return fit_delay(_DELAYS, moved, contiguous(len(there), ENOUGH_BLOCKS), each=True)
 
 
 def _of_attitude(signals: Signals) -> Array:
@@ -459,7 +458,7 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
         return np.asarray((x[kept] * y[kept]).sum(axis=0) / (x[kept] ** 2).sum(axis=0))
 
     with np.errstate(invalid="ignore"):
-        whole, left_out = leaving_out(ratio, len(x), _BLOCKS)
+        whole, left_out = leaving_out(ratio, len(x), ENOUGH_BLOCKS)
         scale = -_logarithms(np.vstack([whole, left_out]))
         return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
 
@@ -502,7 +501,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)
     share, left_out = leaving_out(
-        lambda kept: np.array(_pulled(left[kept], drag[kept], pulls[kept])[:1]), len(left), _BLOCKS
+        lambda kept: np.array(_pulled(left[kept], drag[kept], pulls[kept])[:1]), len(left), ENOUGH_BLOCKS
     )
     return float(length), (["swing"], share, jackknife_error(left_out))
 
