@@ -106,7 +106,7 @@ class DelayFit(NamedTuple):
         Without each block.
     error : array, shape (...)
         Standard error by the jackknife over blocks, NaN of a single one. Where two delays explain as much, leaving out
-        a block moves from one to the other, and it is large; at the end of what was tried it is a step at least.
+        a block moves from one to the other, and it is large; at the end of what was tried it holds that of a step.
     inside : array of bool, shape (...)
         Whether it is neither the first nor the last that was tried.
     tried : array, shape (delay,)
@@ -196,7 +196,7 @@ def fit_delay(
     return DelayFit(
         delay=values[0],
         left_out=values[1:],
-        error=np.where(inside[0], error, np.hypot(error, delays[1] - delays[0])),
+        error=np.where(inside[0], error, np.hypot(error, (delays[1] - delays[0]) / np.sqrt(12))),
         inside=inside[0],
         tried=delays,
         unexplained=misfit[:, 0],

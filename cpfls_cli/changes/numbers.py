@@ -73,8 +73,7 @@ _WINDOW_S, _SWING_S = 0.12, 0.4
 """Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
 answers gusts, and only above it does torque drive the body."""
 
-_DELAYS: Array = 0.002 * np.arange(-1.0, 60.0)
-"""Tried, s, up to the longest of rotors and autopilot; one below none, so that one near none lies between two."""
+_DELAYS: Array = 0.002 * np.arange(60.0)  # Tried, s, up to the longest of rotors and autopilot.
 _CLEARLY = 3.0  # Standard errors beyond which a ratio is said to be below 0.
 _ABOVE = 1.96
 """Standard errors by which a ratio is above 0 that has a logarithm: of exchanged rotors hardly any is left."""
@@ -391,8 +390,8 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     with np.errstate(divide="ignore", invalid="ignore"):
         gains, gusts = _logarithms(ratios), 0.5 * np.log(found.residual) - np.log(np.diag(inertia))
         yield [f"gain {axis}" for axis in _ROTATIONS], gains[0], jackknife_error(gains[1:]), ratios[0]
+        yield [f"delay {axis}" for axis in _ROTATIONS], _known(found), found.error
         yield [f"gusts {axis}" for axis in _ROTATIONS], gusts[0], jackknife_error(gusts[1:])
-    yield [f"delay {axis}" for axis in _ROTATIONS], _known(found), found.error
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         # Of the gyroscope in the middle of two samples, for the attitude turns from one to the other.
@@ -413,8 +412,8 @@ def _logarithms(ratios: Array) -> Array:
 
 
 def _known(found: DelayFit) -> Array:
-    """Give delays, NaN where the longest that was tried is the best."""
-    return np.where(found.inside | (found.delay < found.tried[-1]), found.delay, np.nan)
+    """Give delays, NaN where the longest that was tried is the best, be it without a block."""
+    return np.where((np.vstack([found.delay, found.left_out]) < _DELAYS[-1]).all(axis=0), found.delay, np.nan)
 
 
 def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array) -> DelayFit:
