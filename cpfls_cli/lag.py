@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -109,7 +110,6 @@ class DelayFit(NamedTuple):
         a block moves from one to the other, and it is large; at the end of what was tried it holds that of a step.
     inside : array of bool, shape (...)
         Whether it is neither the first nor the last that was tried.
-    tried : array, shape (delay,)
     unexplained : array, shape (delay, ...)
         Share of the signals at each that was tried; of all axes their geometric mean.
     coefficients : array, shape (1 and block, axis, column)
@@ -122,7 +122,6 @@ class DelayFit(NamedTuple):
     left_out: Array
     error: Array
     inside: BoolArray
-    tried: Array
     unexplained: Array
     coefficients: Array
     residual: Array
@@ -153,7 +152,7 @@ def fit_delay(
         Evenly spaced.
     moved : callable
         Gives columns, shape (sample, axis, column), and signals, shape (sample, axis), at a delay: whichever is
-        delayed. Columns that are one array at all delays are multiplied once.
+        delayed.
     block : array of int, shape (sample,)
         Ascending from 0: independent parts.
     each : bool
@@ -165,25 +164,16 @@ def fit_delay(
     ----------
     Ljung 1999, *System Identification*, section 10.1 (least squares); Efron and Tibshirani 1993 (jackknife).
     """
-    first, columns, grams, crosses, powers = np.searchsorted(block, np.arange(block[-1] + 1)), None, [], [], []
-    for delay in delays:
-        now, signal = moved(float(delay))
-        if now is not columns:
-            columns = now
-            known = np.concatenate([np.ones((*now.shape[:2], 1)), now - now.mean(axis=0)], axis=2)
-            gram = _products(known, known, first)
-        signal = (signal - signal.mean(axis=0))[..., None]
-        grams.append(gram)
-        crosses.append(_products(known, signal, first))
-        powers.append(_products(signal, signal, first))
-    gram, cross, power = (_kept(np.array(own)) for own in (grams, crosses, powers))
+    products = np.array([_products(*moved(float(delay)), block) for delay in delays])
+    total = products.sum(axis=1, keepdims=True)
+    kept = np.concatenate([total, total - products], axis=1) if block[-1] else total
     # About the means of what is kept.
-    count, sums, level = gram[..., :1, :1], gram[..., 1:, :1], cross[..., :1, :]
-    gram, cross = gram[..., 1:, 1:] - sums @ sums.swapaxes(-1, -2) / count, cross[..., 1:, :] - sums @ level / count
-    power, count = (power - level**2 / count)[..., 0, 0], count[..., 0, 0]
+    count, sums = kept[..., 0, 0], kept[..., 1:, :1]
+    kept = kept[..., 1:, 1:] - sums @ sums.swapaxes(-1, -2) / count[..., None, None]
+    gram, cross, power = kept[..., :-1, :-1], kept[..., :-1, -1:], kept[..., -1, -1]
     shared = (own.sum(axis=2, keepdims=True) if pooled else own for own in (gram, cross))
     found = np.broadcast_to(_solved(*shared), cross.shape)
-    rest = np.maximum(power - (found * (2 * cross - gram @ found)).sum(axis=(-2, -1)), 0.0)
+    rest = power - (found * (2 * cross - gram @ found)).sum(axis=(-2, -1))
     # What does not move says nothing.
     moves = power > 0
     misfit = np.log(np.maximum(np.divide(rest, power, out=np.ones_like(rest), where=moves), _TINY))
@@ -198,24 +188,20 @@ def fit_delay(
         left_out=values[1:],
         error=np.where(inside[0], error, np.hypot(error, (delays[1] - delays[0]) / np.sqrt(12))),
         inside=inside[0],
-        tried=delays,
         unexplained=misfit[:, 0],
         coefficients=np.take_along_axis(found[..., 0], best[..., None], 0)[0],
         residual=np.take_along_axis(rest / count, best, 0)[0],
     )
 
 
-def _products(one: Array, other: Array, first: IntArray) -> Array:
-    """Multiply columns of each axis over blocks: (sample, axis, k) and (sample, axis, l) to (block, axis, k, l)."""
-    ends = [*first[1:], len(one)]
-    rows, columns = one.transpose(1, 2, 0), other.transpose(1, 0, 2)
-    return np.array([rows[..., b:e] @ columns[:, b:e] for b, e in zip(first, ends, strict=True)])
-
-
-def _kept(products: Array) -> Array:
-    """Sum over all blocks, and over all but each of several: (delay, block, ...) to (delay, 1 and block, ...)."""
-    total = products.sum(axis=1, keepdims=True)
-    return np.concatenate([total, total - products], axis=1) if products.shape[1] > 1 else total
+def _products(columns: Array, signals: Array, block: IntArray) -> Array:
+    """Multiply a one, columns and the signal of each axis with each other over blocks, shape (block, axis, ...)."""
+    signals = (signals - signals.mean(axis=0))[..., None]
+    ones, found = np.ones_like(signals), []
+    for begin, end in pairwise(np.searchsorted(block, np.arange(block[-1] + 2))):
+        both = np.concatenate([own[begin:end].transpose(1, 2, 0) for own in (ones, columns, signals)], axis=1)
+        found.append(both @ both.swapaxes(1, 2))
+    return np.array(found)
 
 
 def _solved(gram: Array, cross: Array) -> Array:

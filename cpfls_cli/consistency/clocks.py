@@ -165,7 +165,7 @@ def _shifts(half: _Half) -> Iterator[float]:
         return
 
     found = half.rotor_delay(_TELEMETRY_S, 2, each=True)
-    as_logged, least = found.unexplained[len(found.tried) // 2], found.unexplained.min(axis=0)
+    as_logged, least = found.unexplained[len(found.unexplained) // 2], found.unexplained.min(axis=0)
     if as_logged.max() < _NEXT_TO_NOTHING:
         yield from (0.0, 0.0)
         return

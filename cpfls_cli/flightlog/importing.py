@@ -29,6 +29,7 @@ _FEWEST_SAMPLES = 10  # Of which a flight can be made.
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
 # Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
 _POOR_R2 = 0.5
+_STEP = 0.02  # Between delays that are tried, of the shortest period that the filter passes.
 _SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 _ALIASING = "the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight"
 
@@ -274,7 +275,7 @@ def estimate_delay(
     """Estimate the delay at which a rigid body explains most of the torque.
 
     Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
-    For every delay of whole samples, the six inertia parameters and a constant torque about each axis are regressed on
+    For delays of whole samples, the six inertia parameters and a constant torque about each axis are regressed on
     one common window, each axis scaled by its own standard deviation (section 8 of the method's description).
 
     On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
@@ -291,18 +292,21 @@ def estimate_delay(
         raise ComputationError("the delay cannot be estimated: the torque is constant")
     scale[scale == 0] = np.inf
     columns = body_torque_columns(rate, derivative(time, rate))[window] / scale[:, None]
+    columns = columns - columns.mean(axis=0)
 
     def moved(delay: float) -> tuple[Array, Array]:
         return columns, delayed(torque, delay / period)[window] / scale
 
-    # One sample less than none, so that a delay near none lies between two.
-    tried = period * np.arange(-1, int(delay_max_s / period + 1e-9) + 1)
+    # One step less than none, so that a delay near none lies between two.
+    step = period * max(1, int(_STEP / (lowpass_hz * period)) if lowpass_hz else 1)
+    tried = step * np.arange(-1, int(delay_max_s / step + 1e-9) + 1)
     found = fit_delay(tried, moved, blocks_of_time(window.stop - window.start, period), pooled=True)
     delay = max(float(found.delay), 0.0)
-    regressor, own = (each - each.mean(axis=0) for each in moved(delay))
-    inertia = np.linalg.lstsq(regressor.reshape(-1, 6), own.ravel(), rcond=None)[0]
+    own = moved(delay)[1]
+    own = own - own.mean(axis=0)
+    inertia = np.linalg.lstsq(columns.reshape(-1, 6), own.ravel(), rcond=None)[0]
     acting = own.any(axis=0)
-    unexplained = ((own - regressor @ inertia) ** 2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
+    unexplained = ((own - columns @ inertia) ** 2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
     r2 = np.ones(3)
     r2[acting] = 1 - unexplained
     return DelayEstimate(
