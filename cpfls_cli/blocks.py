@@ -10,13 +10,15 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 FEWEST_BLOCKS = 4
 """That give an error, if a wide one: Student's t of three is 4.3."""
-
-_CONFIDENCE = 0.975
-"""Two-sided 95 %."""
-
-
+ENOUGH_BLOCKS = 8
+"""Whose scatter decides: fewer leave the error itself open by more than a quarter."""
+MOST_COMPARED, MOST_BLOCKS = 20, 24
+"""Of predictions that are compared, and of estimates: the work grows with them, longer ones are surer independent, and
+intervals by Student's t are 6 % wider than for infinitely many."""
 BLOCK_S = 4.0
 """Length of blocks: longer than what noise, gusts and motion remember."""
+_CONFIDENCE = 0.975
+"""Two-sided 95 %."""
 
 
 def block_length(seconds: float, longest: float = BLOCK_S, shortest: float = 2.0, wanted: int = 9) -> float:
@@ -27,6 +29,12 @@ def block_length(seconds: float, longest: float = BLOCK_S, shortest: float = 2.0
 def contiguous(samples: int, blocks: int) -> IntArray:
     """Cut samples into blocks of about equal length: the number of the block of each, shape (samples,)."""
     return np.arange(samples, dtype=np.int64) * blocks // max(samples, 1)
+
+
+def blocks_of_time(samples: int, period: float) -> IntArray:
+    """Cut evenly spaced samples, a period in s apart, into blocks as long as these have to be, and enough of them."""
+    seconds = samples * period
+    return contiguous(samples, min(max(FEWEST_BLOCKS, round(seconds / block_length(seconds))), max(samples, 1)))
 
 
 def leaving_out(compute: Callable[[BoolArray], Array], samples: int, blocks: int) -> tuple[Array, Array]:

@@ -1,13 +1,17 @@
-"""Sampled signals that come late: a pure delay and a first-order lag, by one formula for all rooms."""
+"""Delay and lag of sampled signals: both applied by one formula for all rooms, and a delay estimated."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
+from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.filters import recursion
+from cpfls_cli.rounding import levelled
 
 Between = Literal["cubic", "linear", "previous"]
 """What a signal is between samples.
@@ -31,6 +35,9 @@ _FORGOTTEN = 0.02
 """Lag in samples below which nothing of a sample is left at the next one: ``exp(-1 / 0.02)`` is 2e-22."""
 _NODES, _LENGTHS = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
 """Quadrature over a sample about its middle, exact to rounding for lags of a sample and more."""
+_COLLINEAR = 1e-9
+"""Squared share of a column of its own below which it goes with the others."""
+_TINY = float(np.finfo(float).tiny)
 
 
 def delayed(values: Numbers, steps: Any, between: Between = "cubic") -> Numbers:
@@ -87,6 +94,122 @@ def best_delay(delays: Array, misfit: Array) -> tuple[Array, BoolArray]:
     bend = before - 2 * least + after
     step = np.where(inside & (bend > 0), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
     return np.asarray(delays[best] + step * (delays[1] - delays[0])), np.asarray(inside)
+
+
+class DelayFit(NamedTuple):
+    """Delays that were estimated, one of all axes, shape (), or one of each, shape (axis,).
+
+    Attributes
+    ----------
+    delay : array, shape (...)
+        Between those that were tried by a parabola.
+    left_out : array, shape (block, ...)
+        Without each block.
+    error : array, shape (...)
+        Standard error by the jackknife over blocks, NaN of a single one. Where two delays explain as much, leaving out
+        a block moves from one to the other, and it is large; at the end of what was tried it holds that of a step.
+    inside : array of bool, shape (...)
+        Whether it is neither the first nor the last that was tried.
+    unexplained : array, shape (delay, ...)
+        Share of the signals at each that was tried; of all axes their geometric mean.
+    coefficients : array, shape (1 and block, axis, column)
+        At the best of those that were tried, of all and without each block.
+    residual : array, shape (1 and block, axis)
+        Mean square there.
+    """
+
+    delay: Array
+    left_out: Array
+    error: Array
+    inside: BoolArray
+    unexplained: Array
+    coefficients: Array
+    residual: Array
+
+    @property
+    def half(self) -> Array:
+        """Half of the 95 % interval, shape (...)."""
+        return half_width(self.error, len(self.left_out))
+
+
+def fit_delay(
+    delays: Array,
+    moved: Callable[[float], tuple[Array, Array]],
+    block: IntArray,
+    *,
+    each: bool = False,
+    pooled: bool = False,
+) -> DelayFit:
+    """Estimate by which delay columns explain signals best: regressions with a constant at every delay, over blocks.
+
+    A delay of all axes is the most likely one where each axis has noise of its own size, so that one that is hardly
+    explained does not move it. Where an autopilot answers what else moves the vehicle, as gusts, the delay of the loop
+    pulls the estimate, and the interval does not hold it.
+
+    Parameters
+    ----------
+    delays : array, shape (delay,)
+        Evenly spaced.
+    moved : callable
+        Gives columns, shape (sample, axis, column), and signals, shape (sample, axis), at a delay: whichever is
+        delayed.
+    block : array of int, shape (sample,)
+        Ascending from 0: independent parts.
+    each : bool
+        A delay of each axis.
+    pooled : bool
+        All axes share the coefficients.
+
+    References
+    ----------
+    Ljung 1999, *System Identification*, section 10.1 (least squares); Efron and Tibshirani 1993 (jackknife).
+    """
+    products = np.array([_products(*moved(float(delay)), block) for delay in delays])
+    total = products.sum(axis=1, keepdims=True)
+    kept = np.concatenate([total, total - products], axis=1) if block[-1] else total
+    # About the means of what is kept.
+    count, sums = kept[..., 0, 0], kept[..., 1:, :1]
+    kept = kept[..., 1:, 1:] - sums @ sums.swapaxes(-1, -2) / count[..., None, None]
+    gram, cross, power = kept[..., :-1, :-1], kept[..., :-1, -1:], kept[..., -1, -1]
+    shared = (own.sum(axis=2, keepdims=True) if pooled else own for own in (gram, cross))
+    found = np.broadcast_to(_solved(*shared), cross.shape)
+    rest = power - (found * (2 * cross - gram @ found)).sum(axis=(-2, -1))
+    # What does not move says nothing.
+    moves = power > 0
+    misfit = np.log(np.maximum(np.divide(rest, power, out=np.ones_like(rest), where=moves), _TINY))
+    if not each:
+        misfit = misfit.sum(axis=2) / np.maximum(moves.sum(axis=2), 1)
+    misfit = np.apply_along_axis(levelled, 0, np.exp(misfit))
+    values, inside = best_delay(delays, misfit)
+    error = jackknife_error(values[1:]) if len(values) > 1 else np.full(values.shape[1:], np.nan)
+    best = np.broadcast_to(misfit.argmin(axis=0).reshape(len(values), -1), rest.shape[1:])[None]
+    return DelayFit(
+        delay=values[0],
+        left_out=values[1:],
+        error=np.where(inside[0], error, np.hypot(error, (delays[1] - delays[0]) / np.sqrt(12))),
+        inside=inside[0],
+        unexplained=misfit[:, 0],
+        coefficients=np.take_along_axis(found[..., 0], best[..., None], 0)[0],
+        residual=np.take_along_axis(rest / count, best, 0)[0],
+    )
+
+
+def _products(columns: Array, signals: Array, block: IntArray) -> Array:
+    """Multiply a one, columns and the signal of each axis with each other over blocks, shape (block, axis, ...)."""
+    signals = (signals - signals.mean(axis=0))[..., None]
+    ones, found = np.ones_like(signals), []
+    for begin, end in pairwise(np.searchsorted(block, np.arange(block[-1] + 2))):
+        both = np.concatenate([own[begin:end].transpose(1, 2, 0) for own in (ones, columns, signals)], axis=1)
+        found.append(both @ both.swapaxes(1, 2))
+    return np.array(found)
+
+
+def _solved(gram: Array, cross: Array) -> Array:
+    """Solve normal equations of columns of any length; one of zeros gets 0."""
+    size = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 0.0))
+    size = np.where(size > 0, size, 1.0)[..., None]
+    among = gram / size / size.swapaxes(-1, -2) + _COLLINEAR * np.eye(gram.shape[-1])
+    return np.asarray(np.linalg.solve(among, cross / size) / size)
 
 
 class Lagged(NamedTuple):

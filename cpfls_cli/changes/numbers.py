@@ -9,13 +9,13 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.blocks import contiguous, jackknife_error, leaving_out
+from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_error, leaving_out
 from cpfls_cli.consistency.check import flown
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.lag import best_delay, delayed
+from cpfls_cli.lag import DelayFit, delayed, fit_delay
 from cpfls_cli.result import about, part, result
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
 
@@ -61,7 +61,6 @@ KINDS: dict[str, Kind] = {
 """By the first word of a number's name; chance is drawn in this order."""
 
 _SHORTEST_S = 4.0  # Of flight, below which it has no numbers.
-_BLOCKS = 8  # Of a flight, for errors.
 _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
@@ -74,14 +73,10 @@ _WINDOW_S, _SWING_S = 0.12, 0.4
 """Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
 answers gusts, and only above it does torque drive the body."""
 
-_LATEST_S = 0.12  # Of rotors and autopilot.
-_STEP_S = 0.002
-_DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
+_DELAYS: Array = 0.002 * np.arange(60.0)  # Tried, s, up to the longest of rotors and autopilot.
 _CLEARLY = 3.0  # Standard errors beyond which a ratio is said to be below 0.
 _ABOVE = 1.96
 """Standard errors by which a ratio is above 0 that has a logarithm: of exchanged rotors hardly any is left."""
-
-_COLLINEAR = 1e-9  # Squared share of a signal of its own below which it goes with the others.
 
 
 @result
@@ -293,9 +288,9 @@ def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Itera
 def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[Array], Array]) -> _Numbers:
     """Compute numbers of means over a flight, with their errors by blocks of it left out."""
     flown = values[flies]
-    block = contiguous(len(flown), _BLOCKS)
-    sums = np.array([flown[block == number].sum(axis=0) for number in range(_BLOCKS)])
-    count = np.bincount(block, minlength=_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
+    block = contiguous(len(flown), ENOUGH_BLOCKS)
+    sums = np.array([flown[block == number].sum(axis=0) for number in range(ENOUGH_BLOCKS)])
+    count = np.bincount(block, minlength=ENOUGH_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         left_out = np.array([of(mean) for mean in (sums.sum(axis=0) - sums) / (count.sum() - count)])
         return names, of(flown.mean(axis=0)), jackknife_error(left_out)
@@ -342,7 +337,7 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     alike = np.einsum("btr,bts->brs", weighed, turned.conj().reshape(count, length, -1))
     flown = np.asarray(flies[whole].reshape(count, length).all(axis=1))
     names = [f"unbalance M{index + 1}" for index in range(signals.speed.shape[1])]
-    if flown.sum() < _BLOCKS:
+    if flown.sum() < ENOUGH_BLOCKS:
         return [], np.zeros(0), np.zeros(0)
     power = 4 * (np.abs(np.linalg.solve(alike + _ALIKE * np.eye(len(names)), parts)) ** 2).sum(axis=2)
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
@@ -369,9 +364,8 @@ def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
     if inside.sum() < FEWEST_WINDOWS:
         return [], np.zeros(0), np.zeros(0)
     assert signals.rotor_command is not None, "asked for"
-    found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
-    delays = _STEP_S * found[:, 1]
-    return [f"lag {name}" for name in rotors], delays[0], _delay_error(delays[1:])
+    found = _followed(own, inside, own.average(signals.speed), signals.rotor_command)
+    return [f"lag {name}" for name in rotors], _known(found), found.error
 
 
 def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
@@ -391,16 +385,13 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     turned = own.derivative(momentum) + own.average(rotations.cross(signals.body_rate, momentum))
     assert signals.torque is not None, "rotor speeds are there"
     assert signals.thrust is not None, "rotor speeds are there"
-    found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]), signals.period)
-    moments = np.diag(inertia)
-    with np.errstate(divide="ignore"):
-        gusts = np.log(found[:, 2] / moments)
-    estimates = np.stack([_logarithms(found[:, 0]), _STEP_S * found[:, 1], gusts], axis=1)
-    for kind, values in zip(("gain", "delay", "gusts"), estimates.transpose(1, 0, 2), strict=True):
-        with np.errstate(invalid="ignore"):
-            error = _delay_error(values[1:]) if kind == "delay" else jackknife_error(values[1:])
-        names = [f"{kind} {axis}" for axis in _ROTATIONS]
-        yield (names, values[0], error, found[0, 0]) if kind == "gain" else (names, values[0], error)
+    found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]))
+    ratios = np.diagonal(found.coefficients, axis1=1, axis2=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gains, gusts = _logarithms(ratios), 0.5 * np.log(found.residual) - np.log(np.diag(inertia))
+        yield [f"gain {axis}" for axis in _ROTATIONS], gains[0], jackknife_error(gains[1:]), ratios[0]
+        yield [f"delay {axis}" for axis in _ROTATIONS], _known(found), found.error
+        yield [f"gusts {axis}" for axis in _ROTATIONS], gusts[0], jackknife_error(gusts[1:])
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         # Of the gyroscope in the middle of two samples, for the attitude turns from one to the other.
@@ -420,55 +411,24 @@ def _logarithms(ratios: Array) -> Array:
         return np.log(np.where(above, ratios, np.where(below, 0.0, np.nan)))
 
 
-def _delay_error(left_out: Array) -> Array:
-    """Compute the error of delays: at the end of what is tried all blocks give the same, which says nothing."""
-    return np.asarray(np.hypot(jackknife_error(left_out), _STEP_S / np.sqrt(12)))
+def _known(found: DelayFit) -> Array:
+    """Give delays, NaN where the longest that was tried is the best, be it without a block."""
+    return np.where((np.vstack([found.delay, found.left_out]) < _DELAYS[-1]).all(axis=0), found.delay, np.nan)
 
 
-def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, period: float) -> Array:
-    """Fit what follows, averaged over windows, to what drives it, of all and without each block; see `_fit`."""
-    driven = np.array([own.average(delayed(drives, each / period))[inside] for each in _DELAYS])
-    there = turned[inside]
-    # Squares and products of each block, about means of all.
-    both = np.concatenate([driven, np.broadcast_to(there, (len(driven), *there.shape))], axis=2)
-    both -= both.mean(axis=1, keepdims=True)
-    block = contiguous(len(there), _BLOCKS)
-    parts = [both[:, block == number] for number in range(_BLOCKS)]
-    sums = np.array([part.sum(axis=1) for part in parts])
-    products = np.array([part.transpose(0, 2, 1) @ part for part in parts])
-    count = np.bincount(block, minlength=_BLOCKS)
-    left_out = zip(count.sum() - count, sums.sum(axis=0) - sums, products.sum(axis=0) - products, strict=True)
-    kept = [(count.sum(), sums.sum(axis=0), products.sum(axis=0)), *left_out]
-    return np.array([_fit(*each, there.shape[1]) for each in kept])
-
-
-def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
-    """Fit what follows to what drives it at each delay: gain, best delay in steps, residual, shape (3, column).
-
-    A delay at the end of what is tried is not known.
+def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array) -> DelayFit:
+    """Fit what follows, averaged over windows, shape (window, axis), to what drives it, and its delay about each axis.
 
     Conditional on the other columns, and on those that nothing follows: of a weak rotor thrust turns the body too, and
     so does each torque about all axes.
-
-    `count`: of windows.
-    `sums`: shape (delay, drive and column).
-    `products`, shape (delay, drive and column, drive and column): over them of what drives and of what follows, the
-    last of them.
     """
-    products = products - sums[:, :, None] * sums[:, None, :] / count
-    drives = products.shape[1] - columns
-    squares = np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0)
-    size = np.sqrt(squares[:, None, :drives])
-    # What does not change drives nothing.
-    size = np.where(size > 0, size, 1.0)
-    among = products[:, :drives, :drives] / size / size.transpose(0, 2, 1)
-    cross = products[:, :drives, drives:] / size.transpose(0, 2, 1)
-    found = np.linalg.solve(among + _COLLINEAR * np.eye(drives), cross)
-    left = np.maximum(squares[:, drives:] - (cross * found).sum(axis=1), 0.0)
-    best, axis = np.argmin(left, axis=0), np.arange(columns)
-    gain = found[best, axis, axis] / size[best, 0, axis]
-    late = np.where(best < len(left) - 1, best_delay(np.arange(len(left), dtype=float), left)[0], np.nan)
-    return np.array([gain, late, np.sqrt(left[best, axis] / count)])
+    there = turned[inside]
+
+    def moved(delay: float) -> tuple[Array, Array]:
+        driven = own.average(delayed(drives, delay / own.period))[inside, None]
+        return np.broadcast_to(driven, (*there.shape, driven.shape[2])), there
+
+    return fit_delay(_DELAYS, moved, contiguous(len(there), ENOUGH_BLOCKS), each=True)
 
 
 def _of_attitude(signals: Signals) -> Array:
@@ -497,7 +457,7 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
         return np.asarray((x[kept] * y[kept]).sum(axis=0) / (x[kept] ** 2).sum(axis=0))
 
     with np.errstate(invalid="ignore"):
-        whole, left_out = leaving_out(ratio, len(x), _BLOCKS)
+        whole, left_out = leaving_out(ratio, len(x), ENOUGH_BLOCKS)
         scale = -_logarithms(np.vstack([whole, left_out]))
         return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
 
@@ -540,7 +500,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)
     share, left_out = leaving_out(
-        lambda kept: np.array(_pulled(left[kept], drag[kept], pulls[kept])[:1]), len(left), _BLOCKS
+        lambda kept: np.array(_pulled(left[kept], drag[kept], pulls[kept])[:1]), len(left), ENOUGH_BLOCKS
     )
     return float(length), (["swing"], share, jackknife_error(left_out))
 

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.findings import Finding, off_clock
+from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
+from cpfls_cli.consistency.findings import FaultNumber, Finding, off_clock
 from cpfls_cli.consistency.gyroscope import LONGEST_DELAY_S
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.importing import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
-from cpfls_cli.lag import best_delay
-from cpfls_cli.rounding import levelled
+from cpfls_cli.lag import DelayFit, fit_delay
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import capitalised
 
-_STEPS = 41  # The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
+_STEP_S = 0.005  # Between delays that are tried.
 # Above the motion of a multirotor and below most of the noise of its derivative.
 _LOWPASS_HZ, _SHARE_OF_RATE = 8.0, 0.2
 _DELAY_MAX_S = 0.2  # Rotors of the largest multirotors follow within a fifth of a second.
@@ -26,8 +26,7 @@ _SMALLEST_R2 = 0.3  # A rigid body that explains less of the torque leaves the d
 _SURE_S = 0.002  # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
 _FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2  # Windows that a fit of five numbers wants, and estimates that have a scatter.
 _ROTORS_OFF_S = 0.008  # Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
-# Telemetry comes up to a quarter of a second late; steps of 20 ms, then of 5.
-_TELEMETRY_S, _TELEMETRY_STEPS, _FINER = 0.24, 25, 9
+_TELEMETRY_S = 0.24  # Telemetry comes up to a quarter of a second late.
 _SCATTER_S, _SCATTER = 0.004, 0.2  # Estimates of one clock scatter by less than this, or by less than this share of it.
 _FEWEST_SHIFTS = 4  # Two halves of one flight about roll and pitch.
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
@@ -37,18 +36,21 @@ _UNDECIDED = "these flights do not show whether the gyroscope or the attitude is
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
-    """Say by which delay the motion follows commands or a logged torque, median over the flights; nothing if unknown.
+    """Say by which delay the motion follows commands or a logged torque; nothing if unknown.
 
+    Median over the flights, and all of their 95 % intervals.
     Behind measured speeds nothing has to come late: what looks so may be an autopilot that answers gusts.
     """
     driven = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
     estimates = [estimate for signals in driven if (estimate := _estimate(signals)) is not None]
     if not estimates:
         return ()
-    delay = float(np.median([estimate.delay_s for estimate in estimates]))
+    delay = 1000 * float(np.median([estimate.delay_s for estimate in estimates]))
+    low, high = 1000 * min(own.low_s for own in estimates), 1000 * max(own.high_s for own in estimates)
     whom = "commands" if driven[0].commanded else "logged torque"
-    bound = "at least" if any(estimate.at_bound for estimate in estimates) else "about"
-    return (f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms.",)
+    bound = any(estimate.at_bound for estimate in estimates)
+    by = f"at least {delay:.0f} ms" if bound else f"{delay:.0f} ms [{low:.0f}, {high:.0f}]"
+    return (f"The motion follows the {whom} by {by}.",)
 
 
 def _estimate(signals: Signals) -> DelayEstimate | None:
@@ -65,17 +67,18 @@ def _estimate(signals: Signals) -> DelayEstimate | None:
 
 
 def attitude_on_clock(
-    gyro_delay: float, flights: Sequence[Signals], windows: Windows
+    found: FaultNumber, flights: Sequence[Signals], windows: Windows
 ) -> tuple[tuple[ChannelRepair, ...], tuple[str, ...]]:
     """Put an attitude that is late against the gyroscope onto its clock.
 
     Which of the two is late the rotors say. Where they do not, as commands or a loop that answers gusts, it is the one
     that comes after the other: a sensor, a filter or a wire makes a log late, and nothing makes it early.
 
-    `gyro_delay`: of the gyroscope behind the attitude, s.
+    `found`: delay of the gyroscope behind the attitude, s.
     Result `repairs`: empty where the gyroscope is late.
     Result `notes`: that only this makes the gyroscope late.
     """
+    gyro_delay, half_s = found.value, 0.5 * (found.high - found.low)
     behind = np.array([delay for half in _halves(flights, windows) if (delay := _behind(half)) is not None])
     agrees, lags = False, False
     if len(behind) >= _FEWEST_HALVES:
@@ -85,8 +88,8 @@ def attitude_on_clock(
         return (), () if lags else (f"{capitalised(_UNDECIDED)}, so the gyroscope is shifted.",)
     channels = ("gyroscope", "rotors") if agrees else ("gyroscope",)
     judged = "the gyroscope and the rotors, whose clocks agree" if agrees else f"the gyroscope: {_UNDECIDED}"
-    what = f"the attitude is {off_clock(-gyro_delay)}, judged by {judged}"
-    finding = _late(what, "correct its clock in the log", ("attitude", *channels), -gyro_delay)
+    what = f"the attitude is {off_clock(-gyro_delay, half_s)}, judged by {judged}"
+    finding = _off_clock(what, "correct its clock in the log", ("attitude", *channels), -gyro_delay)
     return (ChannelRepair("attitude", delay_s=-gyro_delay).with_finding(finding, f"It is {_DONE}"),), ()
 
 
@@ -105,12 +108,13 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     delay = float(np.median(found))
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(found) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
-    what = f"the rotor speeds are {off_clock(delay)}, judged by the gyroscope"
-    finding = _late(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
+    half_s = float(half_width(mean_error(np.array(found)), len(found)))
+    what = f"the rotor speeds are {off_clock(delay, half_s)}, judged by the gyroscope"
+    finding = _off_clock(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
     return ChannelRepair("rotor_speed", delay_s=delay).with_finding(finding, f"They are {_DONE}")
 
 
-def _late(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
+def _off_clock(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
     return Finding(what, remedy, channels, delay, "s", contradiction=False, repairable=True)
 
 
@@ -124,20 +128,18 @@ class _Half:
 
     time: Array
     torque: Array
-    motion: list[Array]
+    motion: Array  # Shape (window, axis, column).
     windows: Windows
 
-    def explained(self, late: float, axes: int) -> Array:
-        """Give the share that the motion explains of the torque of rotors late by so many s; NaN of a constant one."""
-        torque = self.windows.average(shifted(self.torque[:, :axes], self.time, late))
-        shares = np.full(axes, np.nan)
-        for axis in range(axes):
-            if np.ptp(torque[:, axis]):
-                about = torque[:, axis] - torque[:, axis].mean()
-                motion = self.motion[axis]
-                rest = about - motion @ np.linalg.lstsq(motion, about, rcond=None)[0]
-                shares[axis] = 1 - (rest**2).sum() / (about**2).sum()
-        return shares
+    def rotor_delay(self, most_s: float, axes: int, *, each: bool) -> DelayFit:
+        """Estimate the delay of the rotors, to so many s either way, of all axes alike or of each."""
+        motion, tried = self.motion[:, :axes], np.linspace(-most_s, most_s, 2 * round(most_s / _STEP_S) + 1)
+
+        def moved(delay: float) -> tuple[Array, Array]:
+            return motion, self.windows.average(shifted(self.torque[:, :axes], self.time, delay))
+
+        block = blocks_of_time(len(motion), self.windows.hop * self.windows.period)
+        return fit_delay(tried, moved, block, each=each)
 
 
 def _halves(flights: Sequence[Signals], windows: Windows) -> Iterator[_Half]:
@@ -153,9 +155,8 @@ def _halves(flights: Sequence[Signals], windows: Windows) -> Iterator[_Half]:
                 continue
             air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(rate), 0))
             turning, turned, moved = windows.derivative(rate), windows.average(rate), windows.average(air)
-            columns = (np.column_stack([turning[:, axis], turned[:, axis], moved]) for axis in range(3))
-            motion = [each - each.mean(axis=0) for each in columns]
-            yield _Half(signals.time[part], signals.torque[part], motion, windows)
+            columns = [np.column_stack([turning[:, axis], turned[:, axis], moved]) for axis in range(3)]
+            yield _Half(signals.time[part], signals.torque[part], np.stack(columns, axis=1), windows)
 
 
 def _shifts(half: _Half) -> Iterator[float]:
@@ -163,30 +164,17 @@ def _shifts(half: _Half) -> Iterator[float]:
     if not np.ptp(half.torque[:, :2], axis=0).all():
         return
 
-    def left(delay: float) -> Array:
-        return 1 - half.explained(delay, 2)
-
-    as_logged = left(0.0)
+    found = half.rotor_delay(_TELEMETRY_S, 2, each=True)
+    as_logged, least = found.unexplained[len(found.unexplained) // 2], found.unexplained.min(axis=0)
     if as_logged.max() < _NEXT_TO_NOTHING:
         yield from (0.0, 0.0)
         return
-    coarse = np.linspace(-_TELEMETRY_S, _TELEMETRY_S, _TELEMETRY_STEPS)
-    rest = np.array([left(delay) for delay in coarse])
-    for axis in range(2):
-        best = int(np.argmin(levelled(rest[:, axis])))
-        if rest[best, axis] > 1 - _SMALLEST_R2:
-            continue
-        near = np.linspace(-1.0, 1.0, _FINER) * (coarse[1] - coarse[0]) + coarse[best]
-        fine = np.array([left(delay)[axis] for delay in near])
-        delay, inside = best_delay(near, levelled(fine))
-        sure = 0 < best < _TELEMETRY_STEPS - 1 and inside and fine.min() < _HALF * as_logged[axis]
-        yield float(delay) if sure else 0.0
+    sure = found.inside & (least < _HALF * as_logged)
+    for axis in np.flatnonzero(least <= 1 - _SMALLEST_R2):
+        yield float(found.delay[axis]) if sure[axis] else 0.0
 
 
 def _behind(half: _Half) -> float | None:
     """Estimate the delay of the gyroscope behind the rotors, s; all axes have equal weight."""
-    delays = np.linspace(-LONGEST_DELAY_S, LONGEST_DELAY_S, _STEPS)
-    shares = [half.explained(-delay, 3) for delay in delays]
-    explained = np.array([float(np.mean(own[~np.isnan(own)])) if np.isfinite(own).any() else 0.0 for own in shares])
-    delay, inside = best_delay(delays, levelled(-explained))
-    return float(delay) if inside and explained.max() >= _SMALLEST_R2 else None
+    found = half.rotor_delay(LONGEST_DELAY_S, 3, each=False)
+    return -float(found.delay) if found.inside and found.unexplained.min() <= 1 - _SMALLEST_R2 else None

@@ -94,6 +94,8 @@ def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
     return tuple(finding.sentence for finding in findings if not finding.contradiction)
 
 
-def off_clock(delay_s: float) -> str:
-    """Say how late or early something is."""
-    return f"{'late' if delay_s > 0 else 'early'} by {abs(1000 * delay_s):.0f} ms"
+def off_clock(delay_s: float, half_s: float = float("nan")) -> str:
+    """Say how late or early something is, with its 95 % interval of so much to either side where that is known."""
+    ms, half = abs(1000 * delay_s), 1000 * half_s
+    interval = f" [{ms - half:.0f}, {ms + half:.0f}]" if half < float("inf") else ""
+    return f"{'late' if delay_s > 0 else 'early'} by {ms:.0f} ms{interval}"

@@ -14,7 +14,7 @@ from cpfls_cli.blocks import block_length, jackknife_error
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.repair import align_quaternion_signs
-from cpfls_cli.rounding import levelled
+from cpfls_cli.lag import fit_delay
 from cpfls_cli.weak_form.resampling import blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FEWEST_BLOCKS = 7  # Blocks below which a jackknife says too little about significance of one in a thousand.
 # Short flights are cut into so many blocks, but into none that knows its neighbour.
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
-# A coarse delay that Gauss-Newton steps refine, and how many: the last one changes nothing.
+# Between delays that are tried, and Gauss-Newton steps from the best: the last one changes nothing.
 _SCAN_STEP_S, _ROUNDS = 0.005, 4
 # A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
@@ -114,7 +114,7 @@ def _relative(turned: Array) -> Array:
 class DelayScan:
     """The delay at which the readings as they are fit best."""
 
-    delay: float  # Positive where the gyroscope is late, s, on a coarse grid.
+    delay: float  # Positive where the gyroscope is delayed, s; Gauss-Newton steps refine it.
     variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
     excited: BoolArray  # Shape (3,): axes that turn enough to identify a scale.
     seen: Array  # Shape (window, 3), rad/s: averages of the rate by the attitude.
@@ -125,10 +125,14 @@ def scan(flights: Sequence[Kinematics]) -> DelayScan:
     """Scan the delay between gyroscope and attitude."""
     step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
     half = int(LONGEST_DELAY_S / step)
-    delays = step * np.arange(-half, half + 1)
     seen = np.concatenate([flight.rate for flight in flights])
-    unexplained = np.array([_unexplained(seen, _read(flights, delay)) for delay in delays])
-    delay = float(delays[np.argmin(levelled(unexplained))])
+
+    def moved(delay: float) -> tuple[Array, Array]:
+        # Any matrix on the readings, so that a swapped axis does not shift the delay.
+        return np.broadcast_to(_read(flights, delay)[:, None], (*seen.shape, 3)), seen
+
+    whole = np.zeros(len(seen), dtype=np.int64)
+    delay = float(fit_delay(np.linspace(-half, half, 2 * half + 1) * step, moved, whole).delay)
     read = _read(flights, delay)
     variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
     # The variance of each rate that the other two do not share.
@@ -138,13 +142,6 @@ def scan(flights: Sequence[Kinematics]) -> DelayScan:
 
 def _read(flights: Sequence[Kinematics], delay: float) -> Array:
     return np.concatenate([flight.gyro_rate(delay) for flight in flights])
-
-
-def _unexplained(seen: Array, read: Array) -> float:
-    """Compute the log variance left by any matrix on the readings, so that a swapped axis does not shift the delay."""
-    right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
-    rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
-    return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
 
 
 def _precision(read: Array) -> Array:

@@ -372,12 +372,17 @@ def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Read:
     return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
 
 
+def _clock_words(now: _Compared, repair: ChannelRepair) -> list[str]:
+    half_s = _clearest(now.checked(repair)).delay.half
+    return [f"is {off_clock(repair.delay_s, half_s)}"] if repair.delay_s else []
+
+
 def _told(
     now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str]
 ) -> tuple[ChannelRepair, ...]:
     channel = CHANNELS[repair.channel]
     first, *others = now.with_position(repair)
-    clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []
+    clock = _clock_words(now, repair)
     who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
@@ -395,7 +400,7 @@ def _contradicted(
     now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], opposed: Sequence[str]
 ) -> Finding:
     channel = CHANNELS[repair.channel]
-    clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []
+    clock = _clock_words(now, repair)
     verb = "contradicts" if len(opposed) == 1 else "contradict"
     return Finding(
         f"the {channel.words} {joined([*what, *clock])}, judged by the {joined(witnesses)}, which the "

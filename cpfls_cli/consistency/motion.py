@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import BLOCK_S, jackknife_error
+from cpfls_cli.blocks import BLOCK_S, half_width, jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
@@ -84,14 +84,20 @@ CHANNELS = {
 
 
 class Sure(NamedTuple):
-    """A number with its standard error."""
+    """A number with its standard error, by so many blocks."""
 
     value: float
     error: float
+    blocks: int
 
     def beyond(self, size: float) -> bool:
         """Check whether it is surely not zero, and larger than a size."""
         return abs(self.value) > max(size, _JACKKNIFE_SIGMAS * self.error)
+
+    @property
+    def half(self) -> float:
+        """Half of its 95 % interval."""
+        return float(half_width(np.array(self.error), self.blocks))
 
 
 class Pair(NamedTuple):
@@ -267,9 +273,9 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
     """Divide two sums, with a jackknife over blocks."""
     tops, bottoms = np.bincount(block, top), np.bincount(block, bottom)
     if len(tops) < 2 or not bottoms.sum():
-        return Sure(0.0, np.inf)
+        return Sure(0.0, np.inf, len(tops))
     left_out = (tops.sum() - tops) / np.where(bottoms.sum() == bottoms, 1.0, bottoms.sum() - bottoms)
-    return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)))
+    return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)), len(tops))
 
 
 def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
@@ -284,20 +290,20 @@ def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
     sums = np.stack([np.bincount(block, entry) for entry in products.reshape(len(a), -1).T], axis=1).reshape(-1, 4, 4)
     total = sums.sum(axis=0)
     if len(sums) < 2 or min(total[0, 0], total[2, 2]) <= 0:
-        return Sure(0.0, np.inf)
+        return Sure(0.0, np.inf, len(sums))
     shared = total[1, 2] ** 2 / (total[1, 1] * total[2, 2])
     if shared > _COULD_BE_LATE:
-        return Sure(0.0, np.inf)
+        return Sure(0.0, np.inf, len(sums))
     fits = [np.linalg.lstsq(each[:3, :3], each[:3, 3], rcond=None)[0] for each in (total, *(total - sums))]
     turns = np.array([fit[1] / fit[0] if fit[0] else np.inf for fit in fits])
-    return Sure(float(turns[0]), float(jackknife_error(turns[1:])))
+    return Sure(float(turns[0]), float(jackknife_error(turns[1:])), len(sums))
 
 
 def _problems(check: PairCheck) -> Iterator[Finding]:
     """Say what is wrong between two channels: axes, or else scale, gravity, clock and heading."""
     pair = check.pair
     frames = list(axes_apart(pair.words, check.first, check.second, pair.floor))
-    late_s, alike = _best_delay(check, np.flatnonzero(check.moving)) if frames else (0.0, 0.0)
+    late_s, alike = _most_alike(check, np.flatnonzero(check.moving)) if frames else (0.0, 0.0)
     if alike > SAME:
         if pair.exact:
             yield pair.finding(f"in {pair.words}, the second is {off_clock(late_s)}", late_s, "s", contradiction=False)
@@ -312,18 +318,20 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
             what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as if one included gravity"
             yield pair.finding(what, own, "m/s^2")
     if pair.exact and check.visible.any() and check.delay.beyond(_DELAY_OFF_S):
-        late = check.delay.value
-        yield pair.finding(f"in {pair.words}, the second is {off_clock(late)}", late, "s", contradiction=False)
+        late = off_clock(check.delay.value, check.delay.half)
+        what = f"in {pair.words}, the second is {late}"
+        yield pair.finding(what, check.delay.value, "s", contradiction=False)
     if pair.exact and pair.second != "specific_force" and _is_turned(check):
         angle = float(np.arctan(check.turn.value))
         what = f"{pair.words} are rotated relative to each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
         yield pair.finding(what, angle, "rad", contradiction=bool(abs(angle) > ANOTHER_NORTH))
 
 
-def _best_delay(check: PairCheck, axes: IntArray) -> tuple[float, float]:
+def _most_alike(check: PairCheck, axes: IntArray) -> tuple[float, float]:
     """Find the delay, s, with which both move most alike along axes, and the least of their correlations then.
 
-    What swings at one frequency and is late by a quarter of its period looks like another axis, and by a half reversed.
+    It decides whether axes differ, in quarters of a hop; `PairCheck.delay` is the estimate. What swings at one
+    frequency and is late by a quarter of its period looks like another axis, and by a half reversed.
     """
     index = np.arange(len(check.first))
     most = min(int(_PER_HOP * LATEST_S / check.hop_s), len(index))
@@ -356,7 +364,7 @@ def _is_turned(check: PairCheck) -> bool:
         return False
     angle = np.arctan(check.turn.value)
     turned = check.first[:, :2] * np.cos(angle) + check.first[:, :2] @ _QUARTER * np.sin(angle)
-    _, late = _best_delay(check, plane)
+    _, late = _most_alike(check, plane)
     return 1 - _correlation(turned, check.second[:, :2]) < _LEAVES_LESS * (1 - late)
 
 

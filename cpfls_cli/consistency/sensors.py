@@ -161,7 +161,7 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     """Hold the sensors of flights with the same hardware, at the sampling period of the windows, against each other."""
     gyroscope = _gyroscope(flights, windows)
     late = gyroscope.late(windows)
-    found, notes = attitude_on_clock(late.coefficients[0].value, flights, windows) if late else ((), ())
+    found, notes = attitude_on_clock(late.coefficients[0], flights, windows) if late else ((), ())
     clocks, flights, dropped = _uncontradicted(found, flights, windows)
     if clocks:
         gyroscope = _gyroscope(flights, windows)

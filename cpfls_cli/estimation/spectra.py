@@ -10,10 +10,12 @@ from scipy import fft
 from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, Numbers
+from cpfls_cli.blocks import MOST_BLOCKS
 
 _FEWEST_IN_BLOCK = 3
 """Windows of a block: those of its ends share samples with the neighbours."""
-_MOST_BLOCKS = 24
+FEWEST_BLOCKS = 6
+"""Below which there is no estimate by frequency."""
 SHARED_BINS = 1.5
 """Neighbouring frequencies of Hann's window for one independent."""
 SMOOTHED_BINS = 5
@@ -126,7 +128,7 @@ def cut_blocks(information: Array) -> IntArray:
     information : array, shape (window,)
         At least 0, such as the power of the instrument: bursts are cut finer than rest.
     """
-    count = max(min(_MOST_BLOCKS, len(information) // _FEWEST_IN_BLOCK), 1)
+    count = max(min(MOST_BLOCKS, len(information) // _FEWEST_IN_BLOCK), 1)
     share = information.sum() / count
     block, number, inside, gathered = np.zeros(len(information), dtype=np.int64), 0, 0, 0.0
     for window, value in enumerate(information):

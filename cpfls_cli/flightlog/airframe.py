@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import BLOCK_S, FEWEST_BLOCKS, half_width, jackknife_error
+from cpfls_cli.blocks import blocks_of_time, half_width, jackknife_error
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.layouts import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
@@ -279,7 +279,8 @@ def turns_by_rotors(flights: Iterable[tuple[Array, Array, float, bool]]) -> tupl
     for body_rate, speed, rate_hz, is_command in flights:
         tried = [(rotors, wanted[:, 2]) for wanted, rotors in _driven(body_rate, speed, rate_hz, is_command)]
         rotors, wanted = largest(tried, lambda each: float(np.linalg.norm(np.linalg.qr(each[0])[0].T @ each[1])))
-        for block in np.array_split(np.arange(len(wanted)), max(FEWEST_BLOCKS, round(len(wanted) / rate_hz / BLOCK_S))):
+        number = blocks_of_time(len(wanted), 1 / rate_hz)
+        for block in (number == each for each in range(number[-1] + 1)):
             squares.append(rotors[block].T @ rotors[block])
             products.append(rotors[block].T @ wanted[block])
     own, together = np.sum(squares, axis=0), np.sum(products, axis=0)

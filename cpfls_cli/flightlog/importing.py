@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import blocks_of_time
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
@@ -18,8 +19,7 @@ from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 from cpfls_cli.inertia import body_torque_columns
-from cpfls_cli.lag import delayed, lagged
-from cpfls_cli.rounding import less, levelled
+from cpfls_cli.lag import delayed, fit_delay, lagged
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
@@ -29,6 +29,7 @@ _FEWEST_SAMPLES = 10  # Of which a flight can be made.
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
 # Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
 _POOR_R2 = 0.5
+_STEP = 0.02  # Between delays that are tried, of the shortest period that the filter passes.
 _SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 _ALIASING = "the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight"
 
@@ -229,9 +230,12 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 
 
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
+    low, high = 1e3 * estimate.low_s, 1e3 * estimate.high_s
+    open_ = f"the estimated delay is hardly determined, {low:.0f} to {high:.0f} ms; state import.delay_s"
     poor = f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque"
     holds = {
         "the estimated delay is the longest one tried; raise import.delay_max_s": estimate.at_bound,
+        open_: not estimate.at_bound and estimate.high_s > estimate.delays[-1],
         poor: estimate.pooled_r2 < _POOR_R2,
         "at the estimated delay, a moment of inertia is negative; check signs and axes": estimate.inertia[:3].min() < 0,
     }
@@ -271,18 +275,12 @@ def estimate_delay(
     """Estimate the delay at which a rigid body explains most of the torque.
 
     Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
-    For every delay, the six inertia parameters and a constant torque about each axis are regressed on one common
-    window, each axis scaled by its own standard deviation. Delays are judged by the geometric mean, over the axes, of
-    the share of torque that stays unexplained: the likelihood where every axis has noise of its own size, so that an
-    axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
-    sample is refined between its neighbours (section 8 of the method's description).
+    For delays of whole samples, the six inertia parameters and a constant torque about each axis are regressed on
+    one common window, each axis scaled by its own standard deviation (section 8 of the method's description).
 
     On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
     Only the leading `share` of the samples is looked at, so that data held out for a test stay unseen.
     """
-    from scipy.linalg import orth
-    from scipy.optimize import minimize_scalar
-
     time, *pair = (own[: round(share * len(own))] for own in (time, body_rate, body_torque))
     if len(time) < 2:
         raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
@@ -294,34 +292,33 @@ def estimate_delay(
         raise ComputationError("the delay cannot be estimated: the torque is constant")
     scale[scale == 0] = np.inf
     columns = body_torque_columns(rate, derivative(time, rate))[window] / scale[:, None]
-    regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
-    # Of columns of one length, so that a weakly excited one is not lost.
-    lengths = np.linalg.norm(regressor, axis=0)
-    basis = orth(regressor / np.where(lengths > 0, lengths, 1.0), rcond=1e-10)
+    columns = columns - columns.mean(axis=0)
 
-    def moved(delay: float) -> Array:
-        own = delayed(torque, delay / period)[window] / scale
-        return np.asarray(own - own.mean(axis=0))
+    def moved(delay: float) -> tuple[Array, Array]:
+        return columns, delayed(torque, delay / period)[window] / scale
 
-    def explained(delay: float) -> tuple[float, Array]:
-        own, r2 = moved(delay), np.ones(3)
-        residual = own - (basis @ (basis.T @ own.ravel())).reshape(own.shape)
-        acting = own.any(axis=0)
-        unexplained = (residual**2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
-        r2[acting] = 1 - unexplained
-        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
-
-    delays = np.append(np.arange(0.0, delay_max_s, period), delay_max_s)
-    curve = np.array([explained(delay)[0] for delay in delays])
-    best = int(np.argmin(levelled(-curve)))
-    bounds = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
-    refined = float(minimize_scalar(lambda own: -explained(float(own))[0], bounds=bounds, method="bounded").x)
-    delay = refined if less(curve[best], explained(refined)[0]) else float(delays[best])
-    pooled, r2 = explained(delay)
-    inertia = np.asarray(np.linalg.lstsq(regressor, moved(delay).ravel(), rcond=None)[0], dtype=float)
-    last = bool(delay > delays[-2])
+    # One step less than none, so that a delay near none lies between two.
+    step = period * max(1, int(_STEP / (lowpass_hz * period)) if lowpass_hz else 1)
+    tried = step * np.arange(-1, int(delay_max_s / step + 1e-9) + 1)
+    found = fit_delay(tried, moved, blocks_of_time(window.stop - window.start, period), pooled=True)
+    delay = max(float(found.delay), 0.0)
+    own = moved(delay)[1]
+    own = own - own.mean(axis=0)
+    inertia = np.linalg.lstsq(columns.reshape(-1, 6), own.ravel(), rcond=None)[0]
+    acting = own.any(axis=0)
+    unexplained = ((own - columns @ inertia) ** 2).sum(axis=0)[acting] / (own**2).sum(axis=0)[acting]
+    r2 = np.ones(3)
+    r2[acting] = 1 - unexplained
     return DelayEstimate(
-        delay_s=delay, r2=r2, pooled_r2=pooled, inertia=inertia, delays=delays, curve=curve, at_bound=last
+        delay_s=delay,
+        low_s=max(float(found.delay - found.half), 0.0),
+        high_s=float(found.delay + found.half),
+        r2=r2,
+        pooled_r2=float(1 - np.prod(unexplained) ** (1 / len(unexplained))),
+        inertia=inertia,
+        delays=tried[1:],
+        curve=1 - found.unexplained[1:],
+        at_bound=bool(not found.inside and delay > 0),
     )
 
 

@@ -28,7 +28,7 @@ from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors,
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
-from cpfls_cli.lag import best_delay
+from cpfls_cli.lag import fit_delay
 
 _PX4_NEW: Final = tuple(f"vehicle_{name}_setpoint.xyz[{axis}]" for name in ("torque", "thrust") for axis in range(3))
 _PX4_OLD: Final = tuple(f"actuator_controls_0.control[{axis}]" for axis in range(4))
@@ -299,12 +299,15 @@ def _compared(found: Rebuilt, mixed: _Mixed, slow: Array, logged: Array) -> Rebu
     def off(shift_s: float) -> Array:
         return np.asarray(np.column_stack([np.interp(at - shift_s, time, column) for column in found.commands.T]) - own)
 
-    lost = np.array([(_between(off(shift)) ** 2).sum() for shift in _SHIFTS_S])
+    def moved(shift_s: float) -> tuple[Array, Array]:
+        return _between(off(shift_s) + own)[..., None], _between(own)
+
+    lag = fit_delay(_SHIFTS_S, moved, np.zeros(len(at), dtype=np.int64), pooled=True).delay
     error = off(0.0)
     # Whether they are right is seen where both were logged at once; how near they come is that of all.
     near = np.abs(time[np.searchsorted(0.5 * (time[1:] + time[:-1]), at)] - at) <= _AT_ONCE_S
     near = near if near.sum() >= _FEWEST else np.ones(len(at), dtype=bool)
-    at_stamps = _explained(found, axes, own[near], error[near], float(best_delay(_SHIFTS_S, lost)[0]))
+    at_stamps = _explained(found, axes, own[near], error[near], float(lag))
     at_stamps = at_stamps._replace(samples=len(at), error=float(np.sqrt((error**2).mean())))
     if not late_s or (np.fmin.reduce(at_stamps.by_axis) >= _LEAST_EXPLAINED and abs(at_stamps.lag) < _ON_TIME_S):
         return at_stamps

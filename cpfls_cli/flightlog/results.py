@@ -33,6 +33,8 @@ class DelayEstimate:
     delays: Array = about("the delays tried", "delay", unit="s", brief=False)
     curve: Array = about("pooled R2 at each of them", "delay", brief=False)
     at_bound: bool = about("whether the best delay is the longest one tried, so the true one may be longer")
+    low_s: float = about("lower end of its 95 % interval, by blocks", unit="s", gaps=True, default=float("nan"))
+    high_s: float = about("upper end of it", unit="s", gaps=True, default=float("nan"))
 
 
 @result

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 from typing_extensions import Doc
 
+from cpfls_cli.blocks import BLOCK_S
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
@@ -38,7 +39,7 @@ class GapSettings(Settings):
 
     window_s: Annotated[float, Gt(0), Doc("length of the smooth windows over which torques are compared, s")] = 0.4
     overlap: Annotated[float, Ge(0), Lt(1), Doc("share that neighbouring windows have in common")] = 0.5
-    block_s: Annotated[float, Gt(0), Doc("length of the blocks that cross-validation leaves out, s")] = 4.0
+    block_s: Annotated[float, Gt(0), Doc("length of the blocks that cross-validation leaves out, s")] = BLOCK_S
     shifts: Annotated[int, Ge(39), Doc("circular time shifts that say what chance alone explains")] = 199
     significance: Annotated[
         float, Gt(0), Lt(0.5), Doc("largest probability that an accepted effect is chance, over the whole catalogue")

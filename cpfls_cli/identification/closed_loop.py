@@ -16,7 +16,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
-from cpfls_cli.blocks import block_length, half_width, jackknife_error
+from cpfls_cli.blocks import ENOUGH_BLOCKS, block_length, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, one_step
@@ -42,7 +42,6 @@ from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
-_FEWEST_BLOCKS = 8
 _UNIFORM = 1e-3
 """Share of a sampling period by which clocks of one study differ at most."""
 _PAUSE = 0.5
@@ -160,7 +159,7 @@ def _by_instruments(
     runs = _runs(given, rows, period)
     repeated = given.kind == "repeats"
     crossed = _crossed(runs, repeated=repeated)
-    if len(crossed) < _FEWEST_BLOCKS:
+    if len(crossed) < ENOUGH_BLOCKS:
         return None
     least_squares, _ = _solved(_by_block([(run.rows, run.rows, run.block) for run in runs]))
     if _share_known(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs, period) > _MOSTLY:

@@ -17,6 +17,7 @@ from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.estimation.estimate import Bounds, Fit, Normal, Prior, estimate, positive_ratio, solve
 from cpfls_cli.estimation.spectra import (
+    FEWEST_BLOCKS,
     SHARED_BINS,
     SMOOTHED_BINS,
     BlockSpectra,
@@ -40,7 +41,6 @@ NARROW, NARROW_DELAY_S = 0.4, 0.02
 """Half widths, of the logarithm of effectiveness and of the delay, above which it is not called identified."""
 GAIN_FLOOR, DELAY_FLOOR_S = 0.02, 5e-4
 """Half widths that no interval is below: of straight lines between samples, clocks and the model's shape."""
-FEWEST_BLOCKS = 6
 _WINDOW_S, _SLOW_WINDOW_S, _WINDOWS = (1.0, 2.0), (2.0, 4.0), 25.0
 """Shortest and longest windows, and how often they fit into a flight between."""
 _SLOW_HZ, _TOP_HZ, _PERIODS = 150.0, 40.0, 2.0
@@ -244,7 +244,7 @@ class _Model(NamedTuple):
         equations = _Equations(spectra, passed, _reference(spectra))
         values = _begun(equations, yaw)
         push = passed * PlantModel.of(values, equations.at_hz).push(spectra.frequency)
-        late = float(np.clip(_lateness(spectra, push), 0.0, _LATEST_S))
+        late = float(np.clip(_phase_delay(spectra, push), 0.0, _LATEST_S))
         return cls(values, equations.at_hz, late)
 
 
@@ -305,7 +305,7 @@ def _calm(parts: list[Numbers], near: _Model, filters: Numbers, frequency: Array
     return np.asarray(1 / np.maximum((left / usual).mean(axis=1) / _USUAL_LEFT, 1.0))
 
 
-def _lateness(spectra: BlockSpectra, torque: Numbers) -> float:
+def _phase_delay(spectra: BlockSpectra, torque: Numbers) -> float:
     """Give the slope of a phase over the band, s."""
     turned, turn = np.unwrap(np.angle(torque)), 2 * np.pi * spectra.frequency
     return float(-(turn @ turned) / (turn @ turn))

@@ -9,12 +9,12 @@ import numpy as np
 from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.law import Law, chain
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.estimation.spectra import block_spectra, cut_blocks, smoothed, transforms, window_starts
+from cpfls_cli.estimation.spectra import FEWEST_BLOCKS, block_spectra, cut_blocks, smoothed, transforms, window_starts
 from cpfls_cli.look.flight import LogFlight
 
 _WINDOW_S, _SLOW_WINDOW_S, _SLOW_HZ = 2.0, 4.0, 150.0
 """Windows, those of slow logs, and the rate of the clock below which a log is one."""
-_OF_CLOCK, _FEWEST_BLOCKS = 0.065, 6
+_OF_CLOCK = 0.065
 _FOLLOWS = 0.9
 """Least share of what the setpoint leaves of the command that goes with the body rate: less, and rounding of the body
 rate makes the feedback seem smaller by as much."""
@@ -85,7 +85,7 @@ def flown_feedback(flight: LogFlight, axis: int, law: Law) -> FlownFeedback | No
         return None
     parts = [transforms(np.nan_to_num(each), begins, length, 1 / flight.rate_hz)[0] for each in signals]
     spectra = block_spectra(parts, cut_blocks((np.abs(parts[2]) ** 2).sum(axis=1)), frequency, inside)
-    if len(spectra.windows) < _FEWEST_BLOCKS:
+    if len(spectra.windows) < FEWEST_BLOCKS:
         return None
     total = smoothed(spectra.total[None], axis=1)[0]
     # Of body rate and command, what goes with the setpoint is taken off.

@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.autopilots.law import Law
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.estimation.spectra import (
+    FEWEST_BLOCKS,
     SHARED_BINS,
     BlockSpectra,
     block_spectra,
@@ -19,7 +20,7 @@ from cpfls_cli.estimation.spectra import (
     transforms,
     window_starts,
 )
-from cpfls_cli.look.effectiveness import FEWEST_BLOCKS, AxisPlant, PlantModel
+from cpfls_cli.look.effectiveness import AxisPlant, PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
 from cpfls_cli.look.reasons import NO_SETPOINT, NOT_MOVED, TOO_SLOW, too_short

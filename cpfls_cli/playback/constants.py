@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
+from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
@@ -30,8 +30,6 @@ from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-ENOUGH_BLOCKS = 8
-"""Whose scatter gives an error by instruments."""
 _LONGEST_S = 8.0
 """Length from which on a run identifies something in all bands."""
 _FLAT = 0.85

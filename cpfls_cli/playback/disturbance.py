@@ -19,7 +19,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import block_length, contiguous, half_width, jackknife_error, mean_error
+from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -48,9 +48,8 @@ _MEMORY_S = (0.05, 8.0)
 _BEGIN_S = (0.2, 1.0)
 _EDGE = 1.02
 """Factor from a bound of the memory within which it lies on the bound."""
-_FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
-"""Below the first their scatter says nothing. Flights are cut into the second, unless blocks get longer than pieces or
-shorter than the last, which is what a piece mostly sees."""
+_BLOCKS = 16
+"""Into which flights are cut, unless blocks get longer than pieces or shorter than what a piece mostly sees."""
 _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
 _LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
@@ -294,7 +293,7 @@ def gusts_in(
         return None
     band = _Band.of(period, length)
     powers = _powers(sides, given, band, instrument_kind)
-    if len(powers.pieces) < _FEWEST_BLOCKS:
+    if len(powers.pieces) < ENOUGH_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
@@ -341,7 +340,7 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, instrument_
         beside = [np.zeros_like(own) for own in left]
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
-    block_s = block_length(seen, _PIECE_S, _LEAST_BLOCK_S, _BLOCKS)
+    block_s = block_length(seen, _PIECE_S, BLOCK_S, _BLOCKS)
     sums, count, each_left = [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import ENOUGH_BLOCKS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.fit import FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
@@ -18,9 +19,6 @@ from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.words import joined
-
-_FEWEST_BLOCKS = 8
-"""Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
 
 _STEP_S = 0.01
 """Longest step of the runs that structures are compared by; what is kept is fitted at all samples."""
@@ -98,7 +96,7 @@ def block_errors(errors: Sequence[Array]) -> Array:
 
 def _blocks(counts: Sequence[int]) -> list[IntArray]:
     """Say which block each window of a flight is in, from the numbers of the windows."""
-    pieces = -(-_FEWEST_BLOCKS // len(counts))
+    pieces = -(-ENOUGH_BLOCKS // len(counts))
     found = (np.array_split(np.zeros(count), min(pieces, count)) for count in counts)
     return [np.repeat(np.arange(len(own)), [len(piece) for piece in own]) for own in found]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_COMPARED, contiguous, half_width, jackknife_error
 from cpfls_cli.playback.errors import (
     MODEL,
     NOTHING_MOVES,
@@ -35,8 +35,8 @@ _BATCH = 100_000
 _FADING = (1e2, 1e-1, 2000)
 """Time constants that are tried: the longest in horizons, the shortest in samples, and how many."""
 
-_BLOCKS, _HORIZONS = 20, 2
-"""Blocks of windows that chance is estimated from, at most, and how many horizons each is long at least."""
+_HORIZONS = 2
+"""Length of a block at least, in horizons."""
 
 
 @dataclass(frozen=True)
@@ -316,7 +316,7 @@ class _Sums:
 
 def _blocks(windows: int, horizon: int, every: int) -> IntArray:
     """Cut windows, one after another, into blocks that stand for independent ones: the number of the block of each."""
-    return contiguous(windows, max(min(_BLOCKS, windows * every // (_HORIZONS * horizon)), 1))
+    return contiguous(windows, max(min(MOST_COMPARED, windows * every // (_HORIZONS * horizon)), 1))
 
 
 def replay(

@@ -48,7 +48,6 @@ POSITIVE = frozenset((*MOMENTS, THRUST, DRAG, "slow_actuation.slow_s"))
 _FEWEST, _AT_ONCE = 0.01, 1000
 """Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one; and the fewest draws
 that tell such a share."""
-_FEWEST_BLOCKS = 2
 _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
@@ -188,7 +187,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
 
 def require_sure(known: Estimates) -> None:
     """Refuse numbers that one block tells."""
-    if known.blocks < _FEWEST_BLOCKS:
+    if known.blocks < 2:
         raise InputError("its flights are too short to tell how sure its numbers are; find it in longer ones")
 
 

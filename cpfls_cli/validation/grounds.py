@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.blocks import MOST_COMPARED
 from cpfls_cli.identification.findings import HARDLY_EXCITED_SHARE
 from cpfls_cli.identification.identify import Identification
-from cpfls_cli.validation.paired import BLOCKS, Comparison, compare_windows, non_overlapping
+from cpfls_cli.validation.paired import Comparison, compare_windows, non_overlapping
 from cpfls_cli.validation.physical import Physics
 from cpfls_cli.validation.replay import NOTHING_MOVES, StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
@@ -108,7 +109,7 @@ class Grounds:
         summed = np.sum(steps.window_error[:, kept][:, :, list(axes)], axis=2)
         error = dict(zip(steps.model, summed, strict=True))
         # Errors that remember each other for long leave few blocks, of torque as of rate.
-        blocks = self.torque[part].blocks if part in self.torque else BLOCKS
+        blocks = self.torque[part].blocks if part in self.torque else MOST_COMPARED
         size = float(_mean(error[NOTHING_MOVES]))
         return compare_windows(error[predictor], error[rival], size, steps.start[kept] * blocks // samples)
 

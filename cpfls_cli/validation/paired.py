@@ -10,7 +10,7 @@ from scipy import fft
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, mean_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_COMPARED, contiguous, half_width, mean_error
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
@@ -18,8 +18,6 @@ from cpfls_cli.regressor.motion import Motion
 # What two solutions of the same equations may differ by, and rounding as a share of what is predicted, squared.
 _SAME, _ROUNDING = 1e-6, 1e-18
 
-BLOCKS = 20
-"""Blocks at most: enough for a test."""
 _SHORTEST_BLOCK = 20
 # Neighbouring blocks of four correlation times share little of what is common to their errors.
 _CORRELATION_TIMES = 4
@@ -107,7 +105,7 @@ def block_count(errors: Array) -> int:
         1 to 20.
     """
     longest = max(_SHORTEST_BLOCK, _CORRELATION_TIMES * correlation_time(errors[:_MOST_SAMPLES]))
-    return min(max(len(errors) // longest, 1), BLOCKS)
+    return min(max(len(errors) // longest, 1), MOST_COMPARED)
 
 
 def correlation_time(signals: Array) -> int:

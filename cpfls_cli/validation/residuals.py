@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import FEWEST_BLOCKS, mean_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_COMPARED, mean_error
 from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.result import about
@@ -28,8 +28,7 @@ _BAND = 1.96
 # Lags of fewer samples than a quarter, or whose pairs are fewer, say little and spoil the distribution of the test.
 _FEWEST_PER_LAG = 4
 
-# Few enough that a block outlasts the memory of most noise, and enough for a test.
-_BLOCKS = 20
+# Of a block.
 _FEWEST_SAMPLES = 50
 
 # What varies by less than this share of the largest value of its kind is the rounding of a constant.
@@ -205,7 +204,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
     array, shape (3,)
         Small where the mean is not 0; NaN for an axis without errors, and for all of fewer than four samples.
     """
-    blocks = min(max(len(errors) // _FEWEST_SAMPLES, FEWEST_BLOCKS), _BLOCKS)
+    blocks = min(max(len(errors) // _FEWEST_SAMPLES, FEWEST_BLOCKS), MOST_COMPARED)
     if len(errors) < blocks:
         return np.full(errors.shape[1], np.nan)
     means = np.array([block.mean(axis=0) for block in np.array_split(errors, blocks)])

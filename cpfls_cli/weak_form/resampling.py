@@ -6,10 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous
+from cpfls_cli.blocks import MOST_BLOCKS, contiguous
 
-# Of blocks: the work grows with them, and intervals by Student's t are 6 % wider than for infinitely many.
-_LARGEST_NUMBER = 24
 _RIDGE = 1e-9  # Of columns brought to one length: far below noise, far above rounding.
 _LEAST_SHARE = 10  # A shift is at least this part of a flight, so that slow motion does not meet itself.
 
@@ -218,7 +216,7 @@ def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArra
     Result: shape (window,); blocks from 0, without gaps.
     """
     spans = [np.ptp(centres[flight_index == f]) for f in np.unique(flight_index)]
-    length = max(block_s, sum(spans) / _LARGEST_NUMBER)
+    length = max(block_s, sum(spans) / MOST_BLOCKS)
     block = np.zeros(len(centres), dtype=int)
     first = 0
     for flight, span in zip(np.unique(flight_index), spans, strict=True):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.lag import best_delay, delayed, lagged
+from cpfls_cli.lag import best_delay, delayed, fit_delay, lagged
 
 BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
@@ -86,3 +86,43 @@ def test_the_best_delay_lies_between_those_that_were_tried():
     best, inside = best_delay(delays, misfit)
     np.testing.assert_allclose(best, [0.013, -0.041, 0.1, -0.1], atol=1e-12)
     assert inside.tolist() == [True, True, False, False]
+
+
+@pytest.fixture
+def followed():
+    """What each of two axes makes of two signals, 2.3 and 4.6 samples later, with noise of its own."""
+    rng = np.random.default_rng(6)
+    drives = np.array([np.convolve(column, np.hanning(16), "same") for column in rng.standard_normal((2, 2400))]).T
+    signal = np.stack([delayed(drives, each) @ weights for each, weights in ((2.3, [2, -1]), (4.6, [1, 3]))], axis=1)
+    return drives, signal + [0.3, 1.5] * rng.standard_normal(signal.shape) + 7.0
+
+
+def tried(drives, signal, block, **how):
+    def moved(delay):
+        return np.broadcast_to(delayed(drives, delay)[:, None], (*signal.shape, 2)), signal
+
+    return fit_delay(np.arange(-2.0, 12.0), moved, block, **how)
+
+
+def test_each_axis_has_its_delay_and_its_coefficients(followed):
+    found = tried(*followed, np.arange(2400) // 200, each=True)
+    assert (np.abs(found.delay - [2.3, 4.6]) < 2 * found.half).all()
+    assert (found.half < [0.1, 0.3]).all()
+    np.testing.assert_allclose(found.coefficients[0], [[2, -1], [1, 3]], atol=0.25)
+    assert found.inside.all()
+
+
+def test_a_delay_at_the_end_is_no_surer_than_a_step(followed):
+    drives, signal = followed
+    found = tried(drives, delayed(signal, 8), np.arange(2400) // 200, each=True)
+    assert found.inside.tolist() == [True, False]
+    assert found.error[1] >= 1 / np.sqrt(12)
+    assert found.delay[1] == 11
+
+
+def test_one_delay_of_all_axes_is_that_of_the_clearer_one_and_without_blocks_it_has_no_error(followed):
+    drives, signal = followed
+    of_one = signal[:, :1] + [[0.0, 30.0]] * np.random.default_rng(8).standard_normal((2400, 2))
+    found = tried(drives, of_one, np.zeros(2400, dtype=int))
+    assert found.delay == pytest.approx(2.3, abs=0.1)
+    assert np.isnan(found.error)

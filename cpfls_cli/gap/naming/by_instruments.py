@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.blocks import ENOUGH_BLOCKS, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, not
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import predicted_rows
-from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
+from cpfls_cli.playback.constants import STRONG
 from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import Instruments
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.importing import estimate_delay
@@ -42,6 +43,41 @@ def test_without_noise_delay_and_inertia_come_back_between_the_samples():
     np.testing.assert_allclose(estimate.r2, 1, atol=1e-5)
 
 
+def flown_in_loops(rng, delays, seconds=20.0):
+    """Rates of vehicles whose loops follow drawn setpoints, logged with coloured noise, and what is commanded."""
+    samples, moments, gain = int(seconds * RATE_HZ), np.diag(INERTIA), 12.0
+    asked = np.repeat(rng.standard_normal((30, len(delays), 3)), samples // 30 + 1, axis=0)[:samples]
+    asked = lfilter([0.07], [1, -0.93], lfilter([0.07], [1, -0.93], asked, axis=0), axis=0)
+    gusts = 0.01 * gain * coloured(rng, asked.shape, memory=75)
+    rate, torque = np.zeros((samples + 1, len(delays), 3)), np.zeros(asked.shape)
+    late = np.round(delays * RATE_HZ).astype(int)
+    for sample in range(samples):
+        torque[sample] = moments * gain * (asked[sample] - rate[sample])
+        acting = torque[np.maximum(sample - late, 0), np.arange(len(delays))]
+        turning = np.cross(rate[sample], moments * rate[sample])
+        rate[sample + 1] = rate[sample] + ((acting - turning) / moments + gusts[sample]) / RATE_HZ
+    time = np.arange(samples) / RATE_HZ
+    noise = 0.1 * rate.std(axis=0) * coloured(rng, asked.shape, memory=5)
+    return [(time, own, torque[:, draw]) for draw, own in enumerate((rate[:-1] + noise).swapaxes(0, 1))]
+
+
+def coloured(rng, shape, memory):
+    keep = np.exp(-1 / memory)
+    return lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(shape), axis=0)
+
+
+def test_intervals_hold_in_closed_loops():
+    delays = np.random.default_rng(4).integers(1, 20, 80) / RATE_HZ
+    flights = flown_in_loops(np.random.default_rng(5), delays)
+    found = [estimate_delay(*flight, lowpass_hz=8.0) for flight in flights]
+    low, value, high = np.array([(own.low_s, own.delay_s, own.high_s) for own in found]).T
+    # A torque acts from its sample to the next.
+    true = delays + 0.5 / RATE_HZ
+    assert abs(np.mean(value - true)) < 4e-4
+    assert 0.88 <= np.mean((low <= true) & (true <= high)) <= 0.99
+    assert np.std(value - true) == pytest.approx(np.sqrt(np.mean((high - value) ** 2)) / 2.4, rel=0.3)
+
+
 def test_only_the_leading_share_is_looked_at():
     time, rate, torque = delayed_signals(0.05)
     spoiled = torque.copy()
@@ -53,6 +89,7 @@ def test_only_the_leading_share_is_looked_at():
 def test_a_delay_beyond_the_longest_one_is_reported_at_the_bound():
     estimate = estimate_delay(*delayed_signals(0.12), delay_max_s=0.1)
     assert estimate.at_bound
+    assert estimate.high_s - estimate.low_s > 1 / RATE_HZ
     assert estimate.delay_s == pytest.approx(0.1, abs=1e-4)
 
 

@@ -168,7 +168,7 @@ def test_the_motion_follows_the_torque(turning, commanded, whom):
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
     early = np.roll(torque, -5, axis=0)
     found = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS)
-    assert found.notes == (f"The motion follows the {whom} by about 50 ms.",)
+    assert found.notes == (f"The motion follows the {whom} by 50 ms [50, 50].",)
     assert not any("follows" in note for note in audit([turning], WINDOWS).notes)
     # Behind measured speeds it may be the autopilot that comes first.
     measured = replace(clean, stated_torque=early, rotor_speed=np.full((len(early), 4), 500.0))
