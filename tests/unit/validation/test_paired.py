@@ -5,11 +5,11 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+from cpfls_cli.blocks import MOST_COMPARED
 from cpfls_cli.identification.data import Flights, TorqueData
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.validation.paired import (
-    BLOCKS,
     block_count,
     compare_errors,
     compare_torque,
@@ -26,7 +26,7 @@ CONSTANT = np.array([0.4, -0.3, 0.2])
 
 def test_equal_models_differ_by_chance_as_often_as_they_should():
     rng = np.random.default_rng(61)
-    found = [compare_errors(*rng.lognormal(sigma=1.0, size=(2, BLOCKS)), 1.0) for _ in range(1500)]
+    found = [compare_errors(*rng.lognormal(sigma=1.0, size=(2, MOST_COMPARED)), 1.0) for _ in range(1500)]
     # Half of the 5 % each; a little less, since the mean has to agree.
     most = binom.ppf(0.9999, 1500, 0.025)
     assert 0 < sum(one.lower for one in found) < most
@@ -34,27 +34,27 @@ def test_equal_models_differ_by_chance_as_often_as_they_should():
 
 
 def test_a_better_model_is_found_though_blocks_differ_by_orders_of_magnitude():
-    theirs = np.logspace(-6, 0, BLOCKS)
-    found = compare_errors(0.8 * theirs * np.random.default_rng(62).uniform(0.9, 1.1, BLOCKS), theirs, 1.0)
+    theirs = np.logspace(-6, 0, MOST_COMPARED)
+    found = compare_errors(0.8 * theirs * np.random.default_rng(62).uniform(0.9, 1.1, MOST_COMPARED), theirs, 1.0)
     assert (found.lower, found.higher) == (True, False)
     assert found.ratio == pytest.approx(0.8, abs=0.08)
 
 
 def test_one_bad_block_of_twenty_is_not_better():
-    theirs = np.ones(BLOCKS)
-    ours = np.where(np.arange(BLOCKS) == 3, 100.0, 0.9)
+    theirs = np.ones(MOST_COMPARED)
+    ours = np.where(np.arange(MOST_COMPARED) == 3, 100.0, 0.9)
     found = compare_errors(ours, theirs, 1.0)
     assert (found.lower, found.higher) == (False, False)
 
 
 @pytest.mark.parametrize(("ours", "theirs"), [(1e-25, 1e-28), (0.0, 0.0), (0.3, 0.3 * (1 + 1e-9))])
 def test_rounding_is_no_difference(ours, theirs):
-    found = compare_errors(np.full(BLOCKS, ours), np.full(BLOCKS, theirs), 1.0)
+    found = compare_errors(np.full(MOST_COMPARED, ours), np.full(MOST_COMPARED, theirs), 1.0)
     assert (found.ratio, found.lower, found.higher) == (1.0, False, False)
 
 
 def test_errors_beside_rounding_are_higher():
-    found = compare_errors(np.full(BLOCKS, 1e-3), np.full(BLOCKS, 1e-30), 1.0)
+    found = compare_errors(np.full(MOST_COMPARED, 1e-3), np.full(MOST_COMPARED, 1e-30), 1.0)
     assert (found.ratio, found.higher) == (np.inf, True)
 
 
@@ -64,7 +64,7 @@ def test_three_blocks_prove_nothing():
 
 
 def windows(ours, theirs, size=1.0):
-    return compare_windows(ours, theirs, size, np.arange(len(ours)) * BLOCKS // len(ours))
+    return compare_windows(ours, theirs, size, np.arange(len(ours)) * MOST_COMPARED // len(ours))
 
 
 def test_windows_that_one_lost_speak_for_the_other():
@@ -143,7 +143,7 @@ def test_errors_that_remember_each_other_seldom_prove_what_is_not_so(samples, me
 
 def test_blocks_are_at_least_four_correlation_times_long():
     rng = np.random.default_rng(66)
-    assert block_count(rng.standard_normal((5000, 3))) == BLOCKS
+    assert block_count(rng.standard_normal((5000, 3))) == MOST_COMPARED
     assert block_count(rng.standard_normal((99, 3))) == 4
     slow = np.sin(2 * np.pi * np.arange(1000) / 400)[:, None]
     # cos reaches 1/e at 0.19 of a period of 400 samples; the end of the flight takes a little off.
