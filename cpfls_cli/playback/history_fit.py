@@ -162,7 +162,7 @@ class _Begun(NamedTuple):
 
     def flown(self, at: VehicleAt, pushed: Array) -> Iterator[Leg]:
         """Fly all runs, pushed on top of what the model gives."""
-        return legs(at.flown, self.windows.runs, Steps(self.terms, pushed))
+        return legs(self.windows.flown(at, pushed=True), self.windows.runs, Steps(self.terms, pushed))
 
 
 def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
@@ -187,11 +187,11 @@ def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array)
 
     def derivatives() -> tuple[Array, Array]:
         gradient, hessian = np.zeros(count), np.zeros((count, count))
-        vehicle = replace(at.flown, inertia_by=np.zeros((count, 3, 3)), traced=None)
+        slopes = at.slopes(count)
         for each, own, push in zip(begun, flown, pushed, strict=True):
             by = {place: (each.pushed(observer) - push) / _STEP for place, observer in enumerate(moved)}
             group = np.zeros(len(each.missed), dtype=np.int64)
-            sums = sums_of(own, vehicle, Steps(each.terms, push, push_by=by), each.windows.loss, group)
+            sums = sums_of(own, slopes, Steps(each.terms, push, push_by=by), each.windows.loss, group)
             gradient, hessian = gradient + sums[0][0], hessian + sums[1][0]
         return gradient / total, hessian / total
 

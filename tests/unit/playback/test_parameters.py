@@ -21,8 +21,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.remainder import Airflow
-from cpfls_cli.playback.windows import Rotors, Runs, Steps, errors_of_runs
-from cpfls_cli.vehicle.values import value_of
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
@@ -82,18 +81,16 @@ def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
 
 
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_what_is_traced_and_what_has_derivatives_is_the_same_vehicle(rules):
+def test_a_traced_step_is_that_of_the_vehicle(flight, rules):
+    """In one function it is what it is step by step, and what pushes on top changes it as one force does the other."""
     free = numbers(STATED, blocks_of(STATED), rules)
-    at, rng = free.at(somewhere(free, seed=2)), np.random.default_rng(0)
-    air, rate = (tuple(rng.normal(0.0, 2.0, (3, 6))) for _ in range(2))
-    rotors = Rotors(rng.uniform(500, 1000, (4, 6)), rng.normal(0, 50, (4, 6)), rng.uniform(3e5, 9e5, (4, 6)))
-    assert at.flown.traced is not None
-    by_function, plain, differentiated = (
-        np.array([[value_of(each) + np.zeros(6) for each in part] for part in flown.wrench(air, rate, rotors)])
-        for flown in (at.flown, replace(at.flown, traced=None), at.differentiated)
-    )
-    assert by_function == pytest.approx(plain, rel=1e-12)
-    assert differentiated == pytest.approx(plain, rel=1e-12)
+    at, starts = free.at(somewhere(free, seed=2)), flight.starts(5, 40)
+    runs, terms = Runs(flight.motion, starts, translates=True), at.rotor_terms(flight, starts + np.arange(5)[:, None])
+    push = np.random.default_rng(0).normal(0.0, 0.02, (5, len(starts), 6))
+    for pushed, steps in ((False, Steps(terms)), (True, Steps(terms, push))):
+        own = at.traced(flight.motion.period, translates=True, pushed=pushed)
+        traced, plain = (errors_of_runs(flown, runs, steps)[0] for flown in (own, at.flown))
+        assert traced == pytest.approx(plain, rel=1e-9, abs=1e-12)
 
 
 def test_the_stated_numbers_make_the_stated_vehicle():
