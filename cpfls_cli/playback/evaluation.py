@@ -220,13 +220,8 @@ class VehicleAt:
         """Numbers that are times of the rotors' response."""
         return [name for name in TIMES if name in self.free.index]
 
-    @cached_property
-    def flown(self) -> Flown:
-        """The vehicle as runs fly it."""
-        return self._flown(self._acting_number)
-
-    def traced(self, period: float, *, translates: bool, pushed: bool = False) -> Flown:
-        """Give the same with its steps as one function.
+    def flown(self, period: float, *, translates: bool, pushed: bool = False) -> Flown:
+        """Give the vehicle as runs fly it, its steps as one function.
 
         Parameters
         ----------
@@ -234,7 +229,7 @@ class VehicleAt:
             Whether something pushes on top.
         """
         function = traced_step(*self.free.key, translates, pushed)((period, *self.values.tolist()))
-        return replace(self.flown, traced=function)
+        return Flown(Vehicle(self.free.vehicle, ()), self._body, traced=function)
 
     def slopes(self, pushes: int = 0) -> Slopes:
         """Differentiate its accelerations by all numbers, or by those of what pushes on top."""
@@ -243,19 +238,13 @@ class VehicleAt:
 
     @cached_property
     def polynomial(self) -> Flown:
-        """The same as a polynomial of its numbers, coefficients in SI."""
-        return self._flown(Polynomial.number)
+        """The vehicle as a polynomial of its numbers, coefficients in SI."""
+        acting, drag_scale = acting_at(self.free, Polynomial.number)
+        return Flown(Vehicle(self.free.vehicle, acting), self._body, drag_scale)
 
-    def with_derivatives(self, first: int) -> Callable[[str], Value]:
-        """Give numbers by name, with derivatives by places from the first on."""
-        return acting_numbers(
-            self.free, lambda name: Tangent(self.get(name, 0.0), {first + self.free.index[name]: 1.0})
-        )
-
-    def _flown(self, number: Callable[[str], Value]) -> Flown:
-        acting, drag_scale = acting_at(self.free, number)
-        body = Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
-        return Flown(Vehicle(self.free.vehicle, acting), body, drag_scale)
+    @property
+    def _body(self) -> Body:
+        return Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
 
 
 def inertia_entries(free: FreeNumbers, number: Callable[[str], Value], functions: Functions) -> tuple[Value, ...]:

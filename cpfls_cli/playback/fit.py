@@ -382,7 +382,7 @@ class SideBySide:
 
     def flown(self, at: VehicleAt, *, pushed: bool = False) -> Flown:
         """Give a vehicle as these runs fly it, maybe pushed on top."""
-        return at.traced(self.runs.motion.period, translates=self.runs.translates, pushed=pushed)
+        return at.flown(self.runs.motion.period, translates=self.runs.translates, pushed=pushed)
 
     def _legs(self, at: VehicleAt) -> Iterable[Leg]:
         """Fly all runs, or give them as last flown where there are not many: derivatives follow the loss."""

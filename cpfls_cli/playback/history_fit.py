@@ -170,9 +170,10 @@ def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
     steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
     samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
     terms = at.rotor_terms(flight, samples)
-    errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
+    flown = at.flown(flight.motion.period, translates=flight.translates)
+    errors, _ = errors_of_runs(flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
     missed = np.zeros((len(samples) + 1, 6))
-    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
+    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], flown.body)
     return np.asarray(missed[steps - samples[0]] * known[:, :, None])
 
 

@@ -69,28 +69,19 @@ def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
 
 
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
+@pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
+def test_the_numbers_fly_in_one_function_as_their_model_does(flight, rules, pushed):
     free = numbers(STATED, blocks_of(STATED), rules)
-    values = somewhere(free, seed=1)
-    starts = flight.starts(30, 50)
-    at, runs = free.at(values), Runs(flight.motion, starts, translates=True)
-    steps = Steps(at.rotor_terms(flight, starts + np.arange(30)[:, None]))
-    expected, _ = errors_of_runs(at.flown, runs, steps)
-    runs = free_runs(player_of(at.model, flight), flight, starts, 30).errors
-    assert runs == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_a_traced_step_is_that_of_the_vehicle(flight, rules):
-    """In one function it is what it is step by step, and what pushes on top changes it as one force does the other."""
-    free = numbers(STATED, blocks_of(STATED), rules)
-    at, starts = free.at(somewhere(free, seed=2)), flight.starts(5, 40)
-    runs, terms = Runs(flight.motion, starts, translates=True), at.rotor_terms(flight, starts + np.arange(5)[:, None])
-    push = np.random.default_rng(0).normal(0.0, 0.02, (5, len(starts), 6))
-    for pushed, steps in ((False, Steps(terms)), (True, Steps(terms, push))):
-        own = at.traced(flight.motion.period, translates=True, pushed=pushed)
-        traced, plain = (errors_of_runs(flown, runs, steps)[0] for flown in (own, at.flown))
-        assert traced == pytest.approx(plain, rel=1e-9, abs=1e-12)
+    at, starts = free.at(somewhere(free, seed=1)), flight.starts(30, 50)
+    push = np.random.default_rng(0).normal(0.0, 0.02, (30, len(starts), 6)) if pushed else None
+    steps = Steps(at.rotor_terms(flight, starts + np.arange(30)[:, None]), push)
+    flown = at.flown(flight.motion.period, translates=True, pushed=pushed)
+    runs = Runs(flight.motion, starts, translates=True)
+    found, expected = (errors_of_runs(each, runs, steps)[0] for each in (flown, at.model.flown))
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
+    if not pushed:
+        played = free_runs(player_of(at.model, flight), flight, starts, 30).errors
+        assert played == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
 
 
 def test_the_stated_numbers_make_the_stated_vehicle():
