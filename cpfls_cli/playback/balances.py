@@ -212,10 +212,11 @@ class Balances:
 
     def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
         """Sum products of the combinations of columns that weights make."""
-        by_axis = zip(kept, (weights[columns] for columns in form.slices), strict=True)
-        return Sums.joined(
-            [Sums(*[own.T @ each @ own for each in sums[:3]], windows=sums.windows) for sums, own in by_axis]
-        )
+        combined = []
+        for own, columns in zip(kept, form.slices, strict=True):
+            ztx, xtx, ztz = (weights[columns].T @ each @ weights[columns] for each in own[:3])
+            combined.append(Sums(ztx, xtx, ztz, own.windows))
+        return Sums.joined(combined)
 
     def of_band(self, rows: Iterable[Rows], slices: Sequence[slice]) -> list[tuple[Array, Array]]:
         """Sum products of columns of each axis by block, shape (3, block, column, column), and count windows."""
