@@ -67,11 +67,6 @@ class Sums(NamedTuple):
         ztx, xtx, ztz = (np.concatenate(each, axis=2) for each in zip(*(own[:3] for own in axes), strict=True))
         return cls(ztx, xtx, ztz, axes[0].windows)
 
-    def combined(self, columns: Array) -> Sums:
-        """Combine columns, shape (column, combination)."""
-        ztx, xtx, ztz = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
-        return Sums(ztx, xtx, ztz, self.windows)
-
 
 class Rows(NamedTuple):
     """Balances of a flight in windows.
@@ -217,7 +212,11 @@ class Balances:
 
     def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
         """Sum products of the combinations of columns that weights make."""
-        return Sums.joined([own.combined(weights[columns]) for own, columns in zip(kept, form.slices, strict=True)])
+        combined = []
+        for own, columns in zip(kept, form.slices, strict=True):
+            ztx, xtx, ztz = (weights[columns].T @ each @ weights[columns] for each in own[:3])
+            combined.append(Sums(ztx, xtx, ztz, own.windows))
+        return Sums.joined(combined)
 
     def of_band(self, rows: Iterable[Rows], slices: Sequence[slice]) -> list[tuple[Array, Array]]:
         """Sum products of columns of each axis by block, shape (3, block, column, column), and count windows."""

@@ -13,12 +13,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt
+from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt, acting_numbers, inertia_entries
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.parameters import DRAG, LEARNED, LOG_MASS, SLOW, THRUST
 from cpfls_cli.playback.rotors import TimeOfResponse
 from cpfls_cli.playback.windows import Rotors
 from cpfls_cli.vehicle.values import (
+    ARRAYS,
     Polynomial,
     Tangent,
     Value,
@@ -104,9 +105,9 @@ class Equations:
     def known(self) -> Mapping[str, Value]:
         """Numbers as they act, those of the body among them, with derivatives by the free numbers, by place."""
         at, index = self.at, self.at.free.index
-        number = at.with_derivatives(0)
+        number = acting_numbers(at.free, lambda name: Tangent(at.get(name, 0.0), {index[name]: 1.0}))
         known = {name: number(name) for name in (*index, DRAG_OVER_THRUST)}
-        known |= dict(zip(INERTIA_PARAMETERS, at.inertia_entries, strict=True))
+        known |= dict(zip(INERTIA_PARAMETERS, inertia_entries(at.free, number, ARRAYS), strict=True))
         return known | {_MASS: Tangent(at.mass, {index[LOG_MASS]: at.mass} if LOG_MASS in index else {})}
 
     def product(self, factors: Sequence[str]) -> Value:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -34,10 +35,10 @@ from cpfls_cli.playback.parameters import (
 )
 from cpfls_cli.playback.remainder import Airflow, learned_wrench
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
-from cpfls_cli.playback.windows import MOTION, Flown
+from cpfls_cli.playback.windows import STATES, Flown, Rotors, Slopes
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.tracing import ARRAY_SYMBOLS, Graph, traced_in_two
+from cpfls_cli.vehicle.tracing import Graph, Symbol, array_symbols, traced_in_two
 from cpfls_cli.vehicle.values import (
     ARRAYS,
     Functions,
@@ -46,8 +47,9 @@ from cpfls_cli.vehicle.values import (
     Value,
     Vector,
     dot,
+    inverse,
     times,
-    value_of,
+    zero,
 )
 
 TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
@@ -73,31 +75,9 @@ class VehicleAt:
         return float(self.values[self.free.index[name]]) if name in self.free.index else otherwise
 
     @cached_property
-    def inertia_entries(self) -> tuple[Value, ...]:
-        """Entries of the inertia tensor by `INERTIA_ENTRIES`, kg m^2, with derivatives by the numbers, by place."""
-        free, given = self.free, self.with_derivatives(0)
-        logs, products = (
-            [given(name) if name in free.index else 0.0 for name in each] for each in (LOG_INERTIA, PRODUCT_NAMES)
-        )
-        root = [ARRAYS.exp(0.5 * log) for log in logs]
-        stated = six_parameters(free.vehicle.inertia_kg_m2).tolist()
-        tensor = [entry + own for entry, own in zip(stated, (0.0, 0.0, 0.0, *products), strict=True)]
-        pairs = zip(tensor, INERTIA_ENTRIES, strict=True)
-        return tuple(root[row] * entry * root[column] for entry, (row, column) in pairs)
-
-    @cached_property
     def inertia(self) -> Array:
         """Inertia tensor, shape (3, 3), kg m^2."""
-        return symmetric([value_of(entry) for entry in self.inertia_entries])
-
-    @property
-    def inertia_by(self) -> Array:
-        """Derivatives of the inertia tensor by each number, shape (number, 3, 3), kg m^2."""
-        derivatives = np.zeros((len(self.free.index), 3, 3))
-        for (row, column), entry in zip(INERTIA_ENTRIES, self.inertia_entries, strict=True):
-            for place, slope in entry.by.items() if isinstance(entry, Tangent) else ():
-                derivatives[place, [row, column], [column, row]] = slope
-        return derivatives
+        return symmetric(inertia_entries(self.free, lambda name: self.get(name, 0.0), ARRAYS))
 
     @property
     def response(self) -> RotorResponse:
@@ -219,52 +199,62 @@ class VehicleAt:
         -------
         array, shape (samples, 1 + 4 rotors)
         """
-        response = self.response
         if not by:
-            slow = response.slow_s if SLOW in self.free.index else None
-            return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
+            return np.asarray(flight.rotor_terms(*self.times_of_response)[samples])
+        response, period, slow = self.response, flight.motion.period, SLOW in self.free.index
         slopes = [
-            response.slope_by_step(flight.speed[part], flight.motion.period, flight.hold, TIMES[by])
+            response.slope_by_step(flight.speed[part], period, flight.hold, TIMES[by], slow=slow)
             for part in flight.stretches
         ]
         # The number is the logarithm of the slow time.
         return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
+
+    @cached_property
+    def times_of_response(self) -> tuple[float, float, float | None]:
+        """Delay, lag and slow time of the rotors, s; None where nothing is slow."""
+        response = self.response
+        return response.delay_s, response.lag_s, response.slow_s if SLOW in self.free.index else None
 
     @property
     def times(self) -> list[str]:
         """Numbers that are times of the rotors' response."""
         return [name for name in TIMES if name in self.free.index]
 
-    @cached_property
-    def flown(self) -> Flown:
-        """The vehicle as runs fly it."""
-        function = traced_wrench(*self.free.key)(tuple(self.values.tolist()))
-        return replace(
-            self._flown(self._acting_number, np.zeros((0, 3, 3))),
-            traced=lambda air, rate, *rotors: function(air, rate, rotors),
-        )
+    def flown(self, period: float, *, translates: bool, pushed: bool = False) -> Flown:
+        """Give the vehicle as runs fly it, its steps as one function.
 
-    @cached_property
-    def differentiated(self) -> Flown:
-        """The same with the derivatives by all numbers."""
-        return self._flown(self.with_derivatives(MOTION), self.inertia_by)
+        Parameters
+        ----------
+        pushed : bool
+            Whether something pushes on top.
+        """
+        function = traced_step(*self.free.key, translates, pushed)((period, *self.values.tolist()))
+        return Flown(Vehicle(self.free.vehicle, ()), self._body, traced=function)
+
+    def slopes(self, pushes: int = 0) -> Slopes:
+        """Differentiate its accelerations by all numbers, or by those of what pushes on top."""
+        numbers, places, function = traced_slopes(*self.free.key, pushes)
+        return Slopes(numbers, places, function(tuple(self.values.tolist())))
 
     @cached_property
     def polynomial(self) -> Flown:
-        """The same as a polynomial of its numbers, coefficients in SI."""
-        return self._flown(Polynomial.number, np.zeros((0, 3, 3)))
+        """The vehicle as a polynomial of its numbers, coefficients in SI."""
+        acting, drag_scale = acting_at(self.free, Polynomial.number)
+        return Flown(Vehicle(self.free.vehicle, acting), self._body, drag_scale)
 
-    def with_derivatives(self, first: int) -> Callable[[str], Value]:
-        """Give numbers by name, with derivatives by places from the first on."""
-        return acting_numbers(
-            self.free, lambda name: Tangent(self.get(name, 0.0), {first + self.free.index[name]: 1.0})
-        )
+    @property
+    def _body(self) -> Body:
+        return Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
 
-    def _flown(self, number: Callable[[str], Value], inertia_by: Array) -> Flown:
-        acting, drag_scale = acting_at(self.free, number)
-        body = Body.of(replace(self.free.vehicle, mass_kg=self.mass), self.inertia)
-        vehicle = Vehicle(self.free.vehicle, acting)
-        return Flown(vehicle, body, inertia_by, self.free.index.get(LOG_MASS), drag_scale)
+
+def inertia_entries(free: FreeNumbers, number: Callable[[str], Value], functions: Functions) -> tuple[Value, ...]:
+    """Give the entries of the inertia tensor by `INERTIA_ENTRIES`, kg m^2, from free numbers of any kind."""
+    logs, products = ([number(n) if n in free.index else 0.0 for n in each] for each in (LOG_INERTIA, PRODUCT_NAMES))
+    root = [functions.exp(0.5 * log) for log in logs]
+    stated = six_parameters(free.vehicle.inertia_kg_m2).tolist()
+    tensor = [entry + own for entry, own in zip(stated, (0.0, 0.0, 0.0, *products), strict=True)]
+    pairs = zip(tensor, INERTIA_ENTRIES, strict=True)
+    return tuple(times(times(root[row], entry), root[column]) for entry, (row, column) in pairs)
 
 
 def acting_numbers(
@@ -324,28 +314,90 @@ def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[
     return tuple(acting), number(DRAG_OVER_THRUST)
 
 
-@lru_cache(maxsize=256)
-def traced_wrench(
-    vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int
-) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
-    """Make a function of values of the numbers that gives one of torque and force of the vehicle.
+class _Traced:
+    """A vehicle of symbols.
 
-    This takes air velocity, body rate, and speeds, accelerations and slow squares of the rotors: arrays by component.
+    Attributes
+    ----------
+    values : tuple of Symbol
+        The numbers.
+    flown : Flown
     """
-    free, graph = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)), Graph()
-    symbols = dict(zip(free.index, graph.inputs("number", len(free.numbers)), strict=True))
-    air, rate = (graph.inputs(name, 3) for name in ("air", "rate"))
-    rotors = graph.inputs("rotors", 3)
-    acting, drag_scale = acting_at(free, acting_numbers(free, symbols.__getitem__, ARRAY_SYMBOLS))
-    see = Instant(
-        vehicle,
-        rotors[0],
-        air_velocity=air,
-        body_rate=rate,
-        rotor_acceleration=rotors[1],
-        slow_square=rotors[2],
-        drag_scale=drag_scale,
-        functions=ARRAY_SYMBOLS,
+
+    def __init__(self, free: FreeNumbers, *, differentiated: bool = False) -> None:
+        vehicle, self.free, self.graph = free.vehicle, free, Graph()
+        self.values = self.graph.inputs("number", len(free.numbers))
+        symbols = dict(zip(free.index, self.values, strict=True))
+
+        def number(name: str) -> Value:
+            return Tangent(symbols[name], {STATES + free.index[name]: 1.0}) if differentiated else symbols[name]
+
+        functions = array_symbols(len(vehicle.rotors))
+        acting, drag_scale = acting_at(free, acting_numbers(free, number, functions))
+        xx, yy, zz, xy, xz, yz = inertia_entries(free, number, functions)
+        inertia: Any = (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+        inverted: Any = inverse(inertia)
+        growth = functions.exp(number(LOG_MASS)) if LOG_MASS in free.index else 1.0
+        body = Body(growth * vehicle.mass_kg, vehicle.gravity_m_s2, inertia, inverted)
+        self.flown = Flown(Vehicle(vehicle, acting), body, drag_scale, functions=functions)
+
+    def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
+        """Make arguments with one value for each rotor."""
+        return self.graph.inputs(name, count, by_rotor=True)
+
+
+@lru_cache(maxsize=256)
+def traced_step(
+    vehicle: VehicleSettings,
+    blocks: tuple[str, ...],
+    breakpoints: tuple[float, ...],
+    order: int,
+    translates: bool,
+    pushed: bool,
+) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
+    """Make a function of a period and of numbers that gives one of a step of the vehicle; see `Flown.traced`."""
+    own = _Traced(FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)))
+    period, state, rotors = *own.graph.inputs("period", 1), own.graph.inputs("state", 18), own.inputs("rotors", 3)
+    push = own.graph.inputs("push", 6 if pushed else 0)
+    step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
+    arguments = {"state": state, "rotors": rotors, "push": push}
+    return traced_in_two(own.graph, ("number", (period, *own.values)), arguments, step[:2])
+
+
+@lru_cache(maxsize=256)
+def traced_slopes(
+    vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int, pushes: int
+) -> tuple[int, tuple[tuple[int, int], ...], Callable[..., Callable[..., Vector]]]:
+    """Make a function of the numbers that gives derivatives of the accelerations; see `Slopes`.
+
+    Parameters
+    ----------
+    pushes : int
+        Numbers of what pushes on top, by which it is then differentiated, and not by those of the vehicle.
+    """
+    free = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order))
+    own = _Traced(free, differentiated=not pushes)
+    motion, rotors = own.graph.inputs("motion", 15), own.inputs("rotors", 3)
+    times_of = [free.index[name] for name in TIMES if name in free.index and not pushes]
+    by = own.inputs("by", 3 * len(times_of))
+    push, push_by = (own.graph.inputs(n, 6 * count) for n, count in (("push", min(pushes, 1)), ("push_by", pushes)))
+    slopes: tuple[dict[int, Value], ...] = {}, {}, {}
+    for place, first in zip(sorted(times_of), range(0, len(by), 3), strict=True):
+        faster, change, late = by[first : first + 3]
+        for slope, moved in zip(slopes, (faster, change, late + 2.0 * rotors[0] * faster), strict=True):
+            slope[STATES + place] = moved
+    speed, acceleration, slow = (Tangent(x, own) if own else x for x, own in zip(rotors, slopes, strict=True))
+    pushed = tuple(
+        Tangent(x, {STATES + place: push_by[6 * place + row] for place in range(pushes)}) for row, x in enumerate(push)
     )
-    numbers, motion = ("number", tuple(symbols.values())), {"air": air, "rate": rate, "rotors": rotors}
-    return traced_in_two(graph, numbers, motion, Vehicle(vehicle, acting).wrench(see))
+    driven = Rotors(speed, acceleration, slow, pushed or None)
+    found = own.flown.accelerations(motion[:3], motion[3:12], motion[12:], driven)
+    by_place = {
+        (row + 3 * (row >= 3), column): slope
+        for row, x in enumerate(found)
+        for column, slope in (x.by.items() if isinstance(x, Tangent) else ())
+        if not zero(slope)
+    }
+    arguments = {"motion": motion, "rotors": rotors, "by": by, "push": push, "push_by": push_by}
+    made = traced_in_two(own.graph, ("number", own.values), arguments, [tuple(by_place.values())])
+    return pushes or len(free.numbers), tuple(by_place), lambda values: lambda *given: made(values)(*given)[0]

@@ -20,12 +20,12 @@ from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.player import still_runs
-from cpfls_cli.playback.windows import MOST_RUNS, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
+from cpfls_cli.playback.windows import MOST_RUNS, Flown, Leg, Loss, Runs, Steps, legs, losses_of, sums_of
 from cpfls_cli.rounding import smallest
 
-_SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
-"""Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
-rate's, so that each says less that is new."""
+_SIGNAL_WEIGHTS = (0.3, 0.5, 1.0)
+"""Of velocity, attitude and rate: half of the attitude's error follows from the rate's, so that it says less that is
+new, and position follows from velocity, and is not weighed."""
 
 _STILL = 1e-9
 """Speed of a rotor that stands, rad/s."""
@@ -137,7 +137,8 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
     ----------
     scale : array, shape (horizon, 4), m, m/s, rad, rad/s
     """
-    total = np.where(flight.shown & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
+    shown, scale = flight.shown[1:], scale[:, 1:]
+    total = np.where(shown & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
     delta = np.maximum(_ROBUST * np.maximum(scale, _LEAST * scale.mean(axis=0)), 1e-12)
     return Loss(np.array(_SIGNAL_WEIGHTS) / total / delta, delta)
 
@@ -361,7 +362,15 @@ class SideBySide:
         return Steps(self._terms(at), terms_by=by)
 
     def _terms(self, at: VehicleAt, by: str = "") -> Array:
-        return np.concatenate([each.rotor_terms(at, by) for each in self.windows], axis=1)
+        """Give the terms of the rotors, or as last given: most vehicles respond alike."""
+        key = by, *at.times_of_response
+        if self._last.get("response") != key or by:
+            found = np.concatenate([each.rotor_terms(at, by) for each in self.windows], axis=1)
+            if by or len(self.owner) > MOST_RUNS:
+                return found
+            self._last.update(response=key, terms=found)
+        terms: Array = self._last["terms"]
+        return terms
 
     def losses(self, at: VehicleAt) -> Array:
         """Weigh the errors of each run."""
@@ -369,11 +378,15 @@ class SideBySide:
 
     def sums(self, at: VehicleAt, groups: IntArray) -> tuple[Array, Array]:
         """Sum gradient and Hessian by the numbers, by group of each run."""
-        return sums_of(self._legs(at), at.differentiated, self.steps(at, at.times), self.loss, groups)
+        return sums_of(self._legs(at), at.slopes(), self.steps(at, at.times), self.loss, groups)
+
+    def flown(self, at: VehicleAt, *, pushed: bool = False) -> Flown:
+        """Give a vehicle as these runs fly it, maybe pushed on top."""
+        return at.flown(self.runs.motion.period, translates=self.runs.translates, pushed=pushed)
 
     def _legs(self, at: VehicleAt) -> Iterable[Leg]:
         """Fly all runs, or give them as last flown where there are not many: derivatives follow the loss."""
-        flown = legs(at.flown, self.runs, self.steps(at))
+        flown = legs(self.flown(at), self.runs, self.steps(at))
         if len(self.owner) > MOST_RUNS:
             return flown
         key = (at.free.key, at.values.tobytes())
@@ -533,4 +546,4 @@ def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[
 def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
     size = rate_stays(window.flight, window.starts, window.horizon, window.every)
-    return float(window.loss.of(size[:, :, None] ** 2).sum())
+    return float(window.loss.of(size[:, 1:, None] ** 2).sum())

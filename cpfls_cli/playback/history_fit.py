@@ -162,7 +162,7 @@ class _Begun(NamedTuple):
 
     def flown(self, at: VehicleAt, pushed: Array) -> Iterator[Leg]:
         """Fly all runs, pushed on top of what the model gives."""
-        return legs(at.flown, self.windows.runs, Steps(self.terms, pushed))
+        return legs(self.windows.flown(at, pushed=True), self.windows.runs, Steps(self.terms, pushed))
 
 
 def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
@@ -170,9 +170,10 @@ def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
     steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
     samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
     terms = at.rotor_terms(flight, samples)
-    errors, _ = errors_of_runs(at.flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
+    flown = at.flown(flight.motion.period, translates=flight.translates)
+    errors, _ = errors_of_runs(flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
     missed = np.zeros((len(samples) + 1, 6))
-    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], at.flown.body)
+    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], flown.body)
     return np.asarray(missed[steps - samples[0]] * known[:, :, None])
 
 
@@ -187,11 +188,11 @@ def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array)
 
     def derivatives() -> tuple[Array, Array]:
         gradient, hessian = np.zeros(count), np.zeros((count, count))
-        vehicle = replace(at.flown, inertia_by=np.zeros((count, 3, 3)), traced=None)
+        slopes = at.slopes(count)
         for each, own, push in zip(begun, flown, pushed, strict=True):
             by = {place: (each.pushed(observer) - push) / _STEP for place, observer in enumerate(moved)}
             group = np.zeros(len(each.missed), dtype=np.int64)
-            sums = sums_of(own, vehicle, Steps(each.terms, push, push_by=by), each.windows.loss, group)
+            sums = sums_of(own, slopes, Steps(each.terms, push, push_by=by), each.windows.loss, group)
             gradient, hessian = gradient + sums[0][0], hessian + sums[1][0]
         return gradient / total, hessian / total
 

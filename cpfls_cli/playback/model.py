@@ -393,6 +393,6 @@ def turning_by_attitude(fuzzy: InertiaModel) -> Turning:
         exists = positive_definite(matrices)
         safe = np.where(exists[:, None, None], matrices, np.eye(3))
         rate = np.asarray(np.linalg.solve(safe, momentum.T[..., None])[..., 0], dtype=float)
-        return Turned(rate.T, momentum_form(attitude, rate, values)[1].T, exists)
+        return Turned(tuple(rate.T), tuple(momentum_form(attitude, rate, values)[1].T), exists)
 
     return Turning(momentum, turned)

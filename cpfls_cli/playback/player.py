@@ -89,14 +89,11 @@ def _along(model: VehicleModel, stated: Array | None, parts: Sequence[Signals]) 
     """Give what acts over each step that is not simulated, shape (time, 6); None for nothing."""
     if stated is None and not model.along:
         return None
-    beside = [_by_step(model.wrench_beside(part)) for part in parts]
+    at_samples = (model.wrench_beside(part) for part in parts)
+    # Means over each step; the last one has no end.
+    beside = [0.5 * (own + np.concatenate([own[1:], own[-1:]])) for own in at_samples]
     total = np.asarray(sum(each for each in (stated, np.concatenate(beside) if beside else None) if each is not None))
     return model.with_lever(total)
-
-
-def _by_step(values: Array) -> Array:
-    """Take the mean over each step, shape (time, 6); the last one has no end."""
-    return np.asarray(0.5 * (values + np.concatenate([values[1:], values[-1:]])))
 
 
 def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:

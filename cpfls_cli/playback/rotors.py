@@ -46,9 +46,11 @@ class RotorResponse:
         """
         return np.asarray(_terms_at_samples(speed, period, hold, self.delay_s, self.lag_s, self.slow_s), dtype=float)
 
-    def slope_by_step(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
-        """Differentiate `terms_by_step` by one of the times."""
-        return np.asarray(rotor_terms_by_step(speed, period, hold, *self._moved(by)).imag / _STEP)
+    def slope_by_step(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse, *, slow: bool = True) -> Array:
+        """Differentiate `terms_by_step` by one of the times, maybe without slowness."""
+        delay_s, lag_s, slow_s = self._moved(by)
+        terms = rotor_terms_by_step(speed, period, hold, delay_s, lag_s, slow_s if slow else None)
+        return np.asarray(terms.imag / _STEP)
 
     def slope_at_samples(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
         """Differentiate `terms_at_samples` by one of the times."""

@@ -1,19 +1,21 @@
 """Free runs in windows of a flight, all windows side by side, and their derivatives by the numbers of the vehicle.
 
-A state is position (world), velocity (world), rotation (body to world) and body rate, in components, runs last. Between
-two samples the rotors are constant, and one step of the midpoint rule is taken:
+A state is position (world), velocity (world), rotation (body to world, row by row) and momentum (body), in components.
+Between two samples the rotors are constant, and one step of the midpoint rule is taken:
 
     R' = R [omega]_x,   m v' = m g + R F,   L' = M - omega x L,   L = I omega.
 
-Torque and force follow from the vehicle itself (`cpfls_cli.vehicle.motion`): on arrays for the runs, and on numbers
-with derivatives at all states that the runs passed, which are then composed step by step.
+A step is a function of any kind of numbers: of arrays, runs last, or of symbols, by which it is traced where it is
+taken often. So are the derivatives of the accelerations; they are evaluated at all states that the runs passed, and
+then composed step by step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +23,39 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.playback.motion import FASTEST, Body, MeasuredMotion
 from cpfls_cli.vehicle.motion import Instant, Vehicle
-from cpfls_cli.vehicle.values import ARRAYS, Tangent, Value, Vector, add, zero
+from cpfls_cli.vehicle.values import (
+    ARRAYS,
+    Functions,
+    Tangent,
+    Value,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    minus,
+    scaled,
+    subtract,
+    transposed,
+    value_of,
+    zero,
+)
 
 _SAMPLES = 2_000
-"""States at a time of which derivatives are taken, so that they stay in the cache."""
+"""Steps at a time of which derivatives are taken, so that they stay in the cache."""
 
 MOST_RUNS = 1_200
 """Runs side by side."""
 
-MOTION = 6
-"""Places of the derivatives by the motion that a wrench depends on, air velocity and body rate; numbers follow."""
-
 STATES = 9
 """Components of the derivatives of a state: velocity, rotation as a vector in the body frame, body rate."""
+
+_ADDED = (0, 1, 2, 6, 7, 8)
+"""Those of velocity and rate, which a step adds to."""
+
+_POSITION, _VELOCITY, _ROTATION, _MOMENTUM = slice(3), slice(3, 6), slice(6, 15), slice(15, 18)
+_RATE = _MOMENTUM
+"""Where samples of a path have the rate, and states the momentum."""
 
 
 class Turned(NamedTuple):
@@ -41,17 +63,17 @@ class Turned(NamedTuple):
 
     Attributes
     ----------
-    rate : array, shape (3, run), rad/s
+    rate : vector, rad/s
         That has the momentum.
-    direct : array, shape (3, run), N m
+    direct : vector, N m
         Torque that the motion takes beyond the change of momentum.
     exists : array of bool, shape (run,)
         False where no body has the inertia.
     """
 
-    rate: Array
-    direct: Array
-    exists: BoolArray
+    rate: Vector
+    direct: Vector
+    exists: BoolArray | bool = True
 
 
 class Turning(NamedTuple):
@@ -62,11 +84,29 @@ class Turning(NamedTuple):
     momentum : callable
         From rotations and rates, shapes (3, 3, run) and (3, run), to momenta.
     turned : callable
-        From rotations and momenta.
+        From rotations and momenta, rows of the vectors along its first axis.
     """
 
     momentum: Callable[[Array, Array], Array]
     turned: Callable[[Array, Array], Turned]
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the accelerations of a vehicle.
+
+    Attributes
+    ----------
+    numbers : int
+        That it is differentiated by, beside the components of a state.
+    places : sequence of tuple of int
+        Component of the state that each derivative moves, and what it is by: of `STATES`, then of the numbers.
+    values : callable
+        Gives them from velocity, rotation and rate; then see `Steps.arguments`.
+    """
+
+    numbers: int
+    places: Sequence[tuple[int, int]]
+    values: Callable[..., Iterable[Value]]
 
 
 @dataclass(frozen=True)
@@ -76,34 +116,30 @@ class Flown:
     Attributes
     ----------
     vehicle : Vehicle
-        What acts on it; its numbers may have derivatives, by places from `MOTION` on.
+        What acts on it.
     body : Body
         What is moved.
-    inertia_by : array, shape (number, 3, 3), kg m^2
-        Derivatives of the inertia by each number; without rows for nothing but runs.
-    log_mass : int or None
-        Place of the number that is the logarithm of the mass, if any.
     drag_scale : value
         Ratio of the drag factors that effects share to those stated.
     turning : Turning or None
         In the place of a constant inertia.
+    functions : Functions
+        Of the kind of numbers that it is flown with.
     traced : callable or None
-        Torque and force of the same vehicle as one function of air velocity, body rate, speeds, accelerations and slow
-        squares, which takes a part of the time.
+        `stepped` as one function, which takes a part of the time: from states, rotors, and what pushes on top.
     """
 
     vehicle: Vehicle
     body: Body
-    inertia_by: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
-    log_mass: int | None = None
     drag_scale: Value = 1
     turning: Turning | None = None
-    traced: Callable[[Vector, Vector, Value, Value, Value], tuple[Vector, Vector]] | None = None
+    functions: Functions = ARRAYS
+    traced: Callable[[Vector, Vector, Vector], tuple[Vector, Vector]] | None = None
 
     @cached_property
     def _at_rest(self) -> Instant:
         still = np.zeros((len(self.vehicle.settings.rotors), 1))
-        at = Instant(self.vehicle.settings, still, drag_scale=self.drag_scale, functions=ARRAYS)
+        at = Instant(self.vehicle.settings, still, drag_scale=self.drag_scale, functions=self.functions)
         # Worked out here once for all states that follow.
         assert at.hubs
         assert np.any(at.spins)
@@ -111,10 +147,7 @@ class Flown:
 
     def wrench(self, air: Vector, rate: Vector, rotors: Rotors) -> tuple[Vector, Vector]:
         """Compute torque and force, N m and N, body frame, without weight."""
-        if self.traced is None:
-            torque, force = self.vehicle.wrench(self._instant(air, rate, rotors))
-        else:
-            torque, force = self.traced(air, rate, *rotors[:3])
+        torque, force = self.vehicle.wrench(self._instant(air, rate, rotors))
         push = rotors.push
         return (torque, force) if push is None else (add(torque, push[:3]), add(force, push[3:]))
 
@@ -130,6 +163,104 @@ class Flown:
             air_velocity=air,
             body_rate=rate,
         )
+
+    def begun(self, motion: MeasuredMotion, starts: IntArray) -> Vector:
+        """Give the states that runs start from."""
+        rotation, rate = motion.rotation[starts].transpose(1, 2, 0), motion.rate[starts].T
+        if self.turning is None:
+            momentum = apply(self.body.inertia, tuple(rate))
+        else:
+            momentum = tuple(self.turning.momentum(rotation, rate))
+        position, velocity = (np.ascontiguousarray(each[starts].T) for each in motion[:2])
+        return (*position, *velocity, *np.ascontiguousarray(rotation.reshape(9, -1)), *momentum)
+
+    def turned(self, state: Vector) -> Turned:
+        """Say how bodies turn in states."""
+        momentum = state[_MOMENTUM]
+        if self.turning is None:
+            rate = apply(self.body.inverse, momentum)
+            return Turned(rate, cross(rate, momentum))
+        return self.turning.turned(np.stack(state[_ROTATION]).reshape(3, 3, -1), np.stack(momentum))
+
+    def stepped(self, state: Vector, rotors: Rotors, period: Value, translates: bool) -> Stepped:
+        """Take a step of the midpoint rule."""
+        now = self.turned(state)
+        middle = self._moved(state, (state, now), rotors, 0.5 * period, translates)
+        there = self.turned(middle)
+        end = self._moved(state, (middle, there), rotors, period, translates)
+        passed = ((*at[_VELOCITY], *at[_ROTATION], *turned.rate) for at, turned in ((state, now), (middle, there)))
+        return Stepped(end, tuple(chain(*passed)), (now.exists, there.exists))
+
+    def _moved(
+        self, start: Vector, at: tuple[Vector, Turned], rotors: Rotors, interval: Value, translates: bool
+    ) -> Vector:
+        """Move states for an interval with the derivatives at others."""
+        here, turned = at
+        rows, velocity = _rows(here[_ROTATION]), here[_VELOCITY]
+        torque, force = self.wrench(apply(transposed(rows), velocity), turned.rate, rotors)
+        momentum = add(start[_MOMENTUM], scaled(interval, subtract(torque, turned.direct)))
+        columns = transposed(_rows(exponential(scaled(interval, turned.rate), self.functions)))
+        rotation = (dot(row, column) for row in _rows(start[_ROTATION]) for column in columns)
+        place = start[: _ROTATION.start]
+        if translates:
+            pushed = apply(rows, scaled(interval / self.body.mass, force))
+            fallen = (*velocity, 0, 0, -self.body.gravity)
+            place = add(place, scaled(interval, fallen), (0, 0, 0, *pushed))
+        return (*place, *rotation, *momentum)
+
+    def accelerations(self, velocity: Vector, rotation: Vector, rate: Vector, rotors: Rotors) -> Vector:
+        """Give the derivatives of velocity and rate, with those by the components of a state, by place, and by numbers.
+
+        ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
+        ``I d omega' = dM - d omega x I omega - omega x I d omega``.
+
+        Parameters
+        ----------
+        velocity, rotation, rate : vector
+            Without derivatives.
+        rotors : Rotors
+            With those by numbers, by places from `STATES` on.
+        """
+        rows = _rows(rotation)
+        columns = transposed(rows)
+        air, turning = apply(columns, velocity), tuple(Tangent(x, {6 + place: 1.0}) for place, x in enumerate(rate))
+        moved = (Tangent(x, dict(enumerate(column))) for x, column in zip(air, columns, strict=True))
+        torque, force = self.wrench(add(moved, _by_turn(air)), turning, rotors)
+        lifted = scaled(1 / self.body.mass, force)
+        momentum = apply(self.body.inertia, turning)
+        return (
+            *apply(rows, subtract(lifted, _by_turn(tuple(map(value_of, lifted))))),
+            *apply(self.body.inverse, subtract(torque, cross(turning, momentum))),
+        )
+
+
+class Stepped(NamedTuple):
+    """A step of runs.
+
+    Attributes
+    ----------
+    end : vector
+        State at the end.
+    passed : vector
+        Velocity, rotation and rate at the begin, then in the middle.
+    exist : tuple
+        Whether a body has the inertia there.
+    """
+
+    end: Vector
+    passed: Vector
+    exist: tuple[BoolArray | bool, ...] = ()
+
+
+def _rows(matrix: Vector) -> tuple[Vector, ...]:
+    return matrix[:3], matrix[3:6], matrix[6:]
+
+
+def _by_turn(vector: Vector) -> Vector:
+    """Differentiate a vector, which is 0, as ``v x dphi`` by the turn of a state."""
+    x, y, z = vector
+    by = (0, minus(0, z), y), (z, 0, minus(0, x)), (minus(0, y), x, 0)
+    return tuple(Tangent(0, {3 + at: slope for at, slope in enumerate(row) if not zero(slope)}) for row in by)
 
 
 class Rotors(NamedTuple):
@@ -149,21 +280,19 @@ class Rotors(NamedTuple):
     push: Vector | None = None
 
     @classmethod
-    def of(cls, terms: Array, terms_by: Mapping[int, Array] = {}, copies: int = 1) -> Rotors:
+    def of(cls, terms: Array, terms_by: Mapping[int, Array] = {}) -> Rotors:
         """Take what drives vehicles from terms of the rotors.
 
         Parameters
         ----------
-        terms : array, shape (..., 1 + 4 rotors)
+        terms : array, shape (sample, 1 + 4 rotors)
         terms_by : mapping of int to array
             Their derivatives by numbers, by place.
-        copies : int
-            How often all are given, one after another.
         """
-        values = [_laid(each, copies) for each in _rotor_motion(terms)]
+        values = [each.T for each in _rotor_motion(terms)]
         by: list[dict[int, Value]] = [{}, {}, {}]
         for place, each in terms_by.items():
-            faster, change, late = (_laid(own, copies) for own in _divided(each))
+            faster, change, late = (own.T for own in _divided(each))
             for own, moved in zip(by, (faster, change, late + 2.0 * values[0] * faster), strict=True):
                 own[place] = moved
         speed, acceleration, slow = (Tangent(x, own) if own else x for x, own in zip(values, by, strict=True))
@@ -206,22 +335,23 @@ class Steps(NamedTuple):
         for speed, acceleration, slow, push in zip(*parts, pushes, strict=True):
             yield Rotors(speed, acceleration, slow, None if push is None else tuple(push.T))
 
-    def for_both_stages(self) -> Rotors:
-        """Give the rotors over all steps of all runs, once for each stage of a step, with derivatives."""
-        by = {MOTION + place: each for place, each in self.terms_by.items()}
-        push = None if self.push is None else self._pushes(self.push)
-        return Rotors.of(self.terms, by, 2)._replace(push=push)
+    def arguments(self) -> tuple[list[Array], ...]:
+        """Give what derivatives are taken with, each with steps and runs last.
 
-    def _pushes(self, push: Array) -> Vector:
-        by = {MOTION + place: _laid(each, 2) for place, each in self.push_by.items()}
-        return tuple(
-            Tangent(own, {place: each[row] for place, each in by.items()}) for row, own in enumerate(_laid(push, 2))
-        )
-
-
-def _laid(values: Array, copies: int) -> Array:
-    """Arrange values of steps and runs, shape (..., column), side by side: (column, copies times all)."""
-    return np.tile(values.reshape(-1, values.shape[-1]).T, copies)
+        Returns
+        -------
+        rotors : list of array
+            Speeds, accelerations and slow squares.
+        by : list of array
+            Derivatives by each number of their response: of speeds, accelerations, and slow less present squares.
+        push, push_by : list of array
+            What pushes on top, by component, and its derivatives by each of its numbers.
+        """
+        pushes = [] if self.push is None else [self.push, *(by for _, by in sorted(self.push_by.items()))]
+        driven = [_rotor_motion(self.terms), *(_divided(by) for _, by in sorted(self.terms_by.items()))]
+        rotors, *by = ([np.moveaxis(each, -1, 0) for each in own] for own in driven)
+        push, *push_by = ([*np.moveaxis(each, -1, 0)] for each in pushes) if pushes else [[]]
+        return rotors, [*chain(*by)], push, [*chain(*push_by)]
 
 
 def _divided(terms: Array) -> tuple[Array, Array, Array]:
@@ -237,26 +367,16 @@ def _rotor_motion(terms: Array) -> tuple[Array, Array, Array]:
     return speed, acceleration, late + speed**2
 
 
-class _State(NamedTuple):
-    """States of runs, runs last."""
-
-    position: Array
-    velocity: Array
-    rotation: Array
-    momentum: Array
-
-
 class _Path(NamedTuple):
     """Where runs went.
 
     Attributes
     ----------
-    velocity, rate : array, shape (step + 1, 3, run)
-    position : array, shape (step + 1, 3, run)
+    position, velocity, rate : array, shape (step + 1, 3, run)
     rotation : array, shape (step + 1, 3, 3, run)
         At their samples; a run that diverged stays as it was before the step in which it did.
-    stages : tuple of array, shapes (2, step, 3, run), (2, step, 3, 3, run) and (2, step, 3, run)
-        Velocity, rotation and rate at the begin and in the middle of each step; empty where not asked for.
+    passed : list of vector
+        What each step passed, see `Stepped`; empty where not asked for.
     diverged : array of int, shape (run,)
         Step at which a run diverged; -1 for those that did not.
     """
@@ -265,29 +385,23 @@ class _Path(NamedTuple):
     velocity: Array
     rotation: Array
     rate: Array
-    stages: tuple[Array, ...]
+    passed: list[Vector]
     diverged: IntArray
 
-    def of_runs(self, part: slice) -> _Path:
-        """Take some of the runs."""
-        position, velocity, rotation, rate = (each[..., part] for each in self[:4])
-        stages = tuple(each[..., part] for each in self.stages)
-        return _Path(position, velocity, rotation, rate, stages, self.diverged[part])
 
-
-def exponential(turn: Array) -> Array:
-    """Compute rotations ``exp [a]_x``, shape (3, 3, ...), of turns a, shape (3, ...), rad."""
-    square = (turn * turn).sum(axis=0)
-    half = 0.5 * np.sqrt(np.maximum(square, _TINY**2))
+def exponential(turn: Vector, functions: Functions = ARRAYS) -> Vector:
+    """Compute rotations ``exp [a]_x``, row by row, of turns a, rad."""
+    square = dot(turn, turn)
+    half = 0.5 * functions.sqrt(functions.largest(square, _TINY**2))
     # By half the angle nothing cancels where it is small.
-    ratio = np.sin(half) / half
+    ratio = functions.sin(half) / half
     pairs = 0.5 * ratio * ratio
-    return _turn(turn, pairs, 1.0 - pairs * square, ratio * np.cos(half))
+    return _turn(turn, pairs, 1.0 - pairs * square, ratio * functions.cos(half))
 
 
-def right_jacobian(turn: Array) -> Array:
-    """Compute J of ``exp [a + d]_x = exp [a]_x exp [J d]_x``, shape (3, 3, ...), of turns a, shape (3, ...), rad."""
-    square = (turn * turn).sum(axis=0)
+def right_jacobian(turn: Vector) -> Vector:
+    """Compute J of ``exp [a + d]_x = exp [a]_x exp [J d]_x``, row by row, of turns a, arrays, rad."""
+    square = dot(turn, turn)
     small = square < 1e-8
     safe = np.where(small, 1.0, square)
     angle = np.sqrt(safe)
@@ -296,118 +410,12 @@ def right_jacobian(turn: Array) -> Array:
     return _turn(turn, pairs, 1.0 - pairs * square, -skew)
 
 
-def _turn(turn: Array, pairs: Array, diagonal: Array, skew: Array) -> Array:
-    """Sum ``pairs a a' + diagonal 1 + skew [a]_x``, shape (3, 3, ...)."""
-    out = turn[:, None] * (pairs * turn)
-    across = skew * turn
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        out[i, i] += diagonal
-        out[k, j] += across[i]
-        out[j, k] -= across[i]
-    return np.asarray(out)
-
-
-def _product(first: Array, second: Array) -> Array:
-    """Multiply matrices, shapes (3, 3, ...)."""
-    return np.asarray(first[:, 0, None] * second[0] + first[:, 1, None] * second[1] + first[:, 2, None] * second[2])
-
-
-def _applied(matrix: Array, vector: Array) -> Array:
-    return np.asarray(matrix[:, 0] * vector[0] + matrix[:, 1] * vector[1] + matrix[:, 2] * vector[2])
-
-
-def _back(matrix: Array, vector: Array) -> Array:
-    """Multiply with the transposed matrix."""
-    return np.asarray(matrix[0] * vector[0] + matrix[1] * vector[1] + matrix[2] * vector[2])
-
-
-def _crossed(first: Array, second: Array) -> Array:
-    (a, b, c), (u, v, w) = first, second
-    out = np.empty(np.broadcast_shapes(first.shape, second.shape))
-    out[0], out[1], out[2] = b * w - c * v, c * u - a * w, a * v - b * u
-    return out
-
-
-def _filled(components: Vector, count: int) -> Array:
-    out = np.zeros((3, count))
-    for row, value in zip(out, components, strict=True):
-        if not zero(value):
-            row[:] = value.value if isinstance(value, Tangent) else value
-    return out
-
-
-def _turned(flown: Flown, rotation: Array, momentum: Array) -> Turned:
-    if flown.turning is not None:
-        return flown.turning.turned(rotation, momentum)
-    rate = flown.body.inverse @ momentum
-    return Turned(rate, _crossed(rate, momentum), np.ones(rate.shape[1], dtype=bool))
-
-
-def _moved(
-    flown: Flown,
-    start: _State,
-    at: tuple[_State, Turned],
-    rotors: Rotors,
-    interval: float,
-    translates: bool,
-) -> _State:
-    """Move states for an interval with the derivatives at others."""
-    here, turned = at
-    torque, force = flown.wrench(tuple(_back(here.rotation, here.velocity)), tuple(turned.rate), rotors)
-    count = turned.rate.shape[1]
-    momentum = start.momentum + interval * (_filled(torque, count) - turned.direct)
-    rotation = _product(start.rotation, exponential(interval * turned.rate))
-    if not translates:
-        return _State(start.position, start.velocity, rotation, momentum)
-    acceleration = _applied(here.rotation, _filled(force, count)) / flown.body.mass
-    acceleration[2] -= flown.body.gravity
-    return _State(
-        start.position + interval * here.velocity, start.velocity + interval * acceleration, rotation, momentum
-    )
-
-
-def _run(flown: Flown, start: _State, steps: Steps, period: float, translates: bool, *, stages: bool) -> _Path:
-    """Fly all runs."""
-    horizon, count = steps.terms.shape[:2]
-    position, velocity, rate = np.empty((3, horizon + 1, 3, count))
-    rotation = np.empty((horizon + 1, 3, 3, count))
-    passed = (np.empty((2, horizon, 3, count)), np.empty((2, horizon, 3, 3, count)), np.empty((2, horizon, 3, count)))
-    diverged, state, now = np.full(count, -1), start, _turned(flown, start.rotation, start.momentum)
-    position[0], velocity[0], rotation[0], rate[0] = state.position, state.velocity, state.rotation, now.rate
-    with np.errstate(all="ignore"):
-        for step, rotors in enumerate(steps.each()):
-            middle = _moved(flown, state, (state, now), rotors, 0.5 * period, translates)
-            there = _turned(flown, middle.rotation, middle.momentum)
-            end = _moved(flown, state, (middle, there), rotors, period, translates)
-            after = _turned(flown, end.rotation, end.momentum)
-            fastest = np.maximum(np.abs(after.rate).max(axis=0), np.abs(end.velocity).max(axis=0))
-            good = (diverged < 0) & now.exists & there.exists & after.exists & (fastest < FASTEST)
-            if stages:
-                for stage, (at, turned) in enumerate(((state, now), (middle, there))):
-                    for own, value in zip(passed, (at.velocity, at.rotation, turned.rate), strict=True):
-                        own[stage, step] = value
-            if good.all():
-                state, now = end, after
-            else:
-                # A run that no body flies stays as it is from there on.
-                diverged[(diverged < 0) & ~good] = step
-                state = _State(*(np.where(good, new, old) for new, old in zip(end, state, strict=True)))
-                now = Turned(*(np.where(good, new, old) for new, old in zip(after, now, strict=True)))
-            place = step + 1
-            position[place], velocity[place], rotation[place], rate[place] = (
-                state.position,
-                state.velocity,
-                state.rotation,
-                now.rate,
-            )
-    return _Path(position, velocity, rotation, rate, passed if stages else (), diverged)
-
-
-def _begun(flown: Flown, motion: MeasuredMotion, starts: IntArray) -> _State:
-    rotation, rate = motion.rotation[starts].transpose(1, 2, 0), motion.rate[starts].T
-    momentum = flown.body.inertia @ rate if flown.turning is None else flown.turning.momentum(rotation, rate)
-    return _State(motion.position[starts].T, motion.velocity[starts].T, rotation, momentum)
+def _turn(turn: Vector, pairs: Value, diagonal: Value, skew: Value) -> Vector:
+    """Sum ``pairs a a' + diagonal 1 + skew [a]_x``, row by row."""
+    (x, y, z), (i, j, k) = scaled(pairs, turn), scaled(skew, turn)
+    xy, xz, yz = x * turn[1], x * turn[2], y * turn[2]
+    xx, yy, zz = (own * each + diagonal for own, each in zip((x, y, z), turn, strict=True))
+    return xx, xy - k, xz + j, xy + k, yy, yz - i, xz - j, yz + i, zz
 
 
 def rotation_errors(measured: Array, predicted: Array) -> Array:
@@ -448,20 +456,20 @@ class Loss(NamedTuple):
 
     Attributes
     ----------
-    weight, delta : array, shape (horizon, 4) or (horizon, 4, run)
-        For position, velocity, attitude, rate; position is not weighed.
+    weight, delta : array, shape (horizon, 3) or (horizon, 3, run)
+        For velocity, attitude and rate.
     """
 
     weight: Array
     delta: Array
 
     def of(self, squares: Array) -> Array:
-        """Weigh squared errors, shape (horizon, 4, run)."""
+        """Weigh squared errors, shape (horizon, 3, run)."""
         weight, delta = self.of_runs()
         return np.asarray(weight * delta**2 * (np.sqrt(1.0 + squares / delta**2) - 1.0))
 
     def of_runs(self, part: slice = slice(None)) -> Loss:
-        """Give the weights of some runs, shapes (horizon, 4, run)."""
+        """Give the weights of some runs, shapes (horizon, 3, run)."""
         return Loss(*(each[:, :, None] if each.ndim == 2 else each[..., part] for each in self))
 
 
@@ -480,24 +488,63 @@ class Runs:
     motion: MeasuredMotion
     starts: IntArray
     translates: bool
+    _seen: dict[int, tuple[Array, ...]] = field(default_factory=dict, repr=False)
 
     def blocks(self, steps: Steps, most: int) -> Iterator[tuple[slice, Runs, Steps]]:
         """Take some runs at a time."""
+        if len(self.starts) <= most:
+            yield slice(len(self.starts)), self, steps
+            return
         for part in _slices(len(self.starts), most):
             yield part, Runs(self.motion, self.starts[part], self.translates), steps.of_runs(part)
 
-    def fly(self, flown: Flown, steps: Steps, *, stages: bool = False) -> _Path:
+    def fly(self, flown: Flown, steps: Steps, *, passed: bool = False) -> _Path:
         """Fly all runs."""
-        begun = _begun(flown, self.motion, self.starts)
-        return _run(flown, begun, steps, self.motion.period, self.translates, stages=stages)
+        state, period = flown.begun(self.motion, self.starts), self.motion.period
+        samples: list[Array] = []
+        all_passed: list[Vector] = []
+        exist: list[tuple[BoolArray | bool, ...]] = []
+        with np.errstate(all="ignore"):
+            for rotors in steps.each():
+                if flown.traced is None:
+                    step = flown.stepped(state, rotors, period, self.translates)
+                else:
+                    step = Stepped(*flown.traced(state, rotors[:3], rotors.push or ()))
+                samples += [*state[: _ROTATION.stop], *step.passed[12:15]]
+                all_passed += [step.passed] if passed else []
+                exist.append(step.exist)
+                state = step.end
+            last = flown.turned(state)
+            shape = len(steps.terms) + 1, 18, len(self.starts)
+            path = np.concatenate([*samples, *state[: _ROTATION.stop], *last.rate]).reshape(shape)
+            slow = (np.abs(path[1:, [3, 4, 5, 15, 16, 17]]) < FASTEST).all(axis=1)
+        if flown.turning is not None:
+            there = np.array([*exist, (last.exists, last.exists)])
+            slow &= there[:-1].all(axis=1) & there[1:, 0]
+        diverged = np.where(slow.all(axis=0), -1, np.argmin(slow, axis=0))
+        if (diverged >= 0).any():
+            ends = np.where(diverged < 0, len(path), diverged)
+            path = np.take_along_axis(path, np.minimum(np.arange(len(path))[:, None], ends)[:, None], axis=0)
+        position, velocity, rotation, rate = path[:, :3], path[:, 3:6], path[:, 6:15], path[:, 15:]
+        return _Path(position, velocity, rotation.reshape(len(path), 3, 3, -1), rate, all_passed, diverged)
 
     def errors(self, path: _Path) -> Array:
-        """Compare with what was measured: predicted less measured, shape (4, step, 3, run); see `errors_of_runs`."""
-        motion, at = self.motion, self.starts + np.arange(1, len(path.rate))[:, None]
-        measured = (each[at].swapaxes(1, 2) for each in (motion.position, motion.velocity, motion.rate))
-        position, velocity, rate = measured
-        turned = rotation_errors(motion.rotation[at].transpose(0, 2, 3, 1), path.rotation[1:])
-        return np.stack([path.position[1:] - position, path.velocity[1:] - velocity, turned, path.rate[1:] - rate])
+        """Compare velocity, attitude and rate with what was measured: predicted less measured, (3, step, 3, run)."""
+        velocity, rotation, rate = self._measured(len(path.rate) - 1)
+        turned = rotation_errors(rotation, path.rotation[1:])
+        return np.stack([path.velocity[1:] - velocity, turned, path.rate[1:] - rate])
+
+    def _measured(self, horizon: int) -> tuple[Array, ...]:
+        """Give measured velocity, rotation and rate after each step, runs last; remembered: runs are flown again."""
+        if horizon not in self._seen:
+            at = self.samples(horizon)
+            found = (np.moveaxis(each[at], 1, -1) for each in self.motion[1:4])
+            self._seen[horizon] = tuple(map(np.ascontiguousarray, found))
+        return self._seen[horizon]
+
+    def samples(self, horizon: int) -> IntArray:
+        """Give the samples of the motion after each step, shape (step, run)."""
+        return np.asarray(self.starts + np.arange(1, horizon + 1)[:, None])
 
 
 def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntArray]:
@@ -511,9 +558,13 @@ def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntAr
     diverged : array of int, shape (run,)
         Step at which a run diverged; -1 for those that did not.
     """
-    found = [(own.fly(flown, part), own) for _, own, part in runs.blocks(steps, MOST_RUNS)]
-    errors = [own.errors(path).transpose(3, 1, 0, 2) for path, own in found]
-    return np.concatenate(errors), np.concatenate([path.diverged for path, _ in found])
+    errors, diverged = [], []
+    for _, own, part in runs.blocks(steps, MOST_RUNS):
+        path = own.fly(flown, part)
+        away = path.position[1:] - runs.motion.position[own.samples(len(part.terms))].swapaxes(1, 2)
+        errors.append(np.concatenate([away[None], own.errors(path)]).transpose(3, 1, 0, 2))
+        diverged.append(path.diverged)
+    return np.concatenate(errors), np.concatenate(diverged)
 
 
 class Leg(NamedTuple):
@@ -533,7 +584,7 @@ class Leg(NamedTuple):
 def legs(flown: Flown, runs: Runs, steps: Steps) -> Iterator[Leg]:
     """Fly runs, some at a time."""
     for part, own, of_steps in runs.blocks(steps, MOST_RUNS):
-        yield Leg(part, own, own.fly(flown, of_steps, stages=True))
+        yield Leg(part, own, own.fly(flown, of_steps, passed=True))
 
 
 def losses_of(flown: Iterable[Leg], loss: Loss) -> Array:
@@ -546,7 +597,7 @@ def losses_of(flown: Iterable[Leg], loss: Loss) -> Array:
 
 
 def _squares(errors: Array) -> Array:
-    """Sum the squares of the components, shape (step, 4, run)."""
+    """Sum the squares of the components, shape (step, 3, run)."""
     return np.asarray((errors**2).sum(axis=2).swapaxes(0, 1))
 
 
@@ -562,7 +613,7 @@ def _gone(diverged: IntArray, horizon: int) -> BoolArray:
     return np.asarray((diverged >= 0) & (np.arange(horizon)[:, None] >= diverged))
 
 
-def sums_of(legs: Iterable[Leg], flown: Flown, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
+def sums_of(legs: Iterable[Leg], slopes: Slopes, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
     """Sum the gradient and the Gauss-Newton Hessian of the loss of runs by the numbers.
 
     The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
@@ -570,8 +621,8 @@ def sums_of(legs: Iterable[Leg], flown: Flown, steps: Steps, loss: Loss, group: 
 
     Parameters
     ----------
-    flown : Flown
-        That flew them, with derivatives.
+    slopes : Slopes
+        Of the vehicle that flew them.
     group : array of int, shape (run,)
         Which sum a run is added to.
 
@@ -580,37 +631,26 @@ def sums_of(legs: Iterable[Leg], flown: Flown, steps: Steps, loss: Loss, group: 
     gradient : array, shape (group, number)
     hessian : array, shape (group, number, number)
     """
-    numbers, groups, horizon = len(flown.inertia_by), int(group.max(initial=0)) + 1, len(loss.weight)
+    numbers, groups, horizon = slopes.numbers, int(group.max(initial=0)) + 1, len(loss.weight)
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
     for leg in legs if numbers else ():
         shares, residual = _shares(leg, loss.of_runs(leg.part))
-        own_steps, owners = steps.of_runs(leg.part), group[leg.part]
-        for some in _slices(len(owners), max(1, _SAMPLES // (2 * horizon))):
-            for place, by_number, square in _products(leg, flown, own_steps, shares, residual, owners, some):
-                gradient[place] += by_number
-                hessian[place] += square
+        tangents = _Tangents(slopes, leg, steps.of_runs(leg.part), max(1, _SAMPLES // horizon))
+        own = group[leg.part]
+        for some in _slices(len(own), tangents.most):
+            rows = tangents.of_runs(some, shares[some])
+            ends = [some.start, *(some.start + 1 + np.flatnonzero(np.diff(own[some]))).tolist(), some.stop]
+            for first, end in pairwise(ends):
+                jacobian = rows[first - some.start : end - some.start].reshape(-1, numbers)
+                gradient[own[first]] += residual[first:end].reshape(-1) @ jacobian
+                hessian[own[first]] += jacobian.T @ jacobian
     return gradient, hessian
-
-
-def _products(
-    leg: Leg, flown: Flown, steps: Steps, shares: Array, residual: Array, group: IntArray, some: slice
-) -> list[tuple[int, Array, Array]]:
-    """Multiply rows of the Jacobian of some runs with each other, by group."""
-    rows = _tangents(flown, leg, steps, some)
-    rows *= shares[some, :, :, None]
-    own, found = group[some], []
-    ends = [0, *(np.flatnonzero(np.diff(own)) + 1).tolist(), len(own)]
-    for kept in map(slice, ends[:-1], ends[1:]):
-        jacobian = rows[kept].reshape(-1, rows.shape[-1])
-        product = residual[some][kept].reshape(-1) @ jacobian
-        found.append((int(own[kept.start]), product, np.asarray(jacobian.T @ jacobian)))
-    return found
 
 
 def _shares(leg: Leg, loss: Loss) -> tuple[Array, Array]:
     """Give by what rows of the Jacobian are multiplied, and what they come to, shapes (run, step, STATES)."""
-    errors, (weight, delta) = leg.runs.errors(leg.path)[1:], (each[:, 1:] for each in loss)
-    share = np.sqrt(weight / np.sqrt(1.0 + _squares(errors) / delta**2))
+    errors = leg.runs.errors(leg.path)
+    share = np.sqrt(loss.weight / np.sqrt(1.0 + _squares(errors) / loss.delta**2))
     share[np.broadcast_to(_gone(leg.path.diverged, len(share))[:, None], share.shape)] = 0.0
     shares = np.repeat(share.transpose(2, 0, 1), 3, axis=2)
     return shares, shares * errors.transpose(3, 1, 0, 2).reshape(shares.shape)
@@ -621,91 +661,66 @@ def _slices(count: int, most: int) -> Iterator[slice]:
         yield slice(first, min(first + most, count))
 
 
-def _tangents(flown: Flown, leg: Leg, steps: Steps, some: slice) -> Array:
-    """Compose the derivatives of the states of some runs by the numbers, shape (run, step, STATES, number)."""
-    path = leg.path.of_runs(some)
-    moved = _steps_by(flown, path, steps.of_runs(some), leg.runs.motion.period, leg.runs.translates)
-    horizon, count, _, width = moved.shape
-    changes, change = np.empty((count, horizon, STATES, width - STATES)), np.zeros((count, STATES, width - STATES))
-    with np.errstate(all="ignore"):
-        for step in range(horizon):
-            change = moved[step, ..., :STATES] @ change + moved[step, ..., STATES:]
-            changes[:, step] = change
-    changes[_gone(path.diverged, horizon).T] = 0.0
-    return changes
+class _Tangents:
+    """Derivatives of the states of some runs at a time by the numbers, in arrays that are made once.
 
-
-def _steps_by(flown: Flown, path: _Path, steps: Steps, period: float, translates: bool) -> Array:
-    """Differentiate steps by the state at their begin and by numbers, shape (step, run, STATES, STATES + number)."""
-    _, horizon, _, count = path.stages[0].shape
-    numbers, samples = len(flown.inertia_by), horizon * count
-    parts = (np.moveaxis(each, (0, 1), (-3, -2)) for each in path.stages)
-    velocity, rotation, rate = (each.reshape(*each.shape[:-3], -1) for each in parts)
-    by = _accelerations_by(flown, velocity, rotation, rate, steps.for_both_stages(), translates)
-    by = np.moveaxis(by.reshape(6, -1, 2, samples), (2, 3), (0, 1))
-    rates = rate.reshape(3, 2, samples)
-    first, rest = np.zeros((2, samples, STATES, STATES + numbers))
-    second = np.zeros((samples, STATES, STATES))
-    diagonal = [0, 1, 2, 6, 7, 8]
-    for own, half, into_state, into_number in (
-        (by[0], 0.5 * period, first[..., :STATES], first[..., STATES:]),
-        (by[1], period, second, rest[..., STATES:]),
-    ):
-        for rows, components in ((slice(3), slice(3)), (slice(3, 6), slice(6, 9))):
-            np.multiply(half, own[:, rows, :STATES], out=into_state[:, components])
-            np.multiply(half, own[:, rows, STATES:], out=into_number[:, components])
-    for stage, interval, by_turn, by_rate in ((0, 0.5 * period, first, first), (1, period, rest, second)):
-        turn = interval * rates[:, stage]
-        by_turn[:, 3:6, 3:6] = exponential(turn).transpose(2, 1, 0)
-        by_rate[:, 3:6, 6:9] = interval * right_jacobian(turn).transpose(2, 0, 1)
-    for component in diagonal:
-        first[:, component, component] += 1.0
-        rest[:, component, component] = 1.0
-    return np.asarray(second @ first + rest).reshape(horizon, count, STATES, -1)
-
-
-def _accelerations_by(
-    flown: Flown, velocity: Array, rotation: Array, rate: Array, rotors: Rotors, translates: bool
-) -> Array:
-    """Differentiate accelerations, world and body frame, by state and numbers, shape (6, STATES + number, samples).
-
-    ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
-    ``I d omega' = dM - d omega x I omega - omega x I d omega``.
+    Attributes
+    ----------
+    most : int
+        Runs at a time.
     """
-    air, body, numbers = _back(rotation, velocity), flown.body, len(flown.inertia_by)
-    seen = [Tangent(own, {place: 1.0}) for place, own in enumerate((*air, *rate))]
-    torque, force = flown.wrench(tuple(seen[:3]), tuple(seen[3:]), rotors)
-    samples = rate.shape[1]
-    by = np.zeros((6, STATES + numbers, samples))
-    of_air, places = np.zeros((6, 3, samples)), [*range(6, 9), *range(STATES, STATES + numbers)]
-    for row, value in enumerate((*torque, *force)):
-        for place, change in value.by.items() if isinstance(value, Tangent) else ():
-            (of_air if place < 3 else by)[row, place if place < 3 else places[place - 3]] = change
-    turned, pushed = _filled(torque, samples), _filled(force, samples)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        by[:, i] = of_air[:, 0] * rotation[i, 0] + of_air[:, 1] * rotation[i, 1] + of_air[:, 2] * rotation[i, 2]
-        by[:, 3 + i] = of_air[:, j] * air[k] - of_air[:, k] * air[j]
-    momentum = body.inertia @ rate
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        # - F x dphi
-        by[3 + k, 3 + j] -= pushed[i]
-        by[3 + j, 3 + k] += pushed[i]
-        # - omega x I d omega - d omega x I omega
-        by[i, 6:9] -= rate[j] * body.inertia[k][:, None] - rate[k] * body.inertia[j][:, None]
-        by[k, 6 + j] += momentum[i]
-        by[j, 6 + k] -= momentum[i]
-    accelerated = body.inverse @ (turned - _crossed(rate, momentum))
-    for place, change in enumerate(flown.inertia_by):
-        if change.any():
-            by[:3, STATES + place] -= change @ accelerated + _crossed(rate, change @ rate)
-    if flown.log_mass is not None:
-        by[3:, STATES + flown.log_mass] -= pushed
-    # In the order of the state: world, then body.
-    out = np.zeros_like(by)
-    if translates:
-        for i in range(3):
-            out[i] = (rotation[i, 0] * by[3] + rotation[i, 1] * by[4] + rotation[i, 2] * by[5]) / body.mass
-    out[3:] = (body.inverse @ by[:3].reshape(3, -1)).reshape(3, *by.shape[1:])
-    return out
+
+    def __init__(self, slopes: Slopes, leg: Leg, steps: Steps, most: int) -> None:
+        self.most, self._slopes, self._runs = min(most, len(leg.path.diverged)), slopes, leg.runs
+        horizon, runs = steps.terms.shape[:2]
+        self._gone = _gone(leg.path.diverged, horizon)
+        passed = np.concatenate([*chain(*leg.path.passed)]).reshape(horizon, 2, -1, runs)
+        self._passed, self._driven = np.moveaxis(passed, 0, 2), steps.arguments()
+        # What is 0 stays so; the rest is filled anew each time. The end follows from the begin and the middle.
+        widths = (STATES, 2 * STATES), (slopes.numbers, slopes.numbers)
+        self._into, self._by = ([np.zeros((horizon, self.most, STATES, n)) for n in own] for own in widths)
+        self._changes = np.zeros((self.most, 2 * STATES, slopes.numbers))
+        for component in _ADDED:
+            self._into[1][..., component, component] = 1.0
+        self._rows = np.empty((self.most, horizon, STATES, slopes.numbers))
+
+    def of_runs(self, some: slice, shares: Array) -> Array:
+        """Compose them from step to step, times shares of shape (run, step, STATES); (run, step, STATES, number)."""
+        count = some.stop - some.start
+        rows, changes = self._rows[:count], self._changes[:count]
+        change, middle = changes[:, :STATES], changes[:, STATES:]
+        change[:] = 0.0
+        with np.errstate(all="ignore"):
+            self._fill(some)
+            steps = zip(*(each[:, :count] for each in (*self._into, *self._by)), strict=True)
+            for step, (into_middle, into_end, middle_by, end_by) in enumerate(steps):
+                np.add(into_middle @ change, middle_by, out=middle)
+                np.add(into_end @ changes, end_by, out=change)
+                np.multiply(change, shares[:, step, :, None], out=rows[:, step])
+        rows[self._gone[:, some].T] = 0.0
+        return rows
+
+    def _fill(self, some: slice) -> None:
+        """Differentiate the middle of each step, and its end by begin and middle, both by the numbers too."""
+        period, translates, count = self._runs.motion.period, self._runs.translates, some.stop - some.start
+        (middle, end), (middle_by, end_by) = ([each[:, :count] for each in own] for own in (self._into, self._by))
+        driven = [[each[..., some].reshape(*each.shape[:-2], -1) for each in own] for own in self._driven]
+        for component in _ADDED:
+            middle[..., component, component] = 0.0
+        for stage, interval, by_state, by_number in (
+            (0, 0.5 * period, middle, middle_by),
+            (1, period, end[..., STATES:], end_by),
+        ):
+            passed = tuple(self._passed[stage, :, :, some].reshape(15, -1))
+            turn = scaled(interval, passed[12:])
+            into, shape = (middle, end)[stage], middle.shape[:2]
+            for place, (turned, own) in enumerate(zip(exponential(turn), right_jacobian(turn), strict=True)):
+                row, column = divmod(place, 3)
+                into[..., 3 + column, 3 + row] = turned.reshape(shape)
+                by_state[..., 3 + row, 6 + column] = interval * own.reshape(shape)
+            for (row, column), slope in zip(self._slopes.places, self._slopes.values(passed, *driven), strict=True):
+                if translates or row >= 3:
+                    out = by_state[..., row, column] if column < STATES else by_number[..., row, column - STATES]
+                    np.multiply(interval, slope if np.size(slope) == 1 else slope.reshape(shape), out=out)
+        for component in _ADDED:
+            middle[..., component, component] += 1.0

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.vehicle.values import Each, Functions, Value, plus, zero
+from cpfls_cli.vehicle.values import Each, Functions, Tangent, Value, differentiable, plus
 
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
@@ -31,12 +31,17 @@ class Graph:
     def __init__(self) -> None:
         self.nodes: list[tuple[Any, ...]] = []
         self._places: dict[tuple[Any, ...], int] = {}
+        self.by_rotor: set[int] = set()
+        """Arrays with one value for each rotor."""
 
     def node(self, *operation: Any) -> Symbol:
         """Record an operation, or find it."""
         place = self._places.setdefault(operation, len(self.nodes))
         if place == len(self.nodes):
             self.nodes.append(operation)
+            name, *inner = operation
+            if name == "array" or (name not in _OF_ALL_ROTORS and not self.by_rotor.isdisjoint(inner)):
+                self.by_rotor.add(place)
         return Symbol(self, place)
 
     def known(self, value: Value) -> Symbol:
@@ -51,9 +56,11 @@ class Graph:
         """Say what an operation gives, before it is recorded."""
         self._places[operation] = value.place
 
-    def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
+    def inputs(self, name: str, count: int, *, by_rotor: bool = False) -> tuple[Symbol, ...]:
         """Make arguments of the function that is traced."""
-        return tuple(self.node("input", f"{name}{index}") for index in range(count))
+        made = tuple(self.node("input", f"{name}{index}") for index in range(count))
+        self.by_rotor.update(x.place for x in made if by_rotor)
+        return made
 
 
 class Symbol:
@@ -71,7 +78,7 @@ class Symbol:
 
     def _by(self, name: str, a: Value, b: Value) -> Value:
         other = a if b is self else b
-        if isinstance(other, Each):
+        if isinstance(other, (Each, Tangent)):
             return NotImplemented
         if isinstance(other, (int, float)):
             if (name in "+-" and other == 0 and b is other) or (name in "*/" and other == 1 and b is other):
@@ -178,17 +185,28 @@ def _by_rotor(values: Iterable[Value]) -> Value:
     return column if column.any() else 0
 
 
-_ARRAY_FUNCTIONS = {name: _by_numpy(name) for name in (*_FUNCTIONS, "where")}
-ARRAY_SYMBOLS = Functions(
-    **{name: _ARRAY_FUNCTIONS[name] for name in ("sqrt", "exp", "sin", "cos", "floor", "where")},
-    arctan2=_ARRAY_FUNCTIONS["atan2"],
-    absolute=_ARRAY_FUNCTIONS["abs"],
-    largest=lambda a, b: _ARRAY_FUNCTIONS["where"](a > b, a, b),
-    smallest=lambda a, b: _ARRAY_FUNCTIONS["where"](a < b, a, b),
-    rotors=_by_rotor,
-    total=lambda x: x if zero(x) else x.made("total", x) if isinstance(x, Symbol) else x.sum(axis=0),
-)
-"""Functions of symbols for arrays, whose first axis is that of the rotors where there is one value for each of them."""
+def array_symbols(rotors: int) -> Functions:
+    """Give functions of symbols for arrays, and of such with derivatives.
+
+    Their first axis is that of the rotors where there is one value for each of them.
+    """
+
+    def total(x: Value) -> Value:
+        if not isinstance(x, Symbol):
+            return x.sum(axis=0) if isinstance(x, np.ndarray) else rotors * x
+        return x.made("total", x) if x.place in x.graph.by_rotor else rotors * x
+
+    names = ("sqrt", "exp", "sin", "cos", "floor", "where")
+    plain = Functions(
+        **{name: _by_numpy(name) for name in names},
+        arctan2=_by_numpy("atan2"),
+        absolute=_by_numpy("abs"),
+        largest=_by_numpy("largest"),
+        smallest=_by_numpy("smallest"),
+        rotors=_by_rotor,
+        total=total,
+    )
+    return differentiable(plain, lambda value, _: value)
 
 
 def traced(
@@ -236,8 +254,13 @@ def traced_in_two(
 
 @lru_cache(maxsize=32)
 def _compiled(source: str, arrays: bool = False) -> dict[str, Any]:
-    functions = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, "where")} if arrays else _FUNCTIONS
-    names: dict[str, Any] = {**functions, "array": np.array, "inf": math.inf, "nan": math.nan}
+    of_arrays = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, *_OF_ARRAYS)}
+    names: dict[str, Any] = {
+        **(of_arrays if arrays else _FUNCTIONS),
+        "array": np.array,
+        "inf": math.inf,
+        "nan": math.nan,
+    }
     exec(compile(source, "<traced>", "exec"), names)
     return names
 
@@ -271,7 +294,8 @@ class Language(NamedTuple):
 _OPERATORS = {name: f"({{}} {name} {{}})" for name in ("+", "-", "*", "/", "<", ">", "**")} | {"negative": "(-{})"}
 PYTHON = Language({"where": "({1} if {0} else {2})"})
 ARRAYS = Language({"total": "{}.sum(0)"})
-_NUMPY = {"atan2": "arctan2"}
+_OF_ARRAYS = ("where", "largest", "smallest")
+_NUMPY = {"atan2": "arctan2", "largest": "maximum", "smallest": "minimum"}
 """Functions that NumPy has by another name."""
 C = Language(
     {"where": "({} ? {} : {})", "**": "MATH(pow)({}, {})", "abs": "MATH(fabs)({})"},
@@ -352,6 +376,8 @@ def _tuple(items: Iterable[str]) -> str:
 
 _GIVEN = ("input", "number", "array")
 """What is no operation."""
+_OF_ALL_ROTORS = ("input", "number", "total")
+"""What is no array by rotor, whatever it is made of."""
 
 
 def _uses(graph: Graph, results: Sequence[int], known: Container[int] = ()) -> list[int]:

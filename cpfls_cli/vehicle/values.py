@@ -5,7 +5,7 @@ Vectors are tuples of components. What is always 0 is a plain 0, takes no part i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import prod
 from typing import Any, NamedTuple
@@ -104,7 +104,7 @@ class Tangent:
         if power == 2:
             return self.chained(self.value * self.value, 2.0 * self.value)
         # Powers of integers are not defined below 0.
-        value = np.asarray(self.value, dtype=float)
+        value = 1.0 * self.value
         return self.chained(value**power, power * value ** (power - 1))
 
     def __gt__(self, other: Value) -> Value:
@@ -121,93 +121,105 @@ def value_of(x: Value) -> Value:
     return x.value if isinstance(x, Tangent) else x
 
 
-def _lifted(function: Callable[[Value], Value], slope: Callable[[Value, Value], Value]) -> Callable[[Value], Value]:
-    """Make a function of numbers with derivatives from one of arrays and its slope, from argument and value."""
+def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> Functions:
+    """Make functions of numbers with derivatives, and of polynomials, from those of numbers without.
 
-    def lifted(x: Value) -> Value:
+    Parameters
+    ----------
+    spread : callable
+        ``spread(value, other)``: the value for each rotor, where it is the same for all and the other one is not.
+    """
+
+    def lifted(name: str, slope: Callable[[Value, Value], Value]) -> Callable[[Value], Value]:
+        function = getattr(base, name)
+
+        def called(x: Value) -> Value:
+            if not isinstance(x, Tangent):
+                return function(x)
+            value = function(x.value)
+            return x.chained(value, slope(x.value, value))
+
+        return called
+
+    def where(condition: Value, yes: Value, no: Value) -> Value:
+        if isinstance(yes, Polynomial) or isinstance(no, Polynomial):
+            first, second = Polynomial.of(yes).terms, Polynomial.of(no).terms
+            return Polynomial({at: where(condition, first.get(at, 0), second.get(at, 0)) for at in {**first, **second}})
+        if not (isinstance(yes, Tangent) or isinstance(no, Tangent)):
+            return base.where(condition, yes, no)
+        ends = [one if isinstance(one, Tangent) else Tangent(one, {}) for one in (yes, no)]
+        values = [one.value for one in ends]
+        value = 0 if all(map(zero, values)) else base.where(condition, *values)
+        places = {**ends[0].by, **ends[1].by}
+        return Tangent(value, {at: base.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
+
+    def arctan2(y: Value, x: Value) -> Value:
+        upward, along = value_of(y), value_of(x)
+        angle = base.arctan2(upward, along)
+        if not (isinstance(y, Tangent) or isinstance(x, Tangent)):
+            return angle
+        share = 1.0 / base.largest(upward * upward + along * along, _LEAST)
+        turned = minus(times(Tangent(0, getattr(y, "by", {})), share * along), times(x - along, share * upward))
+        return Tangent(angle, turned.by)
+
+    def total(x: Value) -> Value:
+        if isinstance(x, Polynomial):
+            shape = np.broadcast_shapes(*(np.shape(value_of(value)) for value in x.terms.values()))
+            return x.each(lambda value: total(plus(np.zeros(shape), value)))
         if not isinstance(x, Tangent):
-            return function(x)
-        value = function(x.value)
-        return x.chained(value, slope(x.value, value))
+            return x if zero(x) else base.total(x)
+        # What is the same for all rotors counts once for each.
+        by = {place: base.total(spread(change, x.value)) for place, change in x.by.items()}
+        return Tangent(total(x.value), by)
 
-    return lifted
+    def extreme(name: str, first: bool) -> Callable[[Value, Value], Value]:
+        def called(a: Value, b: Value) -> Value:
+            if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
+                return getattr(base, name)(a, b)
+            return where(value_of(a) > value_of(b), *((a, b) if first else (b, a)))
 
+        return called
 
-def _array_where(condition: Value, yes: Value, no: Value) -> Value:
-    if isinstance(yes, Polynomial) or isinstance(no, Polynomial):
-        first, second = Polynomial.of(yes).terms, Polynomial.of(no).terms
-        return Polynomial(
-            {at: _array_where(condition, first.get(at, 0), second.get(at, 0)) for at in {**first, **second}}
-        )
-    if not (isinstance(yes, Tangent) or isinstance(no, Tangent)):
-        return np.where(condition, yes, no)
-    ends = [one if isinstance(one, Tangent) else Tangent(one, {}) for one in (yes, no)]
-    values = [one.value for one in ends]
-    value = 0 if all(map(zero, values)) else np.where(condition, *values)
-    places = {**ends[0].by, **ends[1].by}
-    return Tangent(value, {at: np.where(condition, *(one.by.get(at, 0.0) for one in ends)) for at in places})
-
-
-def _array_arctan2(y: Value, x: Value) -> Value:
-    upward, along = value_of(y), value_of(x)
-    angle = np.arctan2(upward, along)
-    if not (isinstance(y, Tangent) or isinstance(x, Tangent)):
-        return angle
-    share = 1.0 / np.maximum(upward * upward + along * along, _LEAST)
-    turned = minus(times(Tangent(0, getattr(y, "by", {})), share * along), times(x - along, share * upward))
-    return Tangent(angle, turned.by)
+    return Functions(
+        sqrt=lifted("sqrt", lambda _, root: 0.5 / base.largest(root, _LEAST)),
+        exp=lifted("exp", lambda _, value: value),
+        sin=lifted("sin", lambda x, _: base.cos(x)),
+        cos=lifted("cos", lambda x, _: -base.sin(x)),
+        arctan2=arctan2,
+        floor=lambda x: base.floor(value_of(x)),
+        absolute=lifted("absolute", lambda x, _: base.where(x > 0.0, 1.0, -1.0)),
+        where=where,
+        largest=extreme("largest", True),
+        smallest=extreme("smallest", False),
+        rotors=base.rotors,
+        total=total,
+    )
 
 
 _LEAST = 1e-300
 """Square below which a direction has no slope."""
 
 
-def _array_rotors(values: Iterable[Value]) -> Value:
-    return np.array([*values], dtype=float)[:, None]
+def _spread(value: Value, other: Value) -> Value:
+    return value if zero(other) or np.shape(value) == other.shape else np.broadcast_to(value, other.shape)
 
 
-def _array_total(x: Value) -> Value:
-    if isinstance(x, Polynomial):
-        shape = np.broadcast_shapes(*(np.shape(value_of(value)) for value in x.terms.values()))
-        return x.each(lambda value: _array_total(plus(np.zeros(shape), value)))
-    if not isinstance(x, Tangent):
-        return x if zero(x) else x.sum(axis=0)
-    if zero(x.value):
-        return Tangent(0, {place: change.sum(axis=0) for place, change in x.by.items()})
-    # What is the same for all rotors counts once for each.
-    shape = x.value.shape
-    return Tangent(
-        x.value.sum(axis=0),
-        {
-            place: (change if np.shape(change) == shape else np.broadcast_to(change, shape)).sum(axis=0)
-            for place, change in x.by.items()
-        },
-    )
-
-
-def _array_extreme(choose: Callable[[Value, Value], Value], first: bool) -> Callable[[Value, Value], Value]:
-    def extreme(a: Value, b: Value) -> Value:
-        if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
-            return choose(a, b)
-        larger = value_of(a) > value_of(b)
-        return _array_where(larger, *((a, b) if first else (b, a)))
-
-    return extreme
-
-
-ARRAYS = Functions(
-    sqrt=_lifted(np.sqrt, lambda _, root: 0.5 / np.maximum(root, _LEAST)),
-    exp=_lifted(np.exp, lambda _, value: value),
-    sin=_lifted(np.sin, lambda x, _: np.cos(x)),
-    cos=_lifted(np.cos, lambda x, _: -np.sin(x)),
-    arctan2=_array_arctan2,
-    floor=lambda x: np.floor(value_of(x)),
-    absolute=_lifted(np.abs, lambda x, _: np.sign(x)),
-    where=_array_where,
-    largest=_array_extreme(np.maximum, True),
-    smallest=_array_extreme(np.minimum, False),
-    rotors=_array_rotors,
-    total=_array_total,
+ARRAYS = differentiable(
+    Functions(
+        sqrt=np.sqrt,
+        exp=np.exp,
+        sin=np.sin,
+        cos=np.cos,
+        arctan2=np.arctan2,
+        floor=np.floor,
+        absolute=np.abs,
+        where=np.where,
+        largest=np.maximum,
+        smallest=np.minimum,
+        rotors=lambda values: np.array([*values], dtype=float)[:, None],
+        total=lambda x: x.sum(axis=0),
+    ),
+    _spread,
 )
 """Functions of arrays over time, whose first axis is that of the rotors where there is one value for each of them, and
 of such with derivatives."""
@@ -389,6 +401,13 @@ def cross(a: Vector, b: Vector) -> Vector:
         minus(times(z, p), times(x, r)),
         minus(times(x, q), times(y, p)),
     )
+
+
+def inverse(rows: Sequence[Vector]) -> tuple[Vector, ...]:
+    """Invert a symmetric matrix, given by rows."""
+    first, second, third = rows
+    columns = cross(second, third), cross(third, first), cross(first, second)
+    return tuple(scaled(1.0 / dot(first, columns[0]), column) for column in columns)
 
 
 def apply(rows: Iterable[Vector], vector: Vector) -> Vector:

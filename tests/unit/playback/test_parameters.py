@@ -21,8 +21,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.remainder import Airflow
-from cpfls_cli.playback.windows import Rotors, Runs, Steps, errors_of_runs
-from cpfls_cli.vehicle.values import value_of
+from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
@@ -70,30 +69,19 @@ def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
 
 
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
+@pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
+def test_the_numbers_fly_in_one_function_as_their_model_does(flight, rules, pushed):
     free = numbers(STATED, blocks_of(STATED), rules)
-    values = somewhere(free, seed=1)
-    starts = flight.starts(30, 50)
-    at, runs = free.at(values), Runs(flight.motion, starts, translates=True)
-    steps = Steps(at.rotor_terms(flight, starts + np.arange(30)[:, None]))
-    expected, _ = errors_of_runs(at.flown, runs, steps)
-    runs = free_runs(player_of(at.model, flight), flight, starts, 30).errors
-    assert runs == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
-def test_what_is_traced_and_what_has_derivatives_is_the_same_vehicle(rules):
-    free = numbers(STATED, blocks_of(STATED), rules)
-    at, rng = free.at(somewhere(free, seed=2)), np.random.default_rng(0)
-    air, rate = (tuple(rng.normal(0.0, 2.0, (3, 6))) for _ in range(2))
-    rotors = Rotors(rng.uniform(500, 1000, (4, 6)), rng.normal(0, 50, (4, 6)), rng.uniform(3e5, 9e5, (4, 6)))
-    assert at.flown.traced is not None
-    by_function, plain, differentiated = (
-        np.array([[value_of(each) + np.zeros(6) for each in part] for part in flown.wrench(air, rate, rotors)])
-        for flown in (at.flown, replace(at.flown, traced=None), at.differentiated)
-    )
-    assert by_function == pytest.approx(plain, rel=1e-12)
-    assert differentiated == pytest.approx(plain, rel=1e-12)
+    at, starts = free.at(somewhere(free, seed=1)), flight.starts(30, 50)
+    push = np.random.default_rng(0).normal(0.0, 0.02, (30, len(starts), 6)) if pushed else None
+    steps = Steps(at.rotor_terms(flight, starts + np.arange(30)[:, None]), push)
+    flown = at.flown(flight.motion.period, translates=True, pushed=pushed)
+    runs = Runs(flight.motion, starts, translates=True)
+    found, expected = (errors_of_runs(each, runs, steps)[0] for each in (flown, at.model.flown))
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
+    if not pushed:
+        played = free_runs(player_of(at.model, flight), flight, starts, 30).errors
+        assert played == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
 
 
 def test_the_stated_numbers_make_the_stated_vehicle():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.vehicle.stepping import Machine
-from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, python_source, traced
-from cpfls_cli.vehicle.values import ARRAYS, Each, add, apply, cross, dot, scaled, subtract, transposed, zero
+from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, array_symbols, python_source, traced, traced_in_two
+from cpfls_cli.vehicle.values import ARRAYS, Each, Tangent, add, apply, cross, dot, scaled, subtract, transposed, zero
 
 A, B = (0.3, -1.2, 2.5), (1.1, 0.4, -0.7)
 
@@ -77,3 +77,33 @@ def test_long_expressions_are_written_in_lines_that_python_can_read():
     x = graph.inputs("x", 300)
     (found,) = traced(graph, {"x": x}, [(dot(x, x),)])(tuple(float(n) for n in range(300)))
     assert found[0] == pytest.approx(sum(n * n for n in range(300)))
+
+
+def of_rotors(functions, k, x, w):
+    """Sums over the rotors of what differs from rotor to rotor, and of what is the same for all."""
+    lift = functions.rotors([1.0, -2.0, 3.0]) * w + x
+    limited = functions.smallest(functions.largest(lift, -1.0), functions.absolute(x) + k)
+    angle = functions.arctan2(functions.sin(x), functions.exp(k * x))
+    return functions.total(lift**3), functions.total(limited / (2.0 + functions.sqrt(k * k))), angle - functions.cos(x)
+
+
+def test_derivatives_are_written_as_numbers_with_derivatives_have_them():
+    def differentiated(k, x):
+        return Tangent(k, {0: 1.0}), Tangent(x, {1: 1.0})
+
+    graph = Graph()
+    (k,), (x,), (w,) = graph.inputs("k", 1), graph.inputs("x", 1), graph.inputs("w", 1, by_rotor=True)
+    found = of_rotors(array_symbols(3), *differentiated(k, x), w)
+    slopes = [tuple(each.by[place] for place in (0, 1) if place in each.by) for each in found]
+    written = traced_in_two(graph, ("k", (k,)), {"x": (x,), "w": (w,)}, [*slopes, tuple(each.value for each in found)])
+
+    rng = np.random.default_rng(0)
+    x, w = rng.normal(0.0, 1.0, 7), rng.normal(0.0, 1.0, (3, 7))
+    *by, values = written((0.4,))((x,), (w,))
+    expected = of_rotors(ARRAYS, *differentiated(0.4, x), w)
+    for own, value, each in zip(by, values, expected, strict=True):
+        np.testing.assert_allclose(value, each.value, rtol=1e-13)
+        np.testing.assert_allclose(own, [each.by[place] for place in sorted(each.by)], rtol=1e-13)
+    ahead, behind = (of_rotors(ARRAYS, 0.4, x + step, w) for step in (1e-6, -1e-6))
+    for own, one, other in zip(by, ahead, behind, strict=True):
+        np.testing.assert_allclose(own[-1], (one - other) / 2e-6, rtol=1e-6, atol=1e-7)
