@@ -1,4 +1,4 @@
-"""URDF flown in PyBullet along a flight, with the forces of gym-pybullet-drones, whose package nobody can install.
+"""URDF flown in PyBullet along a flight, with the forces of gym-pybullet-drones, which no package index has.
 
 They are those of its ``BaseAviary.py`` with `Physics.PYB_DRAG`; see `cpfls_cli.simulators.urdf`.
 """
