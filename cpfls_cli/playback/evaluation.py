@@ -221,7 +221,7 @@ class VehicleAt:
         return [name for name in TIMES if name in self.free.index]
 
     def flown(self, period: float, *, translates: bool, pushed: bool = False) -> Flown:
-        """Give the vehicle as runs fly it, its steps as one function.
+        """Give the vehicle as runs fly it, by its steps as one function, which is all that it has.
 
         Parameters
         ----------
@@ -400,4 +400,9 @@ def traced_slopes(
     }
     arguments = {"motion": motion, "rotors": rotors, "by": by, "push": push, "push_by": push_by}
     made = traced_in_two(own.graph, ("number", own.values), arguments, [tuple(by_place.values())])
-    return pushes or len(free.numbers), tuple(by_place), lambda values: lambda *given: made(values)(*given)[0]
+
+    def at(values: tuple[float, ...]) -> Callable[..., Vector]:
+        function = made(values)
+        return lambda *given: function(*given)[0]
+
+    return pushes or len(free.numbers), tuple(by_place), at
