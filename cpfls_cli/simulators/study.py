@@ -149,7 +149,8 @@ class VehicleOf:
     @property
     def states_ratio(self) -> bool:
         """Whether the yaw torque follows from the thrust, which another may give."""
-        return self.by_speed and all(self.model.rotors[index].ratio is not None for index in self.order)
+        ratios = [self.model.rotors[index].ratio for index in self.order]
+        return self.by_speed and bool(ratios) and None not in ratios
 
     def filled(self, vehicle: VehicleSettings) -> VehicleSettings:
         """Give rotors whose thrust a model states the yaw torque over thrust of the file."""
@@ -246,8 +247,8 @@ def _lift(model: SimulatorModel, proposal: Proposal) -> float | None:
     if shares is None or not volts > _LEAST_VOLTS:
         return None
     flown = shares[np.isfinite(shares).all(axis=1)]
-    lifts = float(np.polynomial.polynomial.polyval(volts * flown, model.by_volts).mean() / (flown**2).mean())
-    return lifts if lifts > 0 else None
+    lifts = np.maximum(np.polynomial.polynomial.polyval(volts * flown, model.by_volts), 0.0)
+    return float(lifts.sum() / (flown**2).sum()) if lifts.any() and flown.any() else None
 
 
 def _order(model: SimulatorModel, airframe: Airframe) -> tuple[tuple[int, ...], str]:
