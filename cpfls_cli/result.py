@@ -159,12 +159,14 @@ class Described(NamedTuple):
         return self.about is not None and get_origin(self.kind) is tuple
 
 
+@cache
 def maps(kind: Any) -> bool:
     """Tell whether a type maps names to something."""
     origin = get_origin(kind)
     return isinstance(origin, type) and issubclass(origin, Mapping)
 
 
+@cache
 def _scalar(kind: Any) -> type:
     origin, inner = get_origin(kind), get_args(kind)
     if maps(kind):

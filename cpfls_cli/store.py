@@ -52,9 +52,11 @@ Lengths = MutableMapping[str, tuple[int, str]]
 
 def write(path: Path, given: Any, origin: Origin) -> None:
     """Write a result, whose class names its ``FORMAT``; one that breaks its own description is refused."""
-    require_sound(path, given)
     axis = getattr(type(given), "STREAMED", "")
     rows = len(getattr(given, axis)) if axis else 0
+    if rows:
+        # Of the parts none is seen whole.
+        require_sound(path, given)
     # In parts too, so that equal content is equal bytes however it came.
     parts = ({name: getattr(given, name)[at : at + PART] for name in _streamed(given)} for at in range(0, rows, PART))
     write_parts(path, (replace(given, **part) for part in parts) if rows else [given], rows, origin)
@@ -80,12 +82,13 @@ def write_parts(path: Path, parts: Iterable[Any], rows: int, origin: Origin) -> 
                 file[name][done : done + len(values)] = values
             done += len(getattr(part, type(part).STREAMED)) if rows else 1
             output.require_written()
-        streamed = _streamed(part) if rows else []
-        # What lies along the axis is checked in the file, all of it.
-        wrong = list(_wrong_rows(file, None, type(part), streamed)) if rows else []
-        wrong = wrong or [each for each in findings(part) if each.partition(":")[0] not in streamed]
-        if wrong:
-            raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
+        if rows:
+            # What lies along the axis is checked in the file, all of it; the rest may have come with the last part.
+            streamed = _streamed(part)
+            wrong = list(_wrong_rows(file, None, type(part), streamed))
+            wrong = wrong or [each for each in findings(part) if each.partition(":")[0] not in streamed]
+            if wrong:
+                raise ComputationError("\n".join(f"{path}: not written: {each}" for each in wrong))
         _write(file, part, rows, streamed=False)
         output.require_written()
 

@@ -14,12 +14,7 @@ import yaml
 
 BEGIN_S, END_S, EVERY = 5.0, 45.0, 10
 STIFF, DAMPED = np.array([60.0, 60.0, 1.5]), np.array([14.0, 14.0, 2.0])
-ROTOR = {
-    "position_m": "position",
-    "spin": "spin",
-    "thrust_factor_n_s2": "thrust_factor",
-    "drag_factor_n_m_s2": "drag_factor",
-}
+ROTOR = ("position_m", "spin", "thrust_factor_n_s2", "drag_factor_n_m_s2")
 NOISE = {"attitude": 0.003, "rate": 0.005, "position": 0.02, "velocity": 0.05, "speed": 1.0}
 
 
@@ -82,9 +77,12 @@ def known(study):
     """Read the numbers of a vehicle: of a study, or as `cpfls vehicle` found them."""
     if h5py.is_hdf5(study):
         with h5py.File(study) as file:
-            found = {key: file[f"vehicle/rotor/{name}"][()].tolist() for key, name in ROTOR.items()}
-            rotors = [dict(zip(found, each, strict=True)) for each in zip(*found.values(), strict=True)]
-            inertia, mass = file["vehicle/inertia"][()].tolist(), float(file["vehicle/mass"][()])
+            held = file["model/vehicle"]
+            # A table within the table of the rotors: three lines of each.
+            places = held["rotors/position_m/values"][()].reshape(-1, 3)
+            columns = [places, *(held[f"rotors/{name}"][()] for name in ROTOR[1:])]
+            rotors = [dict(zip(ROTOR, each, strict=True)) for each in zip(*(c.tolist() for c in columns), strict=True)]
+            inertia, mass = held["inertia_kg_m2"][()].tolist(), float(held["mass_kg"][()])
             return {"mass_kg": mass, "inertia_kg_m2": inertia, "rotors": rotors}
     with open(study, encoding="utf-8") as stream:
         vehicle = yaml.safe_load(stream)["vehicle"]

@@ -137,6 +137,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert "Not shown, because" not in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_path):
     """Its study is that which it was found with, so no config has to be given with it."""
     apart = ("--held-out", flights[1])

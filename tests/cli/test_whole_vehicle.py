@@ -104,12 +104,12 @@ def noisy(fly, vehicle):
     return fly("noisy.h5", vehicle, "--mode", "closed-loop", "--set", f"simulation.noise={json.dumps(NOISE)}")
 
 
-@pytest.fixture
-def sums(cpfls, config, tmp_path):
+@pytest.fixture(scope="module")
+def sums(cpfls, config, folder):
     """Play a model back along a flight: sums of the mean errors, by prediction and signal."""
 
     def call(model, flown, *options):
-        words = ("replay", config, model, flown, "-o", tmp_path / "r.h5", "--every", "5", "--force", "--json", *options)
+        words = ("replay", config, model, flown, "-o", folder / "r.h5", "--every", "5", "--force", "--json", *options)
         result = cpfls.done(*words)
         models = json.loads(result.stdout)["models"]
         return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
@@ -117,11 +117,15 @@ def sums(cpfls, config, tmp_path):
     return call
 
 
-def test_a_flown_vehicle_is_played_back_by_its_own_model(sums, vehicle, flight):
-    errors = sums(vehicle, flight)
-    rivals = np.minimum(errors["nothing-moves"], errors["rate-stays"])
-    assert (errors["model"] < 0.005 * rivals).all()
-    assert (errors["model"] < 0.005 * errors["stated"]).all()
+@pytest.fixture(scope="module")
+def own(sums, vehicle, flight):
+    """The model that flew, played back along its flight."""
+    return sums(vehicle, flight)
+
+
+def test_a_flown_vehicle_is_played_back_by_its_own_model(own):
+    assert (own["model"] < 0.005 * np.minimum(own["nothing-moves"], own["rate-stays"])).all()
+    assert (own["model"] < 0.005 * own["stated"]).all()
 
 
 def response(**changed):
@@ -141,10 +145,10 @@ WITHOUT = {
 
 
 @pytest.mark.parametrize("part", WITHOUT)
-def test_every_part_of_the_model_flies(sums, written, vehicle, flight, part):
+def test_every_part_of_the_model_flies(sums, written, own, flight, part):
     """A model that lacks a part does not play the flight back."""
     lacking = sums(written("lacking.h5", WITHOUT[part]), flight)["model"]
-    assert (lacking / sums(vehicle, flight)["model"]).max() > 4
+    assert (lacking / own["model"]).max() > 4
 
 
 def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
