@@ -121,6 +121,29 @@ def value_of(x: Value) -> Value:
     return x.value if isinstance(x, Tangent) else x
 
 
+def _lifted(function: Callable[[Value], Value], slope: Callable[[Value, Value], Value]) -> Callable[[Value], Value]:
+    """Make a function of numbers with derivatives from one without and its slope, from argument and value."""
+
+    def called(x: Value) -> Value:
+        if not isinstance(x, Tangent):
+            return function(x)
+        value = function(x.value)
+        return x.chained(value, slope(x.value, value))
+
+    return called
+
+
+def _extreme(
+    choose: Callable[[Value, Value], Value], where: Callable[[Value, Value, Value], Value], *, largest: bool
+) -> Callable[[Value, Value], Value]:
+    def called(a: Value, b: Value) -> Value:
+        if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
+            return choose(a, b)
+        return where(value_of(a) > value_of(b), *((a, b) if largest else (b, a)))
+
+    return called
+
+
 def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> Functions:
     """Make functions of numbers with derivatives, and of polynomials, from those of numbers without.
 
@@ -129,17 +152,6 @@ def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> 
     spread : callable
         ``spread(value, other)``: the value for each rotor, where it is the same for all and the other one is not.
     """
-
-    def lifted(name: str, slope: Callable[[Value, Value], Value]) -> Callable[[Value], Value]:
-        function = getattr(base, name)
-
-        def called(x: Value) -> Value:
-            if not isinstance(x, Tangent):
-                return function(x)
-            value = function(x.value)
-            return x.chained(value, slope(x.value, value))
-
-        return called
 
     def where(condition: Value, yes: Value, no: Value) -> Value:
         if isinstance(yes, Polynomial) or isinstance(no, Polynomial):
@@ -172,25 +184,17 @@ def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> 
         by = {place: base.total(spread(change, x.value)) for place, change in x.by.items()}
         return Tangent(total(x.value), by)
 
-    def extreme(name: str, first: bool) -> Callable[[Value, Value], Value]:
-        def called(a: Value, b: Value) -> Value:
-            if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
-                return getattr(base, name)(a, b)
-            return where(value_of(a) > value_of(b), *((a, b) if first else (b, a)))
-
-        return called
-
     return Functions(
-        sqrt=lifted("sqrt", lambda _, root: 0.5 / base.largest(root, _LEAST)),
-        exp=lifted("exp", lambda _, value: value),
-        sin=lifted("sin", lambda x, _: base.cos(x)),
-        cos=lifted("cos", lambda x, _: -base.sin(x)),
+        sqrt=_lifted(base.sqrt, lambda _, root: 0.5 / base.largest(root, _LEAST)),
+        exp=_lifted(base.exp, lambda _, value: value),
+        sin=_lifted(base.sin, lambda x, _: base.cos(x)),
+        cos=_lifted(base.cos, lambda x, _: -base.sin(x)),
         arctan2=arctan2,
         floor=lambda x: base.floor(value_of(x)),
-        absolute=lifted("absolute", lambda x, _: base.where(x > 0.0, 1.0, -1.0)),
+        absolute=_lifted(base.absolute, lambda x, _: base.where(x > 0.0, 1.0, -1.0)),
         where=where,
-        largest=extreme("largest", True),
-        smallest=extreme("smallest", False),
+        largest=_extreme(base.largest, where, largest=True),
+        smallest=_extreme(base.smallest, where, largest=False),
         rotors=base.rotors,
         total=total,
     )
