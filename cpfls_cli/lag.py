@@ -89,6 +89,8 @@ def best_delay(delays: Array, misfit: Array) -> tuple[Array, BoolArray]:
     """
     best = misfit.argmin(axis=0)
     inside = (best > 0) & (best < len(delays) - 1)
+    if len(delays) < 3:
+        return np.asarray(delays[best]), np.asarray(inside)
     middle = np.clip(best, 1, len(delays) - 2)
     before, least, after = (np.take_along_axis(misfit, (middle + step)[None], 0)[0] for step in (-1, 0, 1))
     bend = before - 2 * least + after
@@ -149,7 +151,7 @@ def fit_delay(
     Parameters
     ----------
     delays : array, shape (delay,)
-        Evenly spaced.
+        Evenly spaced, one or more.
     moved : callable
         Gives columns, shape (sample, axis, column), and signals, shape (sample, axis), at a delay: whichever is
         delayed.
@@ -186,7 +188,7 @@ def fit_delay(
     return DelayFit(
         delay=values[0],
         left_out=values[1:],
-        error=np.where(inside[0], error, np.hypot(error, (delays[1] - delays[0]) / np.sqrt(12))),
+        error=np.where(inside[0], error, np.hypot(error, np.diff(delays[:2]).sum() / np.sqrt(12))),
         inside=inside[0],
         unexplained=misfit[:, 0],
         coefficients=np.take_along_axis(found[..., 0], best[..., None], 0)[0],

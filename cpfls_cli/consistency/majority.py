@@ -176,9 +176,9 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
         if read is not None and opposed:
             dropped.append(_contradicted(now, *read, witnesses, opposed))
         elif read is not None and (sure or read[0].is_mistake):
-            return _told(now, *read, witnesses), ()
+            return _outvoted(now, *read, witnesses), ()
         elif read is not None and _changed_to_thrust(now, read[0], lambda before, after: _surely_less(after, before)):
-            return _told(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
+            return _outvoted(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
         # Noise on both sides can look like one contradiction, not like two.
         elif sure and read is None and len(set(witnesses)) > 1:
             return (_left_out(now, channel, witnesses),), ()
@@ -377,7 +377,7 @@ def _clock_words(now: _Compared, repair: ChannelRepair) -> list[str]:
     return [f"is {off_clock(repair.delay_s, half_s)}"] if repair.delay_s else []
 
 
-def _told(
+def _outvoted(
     now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str]
 ) -> tuple[ChannelRepair, ...]:
     channel = CHANNELS[repair.channel]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import pi
+from math import ceil, pi
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ _COMMANDS = ("body_torque", "thrust", "rotor_command")
 # Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted.
 _POOR_R2 = 0.5
 _STEP = 0.02  # Between delays that are tried, of the shortest period that the filter passes.
+_ROUNDING = 1e-9  # Share of a step between delays, and of a torque that does not change.
 _SMALLEST_WINDOW = 50  # Samples for nine numbers, and for a delay.
 _ALIASING = "the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight"
 
@@ -275,8 +276,9 @@ def estimate_delay(
     """Estimate the delay at which a rigid body explains most of the torque.
 
     Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
-    For delays of whole samples, the six inertia parameters and a constant torque about each axis are regressed on
-    one common window, each axis scaled by its own standard deviation (section 8 of the method's description).
+    For evenly spaced delays up to the longest, the six inertia parameters and a constant torque about each axis are
+    regressed on one common window, each axis scaled by its own standard deviation (section 8 of the method's
+    description).
 
     On a uniform clock, s; rate and torque, commanded or of the rotors, of shape (time, 3), rad/s and N m, body frame.
     Only the leading `share` of the samples is looked at, so that data held out for a test stay unseen.
@@ -286,8 +288,13 @@ def estimate_delay(
         raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
     period = time[1] - time[0]
     rate, torque = (low_pass(own, 1 / period, lowpass_hz, lowpass_order) for own in pair)
-    window = _window(time, delay_max_s, lowpass_hz)
+    coarse = period * max(1, int(_STEP / (lowpass_hz * period)) if lowpass_hz else 1)
+    window = _window(time, delay_max_s + coarse, lowpass_hz)
+    count = max(1, ceil(delay_max_s / coarse - _ROUNDING))
+    # One step further at both ends, so that a delay near none, or near the longest, lies between two.
+    tried = delay_max_s / count * np.arange(-1, count + 2)
     scale = torque[window].std(axis=0)
+    scale[scale <= _ROUNDING * np.abs(torque[window]).max(axis=0)] = 0.0
     if not scale.any():
         raise ComputationError("the delay cannot be estimated: the torque is constant")
     scale[scale == 0] = np.inf
@@ -297,11 +304,8 @@ def estimate_delay(
     def moved(delay: float) -> tuple[Array, Array]:
         return columns, delayed(torque, delay / period)[window] / scale
 
-    # One step less than none, so that a delay near none lies between two.
-    step = period * max(1, int(_STEP / (lowpass_hz * period)) if lowpass_hz else 1)
-    tried = step * np.arange(-1, int(delay_max_s / step + 1e-9) + 1)
     found = fit_delay(tried, moved, blocks_of_time(window.stop - window.start, period), pooled=True)
-    delay = max(float(found.delay), 0.0)
+    delay = float(np.clip(found.delay, 0.0, delay_max_s))
     own = moved(delay)[1]
     own = own - own.mean(axis=0)
     inertia = np.linalg.lstsq(columns.reshape(-1, 6), own.ravel(), rcond=None)[0]
@@ -311,21 +315,21 @@ def estimate_delay(
     r2[acting] = 1 - unexplained
     return DelayEstimate(
         delay_s=delay,
-        low_s=max(float(found.delay - found.half), 0.0),
-        high_s=float(found.delay + found.half),
+        low_s=min(max(float(found.delay - found.half), 0.0), delay),
+        high_s=max(float(found.delay + found.half), delay),
         r2=r2,
         pooled_r2=float(1 - np.prod(unexplained) ** (1 / len(unexplained))),
         inertia=inertia,
-        delays=tried[1:],
-        curve=1 - found.unexplained[1:],
-        at_bound=bool(not found.inside and delay > 0),
+        delays=tried[1:-1],
+        curve=1 - found.unexplained[1:-1],
+        at_bound=bool(found.delay >= delay_max_s),
     )
 
 
-def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
-    """Leave out the filter's transients and, at the start, the longest delay."""
+def _window(time: Array, longest_s: float, lowpass_hz: float | None) -> slice:
+    """Leave out the filter's transients and, at the start, the longest delay that is tried."""
     edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
-    first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge]).tolist()
+    first, last = np.searchsorted(time, [time[0] + longest_s + edge, time[-1] - edge]).tolist()
     if last - first < _SMALLEST_WINDOW:
         raise SettingError(
             "delay_max_s",

@@ -405,8 +405,9 @@ def _meaning(command: Guess, beside: Collection[str], parameters: Parameters, sy
         if any("pwm.m" in name for name in beside):
             said = "motor.m* of a Crazyflie that logs pwm.m* too are thrusts, before it compensates for the battery"
             return choose("thrust", said)
-        older = Rival("rotor_command_is: thrust", "of firmware of 2022, which logged what was asked for")
-        return choose("speed", "motor.m* of a Crazyflie are what the motors get", older)
+        before = "of firmware before November 2022 they are thrusts, before it compensates for the battery"
+        said = "motor.m* of a Crazyflie are what the motors get, by its firmware since November 2022"
+        return choose("speed", said, Rival("rotor_command_is: thrust", before))
     if parameters.get("THR_MDL_FAC") is not None:
         value = float(parameters["THR_MDL_FAC"])
         said = f"THR_MDL_FAC is {value:g}"

@@ -163,7 +163,7 @@ def timeline(
     found = [
         *_flights(flight, topics, recognition),
         *_stated(flight.system, topics),
-        *_told(messages),
+        *_of_messages(messages),
         *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
         *_misread(flight),
@@ -370,7 +370,7 @@ def _of_betaflight(topics: Topics) -> Iterator[Event]:
                 yield Event(time_s=at, kind="failsafe", text=text, severity="danger")
 
 
-def _told(messages: Sequence[Message]) -> Iterator[Event]:
+def _of_messages(messages: Sequence[Message]) -> Iterator[Event]:
     """Take what is worth a look: where it is said how bad it is, warnings; else all but what is said at each start."""
     for at, level, text in messages:
         if level in _LOUD or (not level and not _BANNER.match(text)):

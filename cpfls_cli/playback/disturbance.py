@@ -62,7 +62,7 @@ _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundGusts(GustRanges):
-    """Gusts in flights, and what told them from what a model lacks; white noise as of `Gusts`.
+    """Gusts in flights, and what separated them from what a model lacks; white noise as of `Gusts`.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ def find_gusts(
     given: Instruments,
     determined: Mapping[str, bool] = MappingProxyType({}),
     *,
-    told: bool = True,
+    identified: bool = True,
 ) -> FoundGusts | None:
     """Find sizes and memories of gusts in flights of a vehicle that is known.
 
@@ -182,13 +182,13 @@ def find_gusts(
     model : VehicleModel
         Its constants have to be those of the vehicle: a wrong body is answered with gusts.
     given : Instruments
-        Of flights with rotor speeds. Without any, gusts are told by what was before; where that does not tell them, all
+        Of flights with rotor speeds. Without any, gusts are identified by the past; where that does not identify them, all
         that is left is counted, and no size is known.
     determined : mapping of str to bool
         Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
         determined, and of forces where the thrust factor is not.
-    told : bool
-        Whether something told the constants too. Those of a fit may be mixed with the loop, even where torque
+    identified : bool
+        Whether something identified the constants too. Those of a fit may be mixed with the loop, even where torque
         explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
 
     Returns
@@ -204,8 +204,8 @@ def find_gusts(
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
     by_flight = [_wrench_of_parts(model, flight) for flight in given.flown]
     parts = {name: [each[name][:, :rows] for each in by_flight] for name in by_flight[0]}
-    by_past = given.kind == "none" and told
-    found = gusts_in(sides, given, "past" if by_past else given.kind if told else "none", parts)
+    by_past = given.kind == "none" and identified
+    found = gusts_in(sides, given, "past" if by_past else given.kind if identified else "none", parts)
     if found is None:
         return None
     bound = gusts_in(sides, given, "none") if by_past else None
@@ -228,18 +228,18 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     """
     period = given.flown[0].motion.period
     seen = windows(period, max(_NEW_S, FEWEST_SAMPLES * period), 1 - 1 / PER_WINDOW)
-    left, told = [], []
+    left, signals_seen = [], []
     for flight, own in zip(given.flown, sides, strict=True):
         motion = flight.motion
         moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if len(found.size) > 3 else [])]
         signals = np.hstack([flight.speed**2, *moves])
         for own_part in (each for each in flight.stretches if seen.count(each.stop - each.start)):
             left.append(seen.derivative(own[own_part, 0]) - seen.average(own[own_part, 1]))
-            told.append(seen.average(signals[own_part]))
+            signals_seen.append(seen.average(signals[own_part]))
     if not left:
         return bound
-    moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
-    new = residual_innovations(seen, left, told, moving, found.noise)
+    moving = np.arange(signals_seen[0].shape[1]) >= given.flown[0].speed.shape[1]
+    new = residual_innovations(seen, left, signals_seen, moving, found.noise)
     predicted, without = new.shares
     little = predicted + half_width(jackknife_error(without), len(without)) < MOST_PREDICTED
     gusty = np.isfinite(found.size) & little & ~new.grows(_RARE)
@@ -296,7 +296,7 @@ def gusts_in(
     if len(powers.pieces) < ENOUGH_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
-    # Runs of a path are compared with each other, so what they tell of a gust is told several times.
+    # Runs of a path are compared with each other, so a gust counts several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if instrument_kind == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if instrument_kind == "none" else axis.found(shared) for axis in axes])
@@ -396,21 +396,21 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     asked = np.concatenate(
         [band.laid(given.flown[number], np.asarray(given.setpoints[number]), band.weight) for number in numbers]
     )
-    told = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
-    told = told / np.maximum(np.sqrt((np.abs(told) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+    instrument = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
+    instrument = instrument / np.maximum(np.sqrt((np.abs(instrument) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
     own = np.concatenate([left[number] for number in numbers])
     expected, part = np.zeros_like(own), contiguous(len(own), FOLDS)
     parts = [part == fold for fold in range(FOLDS)]
     for axis in range(own.shape[1]):
         power = (np.abs(own[:, axis]) ** 2).mean(axis=0)
         # Of an axis that a flight does not know all is 0, and so is what is expected.
-        weighed = np.conj(told) / np.where(power > 0, power, 1.0)[:, None]
-        ztz = np.array([np.einsum("pfc,pfd->cd", weighed[at], told[at], optimize=True).real for at in parts])
+        weighed = np.conj(instrument) / np.where(power > 0, power, 1.0)[:, None]
+        ztz = np.array([np.einsum("pfc,pfd->cd", weighed[at], instrument[at], optimize=True).real for at in parts])
         ztx = np.array([np.einsum("pfc,pf->c", weighed[at], own[at, axis]).real for at in parts])[..., None]
         size = np.trace(ztz, axis1=1, axis2=2)
         ridge = _RIDGE * (size.sum() - size) / ztz.shape[1]
         for at, fit in zip(parts, fits_of_others(ztz, ztx, ridge[:, None, None]), strict=True):
-            expected[at, axis] = told[at] @ fit[:, 0]
+            expected[at, axis] = instrument[at] @ fit[:, 0]
     ends = np.cumsum([len(left[number]) for number in numbers])[:-1]
     found = dict(zip(numbers, np.split(expected, ends), strict=True))
     return [found.get(number, np.nan * own) for number, own in enumerate(left)]

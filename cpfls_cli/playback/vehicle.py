@@ -166,7 +166,7 @@ def find_vehicle(
     gusts: FoundGusts | None = None
     if forecast is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
-        gusts = find_gusts(model, given, determined, told=forecast is not None)
+        gusts = find_gusts(model, given, determined, identified=forecast is not None)
     shares, airspeed = _shares(model, own)
     used = None if forecast is None or constants is None else constants.used
     past = choice.complete and settings.history_s and not settings.quick
@@ -362,8 +362,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else True
-        told = known and (number.name in carries or not loop.unexplained)
-        yield number._replace(low=ends[0], high=ends[1], determined=number.determined and told)
+        identified = known and (number.name in carries or not loop.unexplained)
+        yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
 
 
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

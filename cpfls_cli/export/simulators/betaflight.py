@@ -50,7 +50,7 @@ def betaflight_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str
     """Write the mixer of a vehicle, with what it does not hold."""
     lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", *_USE])]
     mixers = [
-        f"mmix {motor} {' '.join(f'{share:.6f}' for share in shares)}"
+        f"mmix {motor} {' '.join(f'{round(share, 6) + 0.0:.6f}' for share in shares)}"
         for motor, shares in enumerate(_mixer(held).tolist())
     ]
     return "\n".join([*lines, "mixer CUSTOM", "mmix reset", *mixers, "save", ""])

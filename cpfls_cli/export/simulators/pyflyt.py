@@ -58,8 +58,8 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
 
 def _order(vehicle: VehicleSettings) -> IntArray:
     """Give the rotor of the config that is each motor: counter-clockwise ones first, of each way the one in front."""
-    behind = np.array([-rotor.position_m[0] for rotor in vehicle.rotors])
-    return np.lexsort(np.array([behind, spins(vehicle)]))
+    forward, left, _ = np.round([rotor.position_m for rotor in vehicle.rotors], 4).T
+    return np.lexsort(np.array([-left, -forward, spins(vehicle)]))
 
 
 def pyflyt_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:

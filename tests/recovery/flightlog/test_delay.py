@@ -100,3 +100,19 @@ def test_a_constant_torque_and_a_short_flight_are_refused():
     with pytest.raises(SettingError, match="at least 50 are needed") as caught:
         estimate_delay(time[:60], rate[:60], torque[:60])
     assert caught.value.key == "delay_max_s"
+
+
+@pytest.mark.parametrize(("delay", "longest"), [(-0.003, 0.2), (0.034, 0.035), (0.03, 0.005)])
+def test_the_interval_holds_the_delay_that_is_taken_out(delay, longest):
+    """Of motion ahead of its torque none is taken out, and one near the longest, or beyond it, is tried up to there."""
+    estimate = estimate_delay(*delayed_signals(delay, noise=0.1), delay_max_s=longest, lowpass_hz=8.0)
+    assert estimate.low_s <= estimate.delay_s <= estimate.high_s
+    assert estimate.delays[-1] == pytest.approx(longest)
+    assert estimate.delay_s == pytest.approx(np.clip(delay, 0.0, longest), abs=1e-3)
+    assert estimate.at_bound is (delay >= longest)
+
+
+def test_a_torque_that_does_not_change_says_nothing_of_the_delay():
+    time, rate, torque = delayed_signals(0.034, noise=0.1)
+    torque[:, 2] = 0.1
+    assert estimate_delay(time, rate, torque, lowpass_hz=8.0).delay_s == pytest.approx(0.034, abs=1e-3)

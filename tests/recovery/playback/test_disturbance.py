@@ -124,7 +124,7 @@ def test_without_instruments_what_was_before_tells_them(flights):
     assert found.lack is None
     assert told.lack is not None
     # Nor are they asked where nothing told the body.
-    bound = find_gusts(model, known, told=False)
+    bound = find_gusts(model, known, identified=False)
     assert bound.instrument_kind == "none"
     assert bound.gusts is None
     assert (bound.high[:3] > found.size[:3]).all()

@@ -243,7 +243,7 @@ PWM = [f"pwm.m{motor}_pwm" for motor in range(1, 5)]
 
 @pytest.mark.parametrize(("beside", "meant"), [((), "speed"), (PWM, "thrust")])
 def test_commands_of_a_crazyflie_are_what_its_motors_get_unless_it_logs_these_too(own, beside, meant):
-    """Its firmware of 2022 alone logs what was asked for, with the PWM in columns of their own."""
+    """Its firmware before November 2022 logs what was asked for, and the PWM in columns of their own."""
     commands, rate = 65.536 * own.speed, np.degrees(own.rate)
     columns = named(commands, *(f"motor.m{motor}" for motor in range(1, 5)))
     columns |= named(1.1 * commands, *beside) if beside else {}
