@@ -84,7 +84,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     assert constants.identified, "instruments identify the body of these flights"
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
-    gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
+    gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, identified=True)
     if gusts is not None:
         print(f"  repeatable share of the residual, by axis: {np.round(gusts.predicted, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts

@@ -182,8 +182,8 @@ def find_gusts(
     model : VehicleModel
         Its constants have to be those of the vehicle: a wrong body is answered with gusts.
     given : Instruments
-        Of flights with rotor speeds. Without any, gusts are identified by the past; where that does not identify them, all
-        that is left is counted, and no size is known.
+        Of flights with rotor speeds. Without any, gusts are identified by the past; where that does not identify them,
+        all that is left is counted, and no size is known.
     determined : mapping of str to bool
         Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
         determined, and of forces where the thrust factor is not.
