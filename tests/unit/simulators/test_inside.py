@@ -196,8 +196,8 @@ def test_limits_of_controls_hold(tmp_path, flight):
 def test_limits_hold_where_filters_begin(tmp_path, commanded):
     """A file whose controls are far out of its limits flies as one whose speeds are at the limit."""
     require("xml")
-    filtered = '<general dyntype="filterexact" dynprm="0.1" ctrllimited="true" ctrlrange="0 {}"'
-    lowest = commanded.speed.min() * 0.9
+    filtered = '<general dyntype="filterexact" dynprm="0.1" ctrllimited="true" ctrlrange="{} 1e9"'
+    lowest = commanded.speed.max() * 1.1
     text = mjcf_of(TRUE, SPINS).replace("<motor", filtered.format(lowest**2))
     limited = flown(given(tmp_path, "xml", text), commanded, lags=True)[1]
     held = replace(commanded, speed=np.full_like(commanded.speed, lowest))
@@ -209,10 +209,10 @@ def test_limits_hold_where_filters_begin(tmp_path, commanded):
 def test_limits_of_speeds_hold(tmp_path, commanded, lags):
     """Of a state that is given, too, which RotorPy limits after each step alone."""
     require("py")
-    top = commanded.speed.min() * 0.9
-    text = re.sub(r"('rotor_speed_max': *)[^,]*", rf"\g<1>{top}", rotorpy_of(TRUE))
+    lowest = commanded.speed.max() * 1.1
+    text = re.sub(r"('rotor_speed_min': *)[^,]*", rf"\g<1>{lowest}", rotorpy_of(TRUE))
     limited = flown(given(tmp_path, "py", text), commanded, lags=lags)[1]
-    held = replace(commanded, speed=np.full_like(commanded.speed, top))
+    held = replace(commanded, speed=np.full_like(commanded.speed, lowest))
     free = flown(given(tmp_path, "py"), held, lags=lags)[1]
     np.testing.assert_allclose(limited, free, atol=1e-9)
 
@@ -369,7 +369,7 @@ def test_why_a_file_is_not_flown(tmp_path, held, monkeypatch):
     oldest = inside.SIMULATORS["mjcf"]
     with monkeypatch.context() as own:
         own.setitem(inside.SIMULATORS, "mjcf", oldest._replace(flies=lambda *_: lambda *_: [][0]))
-        assert why({})[1:] == ("the file as given could not be flown: IndexError: list index out of range", True)
+        assert why({})[1:] == ("the file as corrected could not be flown: IndexError: list index out of range", True)
         own.setitem(inside.SIMULATORS, "mjcf", oldest._replace(flies=lambda *_: {}["control"]))
         assert why({})[1:] == ("v.xml could not be flown: KeyError: 'control'", True)
     with monkeypatch.context() as own:
