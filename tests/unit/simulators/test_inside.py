@@ -21,6 +21,7 @@ from cpfls_cli.export.registry import exported
 from cpfls_cli.export.simulators.urdf import order_of
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.page import TEMPLATES, environment
 from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.motion import State
@@ -28,6 +29,7 @@ from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators import in_pybullet, inside
 from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.results import Corrected, InSimulator
 from cpfls_cli.simulators.study import of_log, played, vehicle_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.exported_vehicles import sheet_of_vehicle
@@ -390,3 +392,15 @@ def test_why_a_file_is_not_flown(tmp_path, held, monkeypatch):
         assert why({}) == missing
     (tmp_path / "v.sdf").write_text(sdf_of(TRUE))
     assert both(of_log(read_model(tmp_path / "v.sdf"), None, None), held, {})[1] is None
+
+
+@pytest.mark.parametrize("refused", [True, False])
+def test_what_a_simulator_refuses_is_part_of_the_answer(refused):
+    """And that it is not installed is in the details alone."""
+    why = InSimulator(program="MuJoCo 4.0.0", why_not="it refuses v.xml as given: no", refused=refused, flown=None)
+    said = Corrected(files=("v.xml",), changes=(), unchanged=(), elsewhere=(), diff="", in_simulator=why)
+    page = environment(TEMPLATES, {}).get_template("corrected.md.j2").render(r={"corrected": said})
+    answer, details = page.split(":::", 1)
+    line = "- **In MuJoCo 4.0.0**: Not flown: it refuses v.xml as given: no."
+    assert (line in answer) == refused
+    assert ("Not flown in MuJoCo" in details) == (not refused)
