@@ -15,8 +15,8 @@ from cpfls_cli.playback.motion import FASTEST, MeasuredMotion, State
 from cpfls_cli.playback.player import less_measured
 from cpfls_cli.playback.rotors import RotorResponse
 
-_ROUNDING = 1e-9
-"""Share of a step."""
+_CLOCKS = 1e-3
+"""Share of a sampling period by which the clock of a log is off at most."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Course:
         steps = self.finer * self.starts[:, None] + np.arange(self.horizon * self.finer)
         return np.asarray(mean[steps])
 
-    def lagged(self, response: RotorResponse, power: int = 1) -> Array:
-        """Give the speeds, or their squares, at which rotors that lag turn at the starts, shape (run, rotor)."""
+    def lagged(self, response: RotorResponse) -> Array:
+        """Give the speeds at which rotors that lag turn at the starts, shape (run, rotor)."""
         flight = self.finer_flight
         parts = [
-            response.terms_at_samples(flight.speed[part] ** power, flight.motion.period, flight.hold)
+            response.terms_at_samples(flight.speed[part], flight.motion.period, flight.hold)
             for part in flight.stretches
         ]
         return np.concatenate(parts)[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]]
@@ -80,8 +80,8 @@ class Course:
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
 
     def steps(self, longest_s: float) -> int:
-        """Count the equal steps in a step of the course, none of them longer than this but for rounding."""
-        return max(1, ceil(self.period / longest_s - _ROUNDING))
+        """Count the equal steps in a step of the course, none of them longer than this but by errors of clocks."""
+        return max(1, ceil((1.0 - _CLOCKS) * self.period / longest_s))
 
     def collected(self, runs: Iterable[Iterable[State]]) -> State:
         """Collect what runs pass through after each step; see `Flies`."""

@@ -6,6 +6,7 @@ Contact is left out, for a log does not say where the ground of the file is.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,9 +26,12 @@ class Controls(NamedTuple):
     power: IntArray
     factor: Array
 
-    def of(self, speed: Array) -> Array:
-        """Give the controls for speeds of the rotors, shape (..., actuator)."""
-        return np.asarray(self.factor * speed[..., self.rotor] ** self.power)
+    def of(self, speed: Array, model: Any) -> Array:
+        """Give the controls for speeds of the rotors within the limits of a model, shape (..., actuator)."""
+        asked = np.asarray(self.factor * speed[..., self.rotor] ** self.power)
+        limited = model.actuator_ctrllimited.astype(bool)
+        asked[..., limited] = np.clip(asked[..., limited], *model.actuator_ctrlrange[limited].T)
+        return asked
 
 
 def compiled(file: Path, folder: Path) -> Any:
@@ -46,19 +50,15 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
     """
     import mujoco
 
-    off = mujoco.mjtDisableBit
-    model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_AUTORESET)
-    steps = course.steps(model.opt.timestep)
-    model.opt.timestep = course.period / steps
+    off, stated, flags = mujoco.mjtDisableBit, model.opt.timestep, model.opt.disableflags
+    steps = course.steps(stated)
     data, body, start = mujoco.MjData(model), _Body.of(model), course.start
-    asked, limited = controls.of(course.commands), model.actuator_ctrllimited.astype(bool)
-    asked[..., limited] = np.clip(asked[..., limited], *model.actuator_ctrlrange[limited].T)
-    filtered = np.flatnonzero(model.actuator_actadr >= 0).tolist()
+    asked, filtered = controls.of(course.commands, model), np.flatnonzero(model.actuator_actadr >= 0).tolist()
     begun = asked[:, 0, filtered]
+    controlled = replace(course, flight=replace(course.flight, speed=controls.of(course.flight.speed, model)))
     for column, own in enumerate(filtered if lags else ()):
         lagging = RotorResponse(lag_s=float(model.actuator_dynprm[own, 0]))
-        power, rotor = int(controls.power[own]), controls.rotor[own]
-        begun[:, column] = controls.factor[own] * course.lagged(lagging, power)[:, rotor]
+        begun[:, column] = controlled.lagged(lagging)[:, own]
 
     def along(run: int) -> Iterator[State]:
         mujoco.mj_resetData(model, data)
@@ -73,8 +73,12 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
     # MuJoCo writes a file into the working folder of a run that ran away.
     mujoco.set_mju_user_warning(lambda _: None)
     try:
+        model.opt.disableflags = flags | int(off.mjDSBL_CONTACT) | int(off.mjDSBL_AUTORESET)
+        model.opt.timestep = course.period / steps
         return course.collected(map(along, range(len(asked))))
     finally:
+        # The next flight may have another rate.
+        model.opt.timestep, model.opt.disableflags = stated, flags
         mujoco.set_mju_user_warning(None)
 
 

@@ -48,13 +48,15 @@ def fly_pybullet(text: bytes, model: SimulatorModel, course: Course, damping: fl
     damping : float or None
         Of all motion; None for PyBullet's own, which gym-pybullet-drones leaves as it is.
     """
-    with _silent(), TemporaryDirectory() as folder:
+    with _silent():
         import pybullet as bullet
 
-        client, file = bullet.connect(bullet.DIRECT), Path(folder, "vehicle.urdf")
-        file.write_bytes(text)
-        body = bullet.loadURDF(str(file), flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
+        client = bullet.connect(bullet.DIRECT)
     try:
+        with _silent(), TemporaryDirectory() as folder:
+            file = Path(folder, "vehicle.urdf")
+            file.write_bytes(text)
+            body = bullet.loadURDF(str(file), flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
         bullet.setGravity(0, 0, -GRAVITY, client)
         if damping is not None:
             bullet.changeDynamics(body, -1, linearDamping=damping, angularDamping=damping, physicsClientId=client)
@@ -133,14 +135,17 @@ def _silent() -> Iterator[None]:
     """Keep what a library prints by itself, past Python, from where answers are read."""
     sys.stdout.flush()
     sys.stderr.flush()
-    kept = [os.dup(number) for number in (1, 2)]
+    flush = ctypes.CDLL(None).fflush
     with open(os.devnull, "wb") as nowhere:
-        for number in (1, 2):
-            os.dup2(nowhere.fileno(), number)
-    try:
-        yield
-    finally:
-        ctypes.CDLL(None).fflush(None)
-        for number, own in zip((1, 2), kept, strict=True):
-            os.dup2(own, number)
-            os.close(own)
+        kept = [os.dup(number) for number in (1, 2)]
+        try:
+            for number in (1, 2):
+                os.dup2(nowhere.fileno(), number)
+            try:
+                yield
+            finally:
+                flush(None)
+        finally:
+            for number, own in zip((1, 2), kept, strict=True):
+                os.dup2(own, number)
+                os.close(own)

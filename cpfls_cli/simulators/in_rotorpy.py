@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,11 @@ def fly_rotorpy(parameters: dict[str, Any], course: Course, *, lags: bool, **int
     from rotorpy.vehicles.multirotor import Multirotor
     from scipy.spatial.transform import Rotation
 
-    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=integrator or None)
+    more = {"integrator_kwargs": integrator} if integrator else {}
+    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", **more)
+    # It limits commands, and not the speeds of a state that it is given.
+    limited = np.clip(course.flight.speed, flown.rotor_speed_min, flown.rotor_speed_max)
+    course = replace(course, flight=replace(course.flight, speed=limited))
     begun, start, commands = course.lagged(RotorResponse(lag_s=parameters["tau_m"])), course.start, course.commands
 
     def along(run: int) -> Iterator[State]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,21 +31,18 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
 
-def _mujoco(file: Path, of: VehicleOf, thrusts: Array) -> Flies:
-    folder = of.model.file.parent
+def _mujoco(own: Any, given: Any, of: VehicleOf, thrusts: Array) -> Flies:
     # Controls are those that fit the file as given.
-    controls = controls_of(compiled(of.model.file, folder), of.model, thrusts)
-    made = compiled(file, folder)
-    return lambda course, lags: fly_mujoco(made, course, controls, lags=lags)
+    controls = controls_of(given, of.model, thrusts)
+    return lambda course, lags: fly_mujoco(own, course, controls, lags=lags)
 
 
-def _rotorpy(file: Path, of: VehicleOf, _thrusts: Array) -> Flies:
-    parameters = quad_params(file, of.model)
-    return lambda course, lags: fly_rotorpy(parameters, course, lags=lags)
+def _rotorpy(own: Any, _given: Any, _of: VehicleOf, _thrusts: Array) -> Flies:
+    return lambda course, lags: fly_rotorpy(own, course, lags=lags)
 
 
-def _pybullet(file: Path, _of: VehicleOf, _thrusts: Array) -> Flies:
-    text, model = without_shapes(file.read_bytes()), as_stated(file)
+def _pybullet(own: Any, _given: Any, _of: VehicleOf, _thrusts: Array) -> Flies:
+    text, model = own
     return lambda course, _lags: fly_pybullet(text, model, course)
 
 
@@ -51,29 +51,68 @@ class Simulator(NamedTuple):
 
     Attributes
     ----------
+    oldest : str
+        The oldest version that flies as documented.
     install : str
         What installs it.
     samples : int
         How many samples are flown at most by each of the two files, which takes up to ten seconds.
-    loaded : callable
-        From a file as given or corrected, the vehicle and thrusts over squared speeds of its rotors, shape (rotor,).
+    load : callable
+        Load a file as given or corrected.
+    flies : callable
+        From what was loaded of a file and of the file as given, the vehicle and thrusts over squared speeds of its
+        rotors, shape (rotor,).
     """
 
     name: str
     package: str
+    oldest: str
     install: str
     samples: int
-    loaded: Callable[[Path, VehicleOf, Array], Flies]
+    load: Callable[[Path, VehicleOf], Any]
+    flies: Callable[[Any, Any, VehicleOf, Array], Flies]
 
 
 _EXTRA = install_command("simulators")
 SIMULATORS = {
-    "mjcf": Simulator("MuJoCo", "mujoco", _EXTRA, 100_000, _mujoco),
-    "rotorpy": Simulator("RotorPy", "rotorpy", _EXTRA, 2_500, _rotorpy),
+    "mjcf": Simulator(
+        *("MuJoCo", "mujoco", "3.2.7", _EXTRA, 100_000),
+        lambda file, of: compiled(file, of.model.file.parent),
+        _mujoco,
+    ),
+    "rotorpy": Simulator(
+        *("RotorPy", "rotorpy", "3.0", _EXTRA, 2_500), lambda file, of: quad_params(file, of.model), _rotorpy
+    ),
     # It is compiled where there is no wheel for this Python, so that the extra leaves it out there.
-    "urdf": Simulator("PyBullet", "pybullet", "pip install pybullet", 50_000, _pybullet),
+    "urdf": Simulator(
+        *("PyBullet", "pybullet", "3.2.6", "pip install pybullet", 50_000),
+        lambda file, _of: (without_shapes(file.read_bytes()), as_stated(file)),
+        _pybullet,
+    ),
 }
 """By the format of the file."""
+
+_WHICH = {STATED: "as given", MODEL: "as corrected"}
+
+
+class _NotFlownError(Exception):
+    """Why a file was not flown, as one sentence."""
+
+
+@contextmanager
+def _why_not(sentence: str, *, typed: bool = True) -> Iterator[None]:
+    """Put an error, maybe with its type, behind the begin of a sentence, which is kept if there is one already.
+
+    Errors are of another package, whose types are its own.
+    """
+    try:
+        yield
+    except _NotFlownError:
+        raise
+    except Exception as error:
+        name = type(error).__name__
+        text = visible(" ".join(str(error).split()).rstrip("."))
+        raise _NotFlownError(f"{sentence}: {f'{name}: ' if typed and text else ''}{text or name}") from error
 
 
 @dataclass(frozen=True)
@@ -99,7 +138,8 @@ class _Flown(PlayedPair):
         if prediction not in self.flies:
             return super().runs(prediction, starts, horizon)
         course = Course(replace(self.flight, speed=self.flight.speed[:, self.rotors]), starts, horizon)
-        return runs_of(course, self.flies[prediction](course, self.lags))
+        with _why_not(f"the file {_WHICH[prediction]} could not be flown"):
+            return runs_of(course, self.flies[prediction](course, self.lags))
 
 
 def runs_of(course: Course, states: State) -> Runs:
@@ -139,27 +179,49 @@ def in_simulator(
     known = SIMULATORS.get(of.model.format)
     if known is None:
         return None
-    why = ""
-    if find_spec(known.package) is None:
+    why, spec, has = "", find_spec(known.package), _version(known.package)
+    # A folder of this name without code is no package.
+    if spec is None or spec.origin is None:
         why = f"its package is not installed; {known.install} does"
+    elif has and _numbers(has) < _numbers(known.oldest):
+        why = f"{known.name} {has} is too old; it needs {known.oldest} or later: pip install -U {known.package}"
     elif not of.order:
         why = f"{of.model.file.name} states no rotors"
     elif any(recording.signals.rotor_speed is None for recording in held):
         why = "the flights have no rotor speeds"
     if why:
-        return InSimulator(program=known.name, why_not=why, flown=None)
-    program = f"{known.name} {version(known.package)}"
+        return InSimulator(program=known.name, why_not=why, refused=False, flown=None)
+    program = f"{known.name} {has}".strip()
     rotors = np.argsort(of.order)
     thrusts = np.array([stated.rotors[place].thrust_factor_n_s2 for place in rotors])
+    name = of.model.file.name
     try:
-        with corrected_files(of.model, texts) as after:
-            flies = {STATED: known.loaded(of.model.file, of, thrusts), MODEL: known.loaded(after, of, thrusts)}
-        flown = [
-            _Flown(**vars(pair), flies=flies, rotors=rotors, lags=recording.signals.commanded)
-            for pair, recording in zip(pairs, held, strict=True)
-        ]
-        replayed = errors_by_horizon(flown, horizon_s, known.samples)
-    except Exception as error:  # Of another package, whose kinds of errors are its own; the answer does not hang on it.
-        lines = str(error).splitlines() or [type(error).__name__]
-        return InSimulator(program=program, why_not=f"it refuses {of.model.file.name}: {visible(lines[0])}", flown=None)
-    return InSimulator(program=program, why_not="", flown=PlaybackChange.of_pairs(flown, replayed))
+        with _why_not(f"{name} could not be flown"):
+            import_module(known.package)
+            with corrected_files(of.model, texts) as after:
+                loaded = {}
+                for prediction, file in ((STATED, of.model.file), (MODEL, after)):
+                    with _why_not(f"it refuses {name} {_WHICH[prediction]}", typed=False):
+                        loaded[prediction] = known.load(file, of)
+            flies = {which: known.flies(own, loaded[STATED], of, thrusts) for which, own in loaded.items()}
+            flown = [
+                _Flown(**vars(pair), flies=flies, rotors=rotors, lags=recording.signals.commanded)
+                for pair, recording in zip(pairs, held, strict=True)
+            ]
+            replayed = errors_by_horizon(flown, horizon_s, known.samples)
+            change = PlaybackChange.of_pairs(flown, replayed)
+    except _NotFlownError as error:
+        return InSimulator(program=program, why_not=str(error), refused=True, flown=None)
+    return InSimulator(program=program, why_not="", refused=False, flown=change)
+
+
+def _version(package: str) -> str:
+    """Give the version of a package; empty where it was put on the path without being installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _numbers(version: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d+", version)[:3]]

@@ -26,6 +26,7 @@ class InSimulator:
 
     program: str = about("the simulator, with its version where it is installed")
     why_not: str = about("why they were not flown there; empty where they were")
+    refused: bool = about("whether the simulator is installed and failed to load or fly a file")
     flown: PlaybackChange | None = part()
 
 

@@ -6,8 +6,11 @@ and PyBullet steps of first order, whose error halves with them.
 """
 
 import re
+import tomllib
 from dataclasses import replace
 from functools import partial
+from importlib.machinery import ModuleSpec
+from importlib.metadata import PackageNotFoundError
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,6 +21,7 @@ from cpfls_cli.export.registry import exported
 from cpfls_cli.export.simulators.urdf import order_of
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.page import TEMPLATES, environment
 from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.motion import State
@@ -25,6 +29,7 @@ from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators import in_pybullet, inside
 from cpfls_cli.simulators.formats import read_model
+from cpfls_cli.simulators.results import Corrected, InSimulator
 from cpfls_cli.simulators.study import of_log, played, vehicle_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.exported_vehicles import sheet_of_vehicle
@@ -72,13 +77,19 @@ def starts(flight):
     return np.arange(0, len(flight) - HORIZON, 50)
 
 
+def flies_of(of, thrusts):
+    known = inside.SIMULATORS[of.model.format]
+    loaded = known.load(of.model.file, of)
+    return known.flies(loaded, loaded, of, thrusts)
+
+
 def flown(of, flight, lags=False):
     """Errors of the playback and of the simulator, shape (run, horizon, 4, 3)."""
     model = vehicle_of(of, of, TRUE.vehicle)
     model = model if lags else replace(model, response=RotorResponse())
     course = Course(flight, starts(flight), HORIZON)
     own = free_runs(player_of(model, flight), flight, course.starts, HORIZON).errors
-    flies = inside.SIMULATORS[of.model.format].loaded(of.model.file, of, np.full(4, TRUE.thrust_factor))
+    flies = flies_of(of, np.full(4, TRUE.thrust_factor))
     turned = replace(course, flight=replace(flight, speed=flight.speed[:, np.argsort(of.order)]))
     return own, inside.runs_of(turned, flies(turned, lags)).errors
 
@@ -184,6 +195,53 @@ def test_limits_of_controls_hold(tmp_path, flight):
     assert apart(free, limited)[3] > 0.05
 
 
+def test_limits_hold_where_filters_begin(tmp_path, commanded):
+    """A file whose controls are far out of its limits flies as one whose speeds are at the limit."""
+    require("xml")
+    filtered = '<general dyntype="filterexact" dynprm="0.1" ctrllimited="true" ctrlrange="{} 1e9"'
+    lowest = commanded.speed.max() * 1.1
+    text = mjcf_of(TRUE, SPINS).replace("<motor", filtered.format(lowest**2))
+    limited = flown(given(tmp_path, "xml", text), commanded, lags=True)[1]
+    held = replace(commanded, speed=np.full_like(commanded.speed, lowest))
+    free = flown(given(tmp_path, "xml", text.replace('"true"', '"false"')), held, lags=True)[1]
+    np.testing.assert_allclose(limited, free, atol=1e-9)
+
+
+@pytest.mark.parametrize("lags", [False, True])
+def test_limits_of_speeds_hold(tmp_path, commanded, lags):
+    """Of a state that is given, too, which RotorPy limits after each step alone."""
+    require("py")
+    lowest = commanded.speed.max() * 1.1
+    text = re.sub(r"('rotor_speed_min': *)[^,]*", rf"\g<1>{lowest}", rotorpy_of(TRUE))
+    limited = flown(given(tmp_path, "py", text), commanded, lags=lags)[1]
+    held = replace(commanded, speed=np.full_like(commanded.speed, lowest))
+    free = flown(given(tmp_path, "py"), held, lags=lags)[1]
+    np.testing.assert_allclose(limited, free, atol=1e-9)
+
+
+def test_a_second_flight_has_the_steps_of_the_file(tmp_path, flight):
+    """Flights of other rates before it leave no step behind."""
+    require("xml")
+    flies = flies_of(given(tmp_path, "xml", mjcf_of(TRUE, SPINS, step=0.008)), np.ones(4))
+    course = Course(flight, starts(flight), 4)
+    first = flies(course, False).rate
+    flies(replace(course, flight=flight, finer=4), False)
+    np.testing.assert_array_equal(flies(course, False).rate, first)
+
+
+def test_steps_are_those_of_a_clock_that_is_a_little_off(flight):
+    course = Course(flight, np.array([0]), 1)
+    period = course.period
+    assert [course.steps(period / 5 * (1 + off)) for off in (-5e-4, 5e-4, -5e-3)] == [5, 5, 6]
+    assert course.steps(2 * period) == 1
+
+
+def test_versions_asked_for_are_those_of_the_extra():
+    extras = tomllib.loads(Path("pyproject.toml").read_text())["project"]["optional-dependencies"]
+    asked = {line.split(";")[0] for line in extras["simulators"]}
+    assert asked >= {f"{own.package}>={own.oldest}" for own in inside.SIMULATORS.values()}
+
+
 def test_what_an_export_says_of_controls_holds(tmp_path, flight):
     """All actuators, and rotors in the order of the log."""
     require("xml")
@@ -258,7 +316,7 @@ def test_what_runs_away_in_mujoco_writes_nothing(tmp_path, flight, monkeypatch, 
     require("xml")
     monkeypatch.chdir(tmp_path)
     of = given(tmp_path, "xml", mjcf_of(TRUE, SPINS, thrust=1e12))
-    flies = inside.SIMULATORS["mjcf"].loaded(of.model.file, of, np.ones(4))
+    flies = flies_of(of, np.ones(4))
     course = Course(flight, np.array([3, 40]), 4)
     assert (inside.runs_of(course, flies(course, False)).diverged >= 0).all()
     assert [path.name for path in tmp_path.iterdir()] == ["v.xml"]
@@ -278,6 +336,15 @@ def test_pybullet_prints_nothing(tmp_path, flight, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_pybullet_leaves_no_client_of_a_refused_file(flight):
+    require("urdf")
+    import pybullet
+
+    with pytest.raises(pybullet.error):
+        in_pybullet.fly_pybullet(b"<robot/>", None, Course(flight, np.array([0]), 1))
+    assert not pybullet.isConnected(0)
+
+
 def test_why_a_file_is_not_flown(tmp_path, held, monkeypatch):
     require("xml")
     body = """<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="0.045"
@@ -286,10 +353,54 @@ def test_why_a_file_is_not_flown(tmp_path, held, monkeypatch):
     assert both(without, held, {})[1].why_not == "v.xml states no rotors"
     of = given(tmp_path, "xml", mjcf_of(TRUE, SPINS).replace("<body ", '<body colour="red" '))
     _, refused = both(of, held, {})
-    assert refused.why_not.startswith("it refuses v.xml: ")
+    # All lines of it: the element is named in the last one.
+    assert refused.why_not.startswith("it refuses v.xml as given: XML Error: ")
     assert "colour" in refused.why_not
+    assert "Element 'body', line" in refused.why_not
     assert refused.flown is None
-    monkeypatch.setattr(inside, "find_spec", lambda _: None)
-    assert both(of, held, {})[1].why_not == 'its package is not installed; pip install "cpfls[simulators]" does'
+    assert refused.refused
+    right = given(tmp_path, "xml", mjcf_of(TRUE, SPINS))
+    pairs = played(right, {}, TRUE.vehicle, held, held, GapSettings(horizon_s=0.3))
+
+    def why(texts):
+        found = inside.in_simulator(right, texts, TRUE.vehicle, held, pairs, 0.3)
+        return found.program, found.why_not, found.refused
+
+    broken = mjcf_of(TRUE, SPINS).replace("<body ", '<body colour="red" ').encode()
+    assert why({"v.xml": broken})[1].startswith("it refuses v.xml as corrected: XML Error: ")
+    oldest = inside.SIMULATORS["mjcf"]
+    with monkeypatch.context() as own:
+        own.setitem(inside.SIMULATORS, "mjcf", oldest._replace(flies=lambda *_: lambda *_: [][0]))
+        assert why({})[1:] == ("the file as corrected could not be flown: IndexError: list index out of range", True)
+        own.setitem(inside.SIMULATORS, "mjcf", oldest._replace(flies=lambda *_: {}["control"]))
+        assert why({})[1:] == ("v.xml could not be flown: KeyError: 'control'", True)
+    with monkeypatch.context() as own:
+        own.setattr(inside, "version", lambda _: "3.2.6")
+        sentence = "MuJoCo 3.2.6 is too old; it needs 3.2.7 or later: pip install -U mujoco"
+        assert why({}) == ("MuJoCo", sentence, False)
+        own.setattr(inside, "version", lambda _: "3.10.0")
+        assert why({}) == ("MuJoCo 3.10.0", "", False)
+
+        def lost(package):
+            raise PackageNotFoundError(package)
+
+        own.setattr(inside, "version", lost)
+        assert why({}) == ("MuJoCo", "", False)
+    missing = ("MuJoCo", 'its package is not installed; pip install "cpfls[simulators]" does', False)
+    for spec in (None, ModuleSpec("mujoco", None, is_package=True)):
+        monkeypatch.setattr(inside, "find_spec", lambda _, spec=spec: spec)
+        assert why({}) == missing
     (tmp_path / "v.sdf").write_text(sdf_of(TRUE))
     assert both(of_log(read_model(tmp_path / "v.sdf"), None, None), held, {})[1] is None
+
+
+@pytest.mark.parametrize("refused", [True, False])
+def test_what_a_simulator_refuses_is_part_of_the_answer(refused):
+    """And that it is not installed is in the details alone."""
+    why = InSimulator(program="MuJoCo 4.0.0", why_not="it refuses v.xml as given: no", refused=refused, flown=None)
+    said = Corrected(files=("v.xml",), changes=(), unchanged=(), elsewhere=(), diff="", in_simulator=why)
+    page = environment(TEMPLATES, {}).get_template("corrected.md.j2").render(r={"corrected": said})
+    answer, details = page.split(":::", 1)
+    line = "- **In MuJoCo 4.0.0**: Not flown: it refuses v.xml as given: no."
+    assert (line in answer) == refused
+    assert ("Not flown in MuJoCo" in details) == (not refused)
