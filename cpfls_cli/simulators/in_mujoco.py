@@ -55,7 +55,10 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
     data, body, start = mujoco.MjData(model), _Body.of(model), course.start
     asked, filtered = controls.of(course.commands, model), np.flatnonzero(model.actuator_actadr >= 0).tolist()
     begun = asked[:, 0, filtered]
-    controlled = replace(course, flight=replace(course.flight, speed=controls.of(course.flight.speed, model)))
+    # Speeds are lines between samples, and their squares are none.
+    fine = course.finer_flight
+    fine = replace(fine, speed=controls.of(fine.speed, model))
+    controlled = replace(course, flight=fine, starts=course.finer * course.starts, finer=1)
     for column, own in enumerate(filtered if lags else ()):
         lagging = RotorResponse(lag_s=float(model.actuator_dynprm[own, 0]))
         begun[:, column] = controlled.lagged(lagging)[:, own]
