@@ -109,7 +109,7 @@ class WeakFlight:
         """
         if columns.momentum is None:
             return np.zeros((len(self), *columns.direct.shape[1:]))
-        return self._of_channels(self.windows.alternating().derivative(columns.momentum))
+        return self.of_channels(self.windows.alternating().derivative(columns.momentum))
 
     def without_force(self) -> WeakFlight:
         """Drop the force balance."""
@@ -126,7 +126,7 @@ class WeakFlight:
         rows = self.windows.average(columns.direct)
         if columns.momentum is not None:
             rows = rows + self.windows.derivative(columns.momentum)
-        return self._of_channels(rows)
+        return self.of_channels(rows)
 
     def innovations(self) -> WeakFlight:
         """Take of each row what the rows before do not predict: of gusts and noise these are alike and independent.
@@ -135,13 +135,13 @@ class WeakFlight:
         """
         lasting = np.array([toeplitz(each) for each in self.lasting])
         white = replace(self, whitening=np.linalg.inv(np.linalg.cholesky(lasting)))
-        return replace(white, seen={key: white._of_channels(rows) for key, rows in self.seen.items()})
+        return replace(white, seen={key: white.of_channels(rows) for key, rows in self.seen.items()})
 
-    def _of_channels(self, rows: Array) -> Array:
+    def of_channels(self, rows: Array) -> Array:
         """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""
         rows = rows * self.known.reshape(-1, *[1] * (rows.ndim - 2))
         if self.whitening is not None:
-            rows = np.moveaxis([each @ rows[:, channel] for channel, each in enumerate(self.whitening)], 0, 1)
+            rows = np.stack([each @ rows[:, at] for at, each in enumerate(self.whitening)], axis=1)
         return np.asarray(rows)
 
 
