@@ -16,10 +16,10 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.odds import likely, odds
-from cpfls_cli.gap.naming.ranking import Scored, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
-from cpfls_cli.gap.settings import COUNTS, RARE
+from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
@@ -56,19 +56,32 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
             selection_frequency=_frequency(own, ranking),
             sentence=effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
         )
-        if hypothesis.flights[0].lasting.size and not candidate.effect.is_lag:
+        rivals, compared = _rivals(own, ranking, step, settings)
+        if flights[0].lasting.size and not candidate.effect.is_lag:
             # A gust lasts: what of it was there before says nothing about a set. What gusts are off by is no formula's.
             flown, floor = [flight.innovations() for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
             step = rank_effects(flown, others, effects, settings, None, also=(candidate,), floor=floor)
             own, *ranking = in_place_of(candidate, step)
-        compared = {
-            tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
-            for other in ranking
-            if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
-        }
-        rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
+            known, also = _rivals(own, ranking, step, settings)
+            # Of innovations the loop answers more at once, so that they add no rival.
+            rivals = tuple(each for each in rivals if each.name in {rival.name for rival in known})
+            compared = {
+                names: min(own_odds, also.get(names, own_odds), key=np.sum) for names, own_odds in compared.items()
+            }
         judged.append(JudgedEffect(effect, rivals, compared))
     return judged
+
+
+def _rivals(
+    own: Scored, ranking: Sequence[Scored], step: RankedStep, settings: GapSettings
+) -> tuple[tuple[Alternative, ...], dict[tuple[str, ...], Array]]:
+    """List the rivals of an effect, and the odds of each set with another one in its place."""
+    compared = {
+        tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
+        for other in ranking
+        if np.isfinite(other.gain) and own.candidate.effect.name not in other.candidate.effect.holds
+    }
+    return tuple(alternatives(own, ranking, step.above_floor, settings)), compared
 
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
