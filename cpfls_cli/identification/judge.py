@@ -89,8 +89,6 @@ class VarianceExplained:
 class _AboutMean:
     """Sum of squares about the mean, chunk by chunk.
 
-    References
-    ----------
     Chan, Golub and LeVeque, The American Statistician 37 (1983), 242 (sums of squares about a mean, pairwise).
     """
 
@@ -142,14 +140,7 @@ def _ratio(numerator: Array, denominator: Array) -> Array:
 
 @dataclass(frozen=True)
 class Baseline:
-    """A linear model with few parameters.
-
-    Attributes
-    ----------
-    columns : callable
-        Motion to columns, shape (samples, 3, parameters).
-    parameters : array, shape (parameters,)
-    """
+    """A linear model with few parameters; `columns` takes motion to shape (samples, 3, parameters)."""
 
     name: str
     columns: Columns

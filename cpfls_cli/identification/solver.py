@@ -106,12 +106,7 @@ def _rows(learned: Samples, partitions: Breakpoints, fit: Fit, *, fuzzy: bool) -
 class Solver:
     """Solve for the fuzzy coefficients, alone as in the paper or with six free inertia parameters under them.
 
-    Attributes
-    ----------
-    learned : Samples
-        The samples that parameters are learned from.
-    ridge : RidgeChoice or None
-        With a rigid body underneath: how the ridge on the coefficients is chosen. Without: no ridge.
+    Then `ridge` says how the ridge on the coefficients is chosen; alone there is none.
     """
 
     learned: Samples
