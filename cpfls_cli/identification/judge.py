@@ -162,18 +162,7 @@ def no_torque_columns(motion: Motion) -> Array:
 
 
 def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
-    """Fit all baselines to the samples that a model is trained on.
-
-    Parameters
-    ----------
-    row_scale : array, shape (3,)
-        Weight of each axis, the model's own.
-
-    Returns
-    -------
-    tuple of Baseline
-        Rigid body, constant inertia, torque zero.
-    """
+    """Fit rigid body, constant inertia and torque zero to the samples learned from, with weights by axis."""
     kinds: tuple[tuple[str, Columns], ...] = (
         ("rigid-body", rigid_columns),
         ("constant-inertia", constant_inertia_columns),

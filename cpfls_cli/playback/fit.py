@@ -433,14 +433,7 @@ class WindowSums:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How far the numbers of a fit scatter, from blocks of windows.
-
-    Attributes
-    ----------
-    covariance : array, shape (number, number)
-    determined : array of bool, shape (number,)
-        Whether the flights say more of a number than what was believed before.
-    """
+    """Covariance of the numbers of a fit from blocks of windows; determined where flights say more than the prior."""
 
     covariance: Array
     blocks: int
