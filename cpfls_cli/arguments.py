@@ -16,12 +16,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 def seconds(text: str) -> float:
-    """Read a duration, such as ``90``, ``90s``, ``10m`` or ``2h``.
-
-    Returns
-    -------
-    float, s
-    """
+    """Read a duration in s, such as ``90``, ``90s``, ``10m`` or ``2h``."""
     unit = _SECONDS.get(text[-1:])
     try:
         value = float(text if unit is None else text[:-1]) * (unit or 1.0)

@@ -62,14 +62,9 @@ class Filter:
 
 
 class RateResponse(NamedTuple):
-    """Rate control by frequency, shape (frequency,) each, share of the full command per rad/s.
+    """Rate control by frequency, share of the full command per rad/s.
 
-    Attributes
-    ----------
-    feedback : array
-        From measured rate to minus the command.
-    forward : array
-        From asked rate to the command.
+    `feedback`: from measured rate to minus the command; `forward`: from asked rate to the command.
     """
 
     feedback: Numbers

@@ -79,19 +79,10 @@ class Parameter:
 class Firmware:
     """The version of an autopilot whose names, defaults and ranges these are, and what others have otherwise.
 
-    Attributes
-    ----------
-    title : str
-    systems : tuple of str
-        First words by which a log names the program that wrote it.
-    oldest : tuple of int
-        First version whose gains count as these do.
-    older : str
-        What is otherwise in logs of before.
-    oldest_gains : tuple of int, or None
-        First version whose gains of the rate count as these do, whatever its filters; None: `oldest`.
-    renamed : tuple of (tuple of int, mapping of str to str)
-        A version, and from names here to those of the versions before it.
+    `systems`: first words by which a log names the program that wrote it; `oldest`: first version whose gains count as
+    these do, `older` what is otherwise in logs of before; `oldest_gains`: first version whose gains of the rate count
+    as these do, whatever its filters (None: `oldest`); `renamed`: versions, with names here and those of the versions
+    before.
     """
 
     title: str

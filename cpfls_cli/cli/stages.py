@@ -160,10 +160,7 @@ def noted(job: Job) -> Iterator[None]:
 def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Callable[..., None]:
     """Write the command line of a stage: its own parameters, its output, a config where it takes one, common options.
 
-    Parameters
-    ----------
-    load : callable
-        Gives the stage, when the command runs.
+    `load` gives the stage, when the command runs.
     """
     declared = any(each.name == "config" for each in line.parameters)
     hints = {"config": ConfigArgument} if line.study and not declared else {}

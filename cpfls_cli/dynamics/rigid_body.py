@@ -66,21 +66,10 @@ def inertia_matrix_gradient(attitude: Array, inertia: Array) -> Array:
 
 
 def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
+    """Compute the generalised torque, N m, from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
 
-    Parameters
-    ----------
-    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
-    inertia : array, shape (3, 3), kg m^2, body frame
-
-    Returns
-    -------
-    array, shape (time, 3), N m
-        On the Euler coordinates; `rotations.body_torque` turns it into the body's.
-
-    References
-    ----------
-    Equations (2) to (4) of the paper, which give the same; method.md section 2.
+    It is on the Euler coordinates; `rotations.body_torque` turns it into the body's. Equations (2) to (4) of the paper
+    give the same; method.md section 2.
     """
     body = body_torque(attitude, attitude_rate, attitude_acceleration, inertia)
     return rotations.generalised_torque(attitude, body)

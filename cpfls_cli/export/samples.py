@@ -34,14 +34,7 @@ _ENDS = (2.5, 97.5)
 
 
 class Column(NamedTuple):
-    """A number, or several, of each vehicle.
-
-    Attributes
-    ----------
-    values : array, shape (vehicle, ...)
-    unit : str
-        With what its axes are.
-    """
+    """A number, or several, of each vehicle; the unit says what its axes are."""
 
     values: Array
     unit: str

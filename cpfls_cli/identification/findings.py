@@ -46,29 +46,13 @@ RIVALS = {
 class FitDiagnostics:
     """Diagnostics of an identification that its warnings, and a verdict on it, rest on.
 
-    Attributes
-    ----------
-    system : LeastSquares
-        The regressor of the model's parameters, without penalty.
-    axes : AxisEvidence
-        Of the training part.
-    rigid_body : array, shape (6,), kg m^2
-        The rigid body that fits the learned samples best.
-    stated : array, shape (6,), kg m^2, or None
-        Inertia stated for the vehicle.
-    indefinite : int
-        Training samples at which D(q) is not positive definite.
-    samples, outside, vertical : mapping of str to int
-        Samples judged, and of them outside the visited attitudes, and near a pitch of +-90 degrees, by part; the
-        training part comes first.
-    scores : mapping of str to mapping of str to Score
-        By part, then by model.
-    learned : Score
-        Of the model, on the samples learned from.
-    freed : FreedTorque or None
-        What the parameters were learned from, where instruments tell the vehicle from the loop.
-    loop : LoopBounds or None
-        How far the loop may have misled the model, where nothing from outside separates it from the vehicle.
+    `system`: regressor of the model's parameters, without penalty; `axes`: of the training part; `rigid_body`: that
+    fits the learned samples best, and the one `stated`, six parameters in kg m^2; `indefinite`: training samples at
+    which D(q) is not positive definite; `samples`, `outside`, `vertical`: samples judged, and of them outside the
+    visited attitudes, and near a pitch of +-90 degrees, by part, the training part first; `scores`: by part, then by
+    model; `learned`: of the model on the samples learned from; `freed`: what the parameters were learned from, where
+    instruments tell the vehicle from the loop; `loop`: how far it may have misled the model, where nothing from outside
+    separates it from the vehicle.
     """
 
     fit: Fit

@@ -127,13 +127,7 @@ _SHOWN = {"extended": "extended model"}
 
 
 def missing(sources: Sources) -> dict[str, str]:
-    """Name the formats of which no artifact was given.
-
-    Returns
-    -------
-    dict of str to str
-        One sentence by format, such as ``selection``: what is not shown, and the command that makes it.
-    """
+    """Name the formats, such as ``selection``, of which no artifact was given: what is not shown, and what makes it."""
     listed = _wanted(sources)
     lacking = {_word(kind): (shows, command) for kind, shows, command in listed if not sources.of_kind(kind)}
     return {

@@ -105,16 +105,10 @@ class FoundGusts(GustRanges):
 
 
 class _Powers(NamedTuple):
-    """Power of what does not come again.
+    """Power of what is not repeatable.
 
-    Attributes
-    ----------
-    power, whole : array, shape (block, axis, frequency)
-        Sums over the pieces of a block, squared units of torque and force; of that, and of all that is left.
-    pieces : array, shape (block,)
-        How many there are.
-    left : array, shape (piece, axis, frequency)
-        Power of all that is left, piece by piece.
+    `power` of that and `whole` of all residuals are sums over the `pieces` of a block, shape (block, axis, frequency),
+    squared units of torque and force; `left` is that of all residuals, shape (piece, axis, frequency).
     """
 
     power: Array
@@ -126,12 +120,8 @@ class _Powers(NamedTuple):
 class _Band(NamedTuple):
     """Pieces of flights, and the frequencies that they are taken apart into.
 
-    Attributes
-    ----------
-    pieces : Windows
-    turns : array, shape (frequency,), rad/s
-    weight, slope : complex array, shape (sample, frequency)
-        Kernels of the average and of the derivative, which is moved onto them.
+    `turns` in rad/s; `weight` and `slope`, shape (sample, frequency), are kernels of the average and of the derivative,
+    which is moved onto them.
     """
 
     pieces: Windows
@@ -171,34 +161,19 @@ def find_gusts(
     *,
     identified: bool = True,
 ) -> FoundGusts | None:
-    """Find sizes and memories of gusts in flights of a vehicle that is known.
+    """Find sizes and memories of gusts in flights of a vehicle that is known; None for too short ones or several rates.
 
     The power of what does not come again is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
     and memory m seen through the pieces, of white noise through their derivative, and of white noise. All four numbers
-    are fitted by Whittle's likelihood; their errors come from the scatter of its slopes over pieces of the runs.
+    are fitted by Whittle's likelihood (1953); their errors come from the scatter of its slopes over pieces of the runs
+    (White 1982; Uhlenbeck and Ornstein 1930).
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Its constants have to be those of the vehicle: a wrong body is answered with gusts.
-    given : Instruments
-        Of flights with rotor speeds. Without any, gusts are identified by the past; where that does not identify them,
-        all that is left is counted, and no size is known.
-    determined : mapping of str to bool
-        Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
-        determined, and of forces where the thrust factor is not.
-    identified : bool
-        Whether something identified the constants too. Those of a fit may be mixed with the loop, even where torque
-        explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
-
-    Returns
-    -------
-    FoundGusts or None
-        None for flights that are too short or of several rates.
-
-    References
-    ----------
-    Whittle 1953; White 1982 (errors from the scatter of slopes); Uhlenbeck and Ornstein 1930.
+    The constants have to be those of the vehicle: a wrong body is answered with gusts. Without repeats gusts are
+    identified by the past; where that does not identify them, all residuals are counted, and no size is known. Nothing
+    is known about an axis whose moment of inertia is not `determined`, and of forces where the thrust factor is not.
+    `identified`: whether something identified the constants too. Those of a fit may be mixed with the loop, even where
+    torque explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a
+    bound.
     """
     rows = 6 if all(flight.translates for flight in given.flown) else 3
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
@@ -444,10 +419,7 @@ class _Axis:
     def found(self, shared: float) -> Array:
         """Give size and memory with their intervals, as columns of `FoundGusts`; the bound where they are not known.
 
-        Parameters
-        ----------
-        shared : float
-            By how much errors are larger than the scatter of blocks tells.
+        Errors are larger than the scatter of blocks by the factor `shared`.
         """
         fit = self._fit
         half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))

@@ -171,15 +171,7 @@ class LoggedFlight:
 
 
 def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
-    """Put the stretches of a flight one after another.
-
-    Parameters
-    ----------
-    parts : sequence of Signals
-        Of one sampling period and with the same signals, each with rotor speeds or a stated torque.
-    hold : {"linear", "previous"}
-        What a speed is between samples.
-    """
+    """Put the stretches of a flight one after another, of one period and with the same signals."""
     first = parts[0]
     thrust_known = first.rotor_speed is not None or first.stated_thrust is not None
     motion = MeasuredMotion(

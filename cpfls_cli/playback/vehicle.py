@@ -199,22 +199,9 @@ def carrying_weight(
 ) -> tuple[VehicleSettings, tuple[FoundNumber, ...]]:
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
-    Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
-    without one either, or where it feels no lift, nothing tells thrust from weight, and the guess stays.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated, with guesses of what is not known.
-    flights : sequence of PlaybackFlight
-        Of this configuration.
-
-    Returns
-    -------
-    VehicleSettings
-        With better guesses; a thrust factor that nothing tells in runs is no longer unknown to them.
-    tuple of FoundNumber
-        The thrust factor, where the accelerometer tells it.
+    Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found
+    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing tells
+    thrust from weight, and the guess stays.
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
@@ -279,13 +266,7 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
 
 
 def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
-    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that.
-
-    Parameters
-    ----------
-    spread : Uncertainty
-        Of this fit.
-    """
+    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
     free, values = fitted.free, fitted.values
     physical = free.physical(values)
     stated = free.physical(free.starts)
@@ -308,13 +289,8 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     Speeds that are partly noise state torques that turn nothing, and those that answer a gust turn nothing either: a
     fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that. A
     moment that is more than the other two together, stated ones included, is not determined itself, and neither is what
-    no vehicle has: a centre of mass beyond the hubs, or a coefficient beyond all that a fit tries on such a vehicle,
-    which it comes to where it is counted by an inertia that is too large.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        Whose mass and rotors say what can be.
+    no vehicle of this mass and these rotors has: a centre of mass beyond the hubs, or a coefficient beyond all that a
+    fit tries on such a vehicle, which it comes to where it is counted by an inertia that is too large.
     """
     hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
     values = {number.name: number.value for number in numbers}
@@ -347,12 +323,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
     the flights show the loop, or are not explained, nothing is determined but what carries the weight, for every effect
-    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight.
-
-    Parameters
-    ----------
-    loop : LoopBounds
-        In moments of inertia of the model whose numbers these are.
+    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight. The
+    bounds are in moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}

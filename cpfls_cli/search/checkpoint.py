@@ -134,12 +134,8 @@ def _nothing(genes: IntArray, objectives: Array) -> Evaluated:
 class StoppedSearch:
     """What a stopped search leaves behind.
 
-    Attributes
-    ----------
-    state : EvolutionState or None
-        After its last generation; None if not even the initial population was evaluated.
-    unfinished : Unfinished
-        What was evaluated of the generation after it.
+    `state`: after its last generation, None if not even the initial population was evaluated; `unfinished`: what was
+    evaluated of the generation after it.
     """
 
     state: EvolutionState | None
@@ -161,13 +157,7 @@ def _same_origin(one: Origin, other: Origin) -> bool:
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file beside the output from which a stopped command can go on.
-
-    Attributes
-    ----------
-    header : Origin
-        Of the command that is run now: its config, seed and inputs.
-    """
+    """A file beside the output from which a stopped command can go on; the origin is of the command that is run now."""
 
     path: Path
     header: Origin

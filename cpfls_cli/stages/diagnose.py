@@ -263,15 +263,7 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
 
 
 def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, diagnosis: Path) -> Command:
-    """Give the command that goes on by the verdict.
-
-    Parameters
-    ----------
-    named, unnamed : Command
-        For a gap with a name, and for one without.
-    diagnosis : Path
-        Where the verdict is written.
-    """
+    """Give the command that goes on by the verdict: for a gap with a name, or for one without."""
     if found.contradictions:
         return to_correct(job)
     match found.verdict:
@@ -296,14 +288,8 @@ def learned_from(
 ) -> Diagnosis:
     """Take the flights of a disagreement, and those that its model learned from, as inputs of a diagnosis.
 
-    Parameters
-    ----------
-    held_out : sequence of InputFile
-        Of these it is said where the model has learned from them.
-    model : str
-        Name of the disagreement that the model is of.
-    of : str
-        Name of the diagnosis among the results of the run.
+    Of those held out it is said where the model has learned from them; `model` and `of` name the disagreement that the
+    model is of, and the diagnosis among the results of the run.
     """
     run.take_also({**flights, **as_inputs(MODEL_FLIGHT, learned)}, of)
     hashes = [(file.name, (file.sha256,)) for file in held_out]

@@ -43,15 +43,10 @@ class Margins:
 
 @dataclass(frozen=True)
 class AxisLoops:
-    """Loops of one axis with one plant or several.
+    """Loops of one axis with one plant or several, by frequency.
 
-    Attributes
-    ----------
-    frequency : array, shape (frequency,), Hz
-    rate : array, shape (..., frequency)
-        Gain of the rate loop alone, as it flies where rates are asked for.
-    command, angle : array, shape (..., frequency)
-        With the angle loop around it, cut at the command, and at the measured angle.
+    `rate`: gain of the rate loop alone, as it flies where rates are asked for; `command`, `angle`: with the angle loop
+    around it, cut at the command, and at the measured angle.
     """
 
     frequency: Array
@@ -96,8 +91,6 @@ def axis_loops(law: Law, axis: int, moved: Numbers, frequency: Array) -> AxisLoo
 def margins(frequency: Array, loop: Numbers) -> Margins:
     """Compute the margins of a loop from its gains, shape (frequency,).
 
-    References
-    ----------
     P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, IEEE Control Systems 40(5), 2020.
     """
     stable = bool(is_stable(frequency, loop))
@@ -166,13 +159,7 @@ def is_stable(frequency: Array, loop: Numbers) -> BoolArray:
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """Answer to a step of the asked angle about each axis, in parts of it.
-
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    angle : array, shape (time, 3)
-    """
+    """Answer to a step of the asked angle about each axis, in parts of it, shape (time, 3)."""
 
     time: Array
     angle: Array

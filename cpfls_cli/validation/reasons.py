@@ -34,19 +34,7 @@ class Reason(NamedTuple):
 
 
 def numbers(values: Array, shown: BoolArray | None = None) -> str:
-    """Format the values of the three axes.
-
-    Parameters
-    ----------
-    values : array, shape (3,)
-    shown : array of bool, shape (3,), optional
-        Axes to print; all by default.
-
-    Returns
-    -------
-    str
-        As ``roll 0.95 pitch 0.97 yaw 0.23``.
-    """
+    """Format the values of the three axes, or of those shown, as ``roll 0.95 pitch 0.97 yaw 0.23``."""
     axes = np.flatnonzero(np.ones(3, dtype=bool) if shown is None else shown)
     return " ".join(f"{AXES[axis]} {values[axis]:.3g}" for axis in axes)
 

@@ -74,14 +74,9 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
 
 
 def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
-    """Take back a good verdict on a model whose flights show the loop.
+    """Take back a good verdict on a model whose flights show the loop, unless the past identifies it.
 
-    Parameters
-    ----------
-    loop : LoopBounds or None
-        None where something from outside separates the vehicle from its autopilot.
-    by_past : bool
-        Whether the past identifies it.
+    `loop` is None where something from outside separates the vehicle from its autopilot.
     """
     if loop is None or not loop.shows_loop:
         return found
@@ -198,17 +193,9 @@ def _no_body(grounds: Grounds) -> str:
 
 
 def region_in_words(visited: BoolArray) -> str:
-    """Describe the attitudes that training visited.
+    """Describe the attitudes that training visited: the shortest ranges that hold all visited cells, and their share.
 
-    Parameters
-    ----------
-    visited : array of bool, shape (cells, cells)
-        Cells of roll and pitch, roll along the first axis, from -180 degrees.
-
-    Returns
-    -------
-    str
-        The shortest ranges of roll and pitch that hold all cells visited, and the share of all cells.
+    Roll is along the first axis of the cells, from -180 degrees.
     """
     roll, pitch = (_range(np.asarray(visited.any(axis=other))) for other in (1, 0))
     return f"roll {roll}, pitch {pitch} ({100 * np.mean(visited):.3g} % of all roll and pitch)"

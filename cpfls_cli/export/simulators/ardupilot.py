@@ -175,10 +175,7 @@ def _keys(model: VehicleModel, held: Held, order: IntArray) -> dict[str, Any]:
 def _reference_angle(momentum: float, weight: float, column: float) -> float:
     """Find the tilt, degrees, at which the drag of the motors alone holds the vehicle at `refSpd`: none is the body's.
 
-    Parameters
-    ----------
-    column : float, kg/m
-        Density times area of the discs.
+    `column`: density times area of the discs, kg/m.
     """
     low, high = 0.0, _STEEPEST
     for _ in range(60):

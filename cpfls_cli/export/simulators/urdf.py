@@ -140,10 +140,7 @@ def add_point(root: ElementTree.Element, name: str, place: Array) -> None:
 def fly_urdf(text: str, course: Course, *, in_world: bool = True) -> State:
     """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`.
 
-    Parameters
-    ----------
-    in_world : bool
-        Whether drag acts along the axes of the world, as there, or along those of the body.
+    Drag acts along the axes of the world, as there, or along those of the body.
     """
     root = ElementTree.fromstring(text)
     attributes = next(root.iter("properties")).attrib
