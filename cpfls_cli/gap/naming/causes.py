@@ -23,6 +23,7 @@ from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
+_OF_99 = 2.576 / 1.960  # An interval at 99 % over one at 95 %.
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,24 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
     share = float(max(shown[number.name] for number in wrong))
     p_value = min(_chance(number) for number in wrong)
     return _without_columns(VEHICLE_NUMBERS.name, tuple(wrong), p_value, share, VEHICLE_NUMBERS.sentence)
+
+
+def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
+    """List moments of inertia that are right where the thrust is wrong: rates show their ratio to the rotor torque.
+
+    That is where a moment of inertia times the thrust is that of the config within 99 %, by independent errors.
+    """
+    known = {number.name: number for number in numbers}
+    thrust = known.pop("thrust_scale", None)
+    moments = {name: each for name, each in known.items() if name.startswith("inertia_")}
+    return [] if thrust is None else [name for name, each in moments.items() if _undone(each, thrust)]
+
+
+def _undone(number: Estimate, other: Estimate) -> bool:
+    """Tell whether two relative errors multiply to none."""
+    off = (1 + number.value) * (1 + other.value) - 1
+    own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
+    return bool(abs(off) < _OF_99 * np.hypot(own, its))
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:

@@ -64,6 +64,41 @@ def test_a_thrust_17_percent_too_large(tmp_path, logs):
     assert ends["position"]["after"] < min(0.8 * ends["position"]["before"], ends["position"]["without_model"])
     assert [rotor.thrust.value for rotor in new.rotors] == [change["after"]] * 4
     np.testing.assert_allclose(np.diag(new.inertia), TRUE.inertia, rtol=1e-4)
+    require_the_same_of_exports(tmp_path, change)
+    np.testing.assert_allclose(np.diag(read_model(tmp_path / "of.sdf").inertia), TRUE.inertia, rtol=1e-4)
+
+
+def require_the_same_of_exports(folder, change):
+    """What is exported of the extended model has the arms as stated, and thrust as it was found."""
+    model, mine = folder / "gap" / "extended.h5", read_model(folder / "mine.sdf")
+    side = abs(mine.hubs[0, 0])
+    for word, name in (("sdf", "of.sdf"), ("px4params", "of.params"), ("betaflight", "of.txt")):
+        result = command_line.run("export", model, "--format", word, "-o", folder / name)
+        assert result.exit_code == 0, result.stderr
+    again = read_model(folder / "of.sdf")
+    np.testing.assert_allclose(again.hubs, mine.hubs, rtol=1e-9, atol=1e-12)
+    factors = [rotor.thrust.value for rotor in again.rotors]
+    assert change["low"] < factors[0] < change["high"]
+    np.testing.assert_allclose(factors, factors[0], rtol=1e-12)
+    # Yaw torque follows thrust, as the file states their ratio.
+    np.testing.assert_allclose([r.ratio.value for r in again.rotors], TRUE.drag_factor / TRUE.thrust_factor, rtol=1e-9)
+    lines = (line.split("\t") for line in (folder / "of.params").read_text().splitlines() if "CA_ROTOR" in line)
+    stated = {name: float(value) for _, _, name, value, _ in lines}
+    assert abs(stated["CA_ROTOR0_PX"]) == pytest.approx(side, rel=1e-6)
+    assert stated["CA_ROTOR0_CT"] == pytest.approx(factors[0] * mine.speed_max.value**2, rel=1e-6)
+    assert stated["CA_ROTOR0_KM"] == pytest.approx(-SPINS[0] * -TRUE.drag_factor / TRUE.thrust_factor, rel=1e-6)
+    mixer = [line.split()[3:5] for line in (folder / "of.txt").read_text().splitlines() if line.startswith("mmix ")]
+    assert all(abs(float(each)) == 1.0 for row in mixer if len(row) == 2 for each in row)
+
+
+def test_thrust_and_inertia_that_are_both_wrong(tmp_path, logs):
+    said, new = corrected(tmp_path, logs, thrust=1 / 0.83, inertia=(1 / 1.2, 1 / 1.2, 1.0))
+    changes = {change["element"]: change for change in said["corrected"]["changes"]}
+    assert list(changes) == ["motorConstant", "ixx", "iyy"]
+    require_the_same_of_exports(tmp_path, changes["motorConstant"])
+    moments = np.diag(read_model(tmp_path / "of.sdf").inertia)
+    np.testing.assert_allclose(moments[:2], np.diag(new.inertia)[:2], rtol=0.01)
+    np.testing.assert_allclose(moments, TRUE.inertia, rtol=0.03)
 
 
 def test_an_inertia_20_percent_too_small(tmp_path, logs):
