@@ -19,11 +19,10 @@ from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rounding import less
 from cpfls_cli.simulation.model import late_effects
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
-
-_ROUNDING = 1e-6
 
 
 def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
@@ -119,8 +118,8 @@ def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
         return 1.0, [], False
     right = of_thrust(refit.estimates.parameters)
     about_z = numbers.get("inertia_z")
-    # What flights do not show has no width but that of rounding.
-    yaw = about_z is None or about_z.high - about_z.low < _ROUNDING or "inertia_z" in right
+    # What flights do not show has no width beyond rounding.
+    yaw = about_z is None or not less(1 + about_z.low, 1 + about_z.high) or "inertia_z" in right
     return 1.0 + numbers["thrust_scale"].value, right, yaw
 
 

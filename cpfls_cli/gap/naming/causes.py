@@ -23,7 +23,6 @@ from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
-_OF_99 = 2.576 / 1.960  # An interval at 99 % over one at 95 %.
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,7 @@ def _undone(number: Estimate, other: Estimate) -> bool:
     """Tell whether two relative errors multiply to none."""
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
-    return bool(abs(off) < _OF_99 * np.hypot(own, its))
+    return _chance_of(off, float(np.hypot(own, its))) > RARE
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
@@ -164,8 +163,11 @@ def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
 
 def _chance(number: Estimate) -> float:
     """Compute the probability that a number as far from 0 is chance."""
-    half = 0.5 * (number.high - number.low)
-    return 2 * float(ndtr(-1.96 * abs(number.value) / half)) if half > 0 else 0.0
+    return _chance_of(number.value, 0.5 * (number.high - number.low))
+
+
+def _chance_of(value: float, half: float) -> float:
+    return 2 * float(ndtr(-1.96 * abs(value) / half)) if half > 0 else 0.0
 
 
 def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
