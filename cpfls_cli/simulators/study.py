@@ -223,9 +223,10 @@ def of_log(
             notes.append("rotors are in the order of the log, whose motors are numbered another way than the file's")
         spins, turned = _spins(model, airframe, order)
         warnings += turned
-    if like is None or model.speed_max is not None:
+    if like is None:
         speed, where = _speed(model, proposal)
     else:
+        # What a log lets one guess is another number for each log, and no other vehicle.
         speed, where = like.rotor_speed_max_rad_s, "Of the model that gives what the file leaves open"
     mass = model.mass_kg if mass_kg is None else mass_kg
     by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
