@@ -1,16 +1,20 @@
 """A wrong number in a simulator's own file, named and corrected from flights in gusts, and nothing else touched."""
 
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
+from cpfls_cli.config.load import load_study
 from cpfls_cli.flightlog.airframe import turns_by_rotors
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
-from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of, write_log
+from tests.builders.simulator_files import mjcf_in_newtons, mjcf_of, rotorpy_of, sdf_of, write_log
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
@@ -160,6 +164,30 @@ def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
     assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")
     (differs,) = [pair for pair in zip(before[1:], after[3:], strict=True) if pair[0] != pair[1]]
     assert differs[1] == f"    'k_eta': {change['after']:.4g},  # from a data sheet"
+
+
+def test_a_yaw_share_one_and_a_half_times_too_large_in_newtons(tmp_path, logs):
+    """Where controls are thrusts, the thrust by speed is the model's, and the file has the yaw torque over thrust."""
+    mine, study, vehicle = (tmp_path / name for name in ("mine.xml", "study.yaml", "vehicle.h5"))
+    mine.write_text(mjcf_in_newtons(TRUE, SPINS, ratio=1.5))
+    assert command_line.run("init", "--from", mine, logs[0], "-o", study).exit_code == 0
+    settings = load_study(study).vehicle
+    factors = {"thrust_factor_n_s2": TRUE.thrust_factor, "drag_factor_n_m_s2": TRUE.drag_factor}
+    rotors = tuple(replace(rotor, **factors) for rotor in settings.rotors)
+    known = replace(settings, rotors=rotors, unknown=())
+    write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
+    words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", tmp_path / "gap", "--json")
+    result = command_line.run(*words)
+    assert result.exit_code == 0, result.stderr
+    said, share = json.loads(result.stdout)["corrected"], TRUE.drag_factor / TRUE.thrust_factor
+    assert {change["element"] for change in said["changes"]} == {"gear yaw"}
+    for change in said["changes"]:
+        assert min(map(abs, (change["low"], change["high"]))) < share < max(map(abs, (change["low"], change["high"])))
+        assert change["sentence"].endswith("by its ratio to the inertia about z")
+    new = read_model(tmp_path / "gap" / "mine.xml")
+    assert [rotor.spin for rotor in new.rotors] == list(SPINS)
+    np.testing.assert_allclose(np.diag(new.inertia), TRUE.inertia)
+    require_the_same_in("mujoco", said)
 
 
 def test_turns_of_single_rotors_have_their_intervals():
