@@ -207,7 +207,8 @@ def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> l
         return [_with_vehicle(recording, model.vehicle) for recording in recordings]
     given = []
     for recording in of_vehicle(recordings, model):
-        signals = recording.signals
+        # What another model knew is no part of the rotors.
+        signals = replace(recording.signals, known_wrench=None)
         known = model.wrench_along(model.acting(signals)) - signals.wrench
         given.append(replace(recording, signals=replace(signals, known_wrench=known)))
     return given
