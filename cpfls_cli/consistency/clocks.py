@@ -7,7 +7,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
-from cpfls_cli.consistency.findings import FaultNumber, Finding, off_clock
+from cpfls_cli.consistency.findings import FaultNumber, Finding, in_ms, off_clock
 from cpfls_cli.consistency.gyroscope import LONGEST_DELAY_S
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
@@ -45,11 +45,11 @@ def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
     estimates = [estimate for signals in driven if (estimate := _estimate(signals)) is not None]
     if not estimates:
         return ()
-    delay = 1000 * float(np.median([estimate.delay_s for estimate in estimates]))
-    low, high = 1000 * min(own.low_s for own in estimates), 1000 * max(own.high_s for own in estimates)
+    delay = float(np.median([estimate.delay_s for estimate in estimates]))
+    low, high = min(own.low_s for own in estimates), max(own.high_s for own in estimates)
     whom = "commands" if driven[0].commanded else "logged torque"
     bound = any(estimate.at_bound for estimate in estimates)
-    by = f"at least {delay:.0f} ms" if bound else f"{delay:.0f} ms [{low:.0f}, {high:.0f}]"
+    by = f"at least {1000 * delay:.0f} ms" if bound else in_ms(delay, low, high)
     return (f"The motion follows the {whom} by {by}.",)
 
 

@@ -256,6 +256,9 @@ def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
     words = ("export", pipeline.model, "--name", "uav", "-o")
     (line,) = refuse(*words, tmp_path / "m.py", "--format", "jax")
     assert line == "--name uav: a Python module is named after its file; leave --name out, or rename -o"
+    for form, ending, whose in (("pyflyt", "urdf", "a model of PyFlyt"), ("webots", "proto", "a PROTO of Webots")):
+        (line,) = refuse(*words, tmp_path / f"m.{ending}", "--format", form)
+        assert line == f"--name uav: {whose} is named after its file; leave --name out, or rename -o"
     assert cpfls(*words, tmp_path / "m.json").exit_code == 0
     assert json.loads((tmp_path / "m.json").read_text())["name"] == "uav"
 

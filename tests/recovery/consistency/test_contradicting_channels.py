@@ -111,7 +111,7 @@ WRONG = {
     "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is rotated by"),
     "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
     "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
-    "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by 30 ms"),
+    "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by 30."),
 }
 
 
@@ -213,7 +213,7 @@ def test_where_rotors_do_not_tell_whose_clock_is_wrong_the_one_behind_is_late(fl
     said = "hese flights do not show whether the gyroscope or the attitude is late"
     if channel == "attitude":
         [sentence] = found.settled
-        assert "The attitude is late by 30 ms" in sentence
+        assert "The attitude is late by 30." in sentence
         assert said in sentence
         assert found.named == ()
     else:
