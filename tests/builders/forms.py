@@ -9,7 +9,6 @@ from cpfls_cli.pages.page import report_page, written
 from cpfls_cli.report.content import Box, Facts, Folded, Form, Section, Table, Text
 from cpfls_cli.report.source import Sources
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
-from tests.builders.command_line import undrawn
 
 
 def phrases(block):
@@ -44,9 +43,7 @@ def in_all_forms(source, blocks, beside=()):
         On the same page.
     """
     sources = Sources([source, *beside], source.vehicle, Study().report)
-    # Drawing the curves takes longer than all the rest.
-    with undrawn():
-        pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
+    pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
     return _plain({"terminal": "\n".join(terminal_lines(blocks, whole=True)), **pages})
 
 

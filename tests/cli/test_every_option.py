@@ -20,8 +20,6 @@ from tests.builders.studies import TINY
 from tests.builders.vehicle_models import write_vehicle
 from tests.builders.vehicle_search import CONFIG, left_out
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 SETTINGS = {
     "playback": {
         "search_windows": 20,

@@ -14,7 +14,6 @@ from cpfls_cli.config.load import load_study, read_config
 from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
-from tests.builders.command_line import undrawn
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 DAMPING = 0.012
@@ -128,8 +127,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")
     cpfls.done("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
     cpfls.done("export", found.output, "-o", tmp_path / "vehicle.json")
-    with undrawn():
-        page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
+    page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
     told = json.loads(page.stdout)
     assert told["sections"] == ["summary", "vehicle", "stated-vehicle", "provenance"]
     text = (tmp_path / "page.html").read_text()
@@ -137,7 +135,6 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert "Not shown, because" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_path):
     """Its study is that which it was found with, so no config has to be given with it."""
     apart = ("--held-out", flights[1])
@@ -161,8 +158,7 @@ def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_pat
 def test_a_replay_is_shown_also_of_the_flight_held_out(cpfls, config, flights, found, tmp_path, along):
     replayed = tmp_path / "replay.h5"
     cpfls("replay", config, found.output, flights[along], "-o", replayed)
-    with undrawn():
-        cpfls.done("report", config, found.output, replayed, "-o", tmp_path / "page.md")
+    cpfls.done("report", config, found.output, replayed, "-o", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert text.count("; sum over all horizons") == text.count("Body rate: better than") == 2
     assert "The windows in which the body rate is farthest off" in text

@@ -8,8 +8,6 @@ import pytest
 from tests.builders.changed_flights import HEADER, flight_table, save, write_flights
 from tests.builders.unknown_logs import ARM, MASS, flat_log, flight, named, ulog_of_flight, write_csv
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 RATE, FORCE, SPEED = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z"), ("rpm1", "rpm2", "rpm3", "rpm4")
 TODAY = flight(seed=11)
 RPM = TODAY.speed * 60 / (2 * np.pi)

@@ -13,8 +13,6 @@ from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 NAMES = ["model", "nothing-moves", "rate-stays", "stated"]
 FAST = ("--every", "7")
 

@@ -19,8 +19,6 @@ from tests.builders.evidence_artifacts import curves, steps, verdict
 from tests.builders.identified_models import EVIDENCE_PARTS, with_parts
 from tests.builders.vehicle_models import vehicle_of, whole, write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 
 @pytest.fixture(scope="module")
 def bare(pipeline):

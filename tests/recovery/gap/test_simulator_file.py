@@ -12,7 +12,6 @@ from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
 from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of, write_log
 
-pytestmark = pytest.mark.usefixtures("undrawn")
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
 
