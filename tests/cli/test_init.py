@@ -110,12 +110,6 @@ def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refus
     assert proposed(log, "--mass", MASS, "--force")[1] == text
 
 
-def test_a_dry_run_writes_nothing(cpfls, log, tmp_path):
-    result = cpfls("init", log, "-o", tmp_path / "other.yaml", "--dry-run")
-    assert result.exit_code == 0
-    assert not (tmp_path / "other.yaml").exists()
-
-
 def test_the_answer_for_machines(proposed, log):
     result, _, _ = proposed(log, "--json")
     summary = json.loads(result.stdout)

@@ -157,11 +157,6 @@ def test_nothing_hidden_nothing_named(none):
     assert max(none.summary["gap_before"]["floors"]) < 1.5
 
 
-def test_extend_refuses_what_names_nothing(refuse, gap_config, none, tmp_path):
-    (message,) = refuse("extend", gap_config, none.folder / "diagnosis.h5", "-o", tmp_path / "x.h5", code=1)
-    assert message == "not extended: the diagnosis is NO_GAP and names no effect that could be added"
-
-
 def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, found, exact, tmp_path):
     shutil.copytree(found.folder, tmp_path / "x")
     (tmp_path / "x" / "notes.txt").write_text("mine")

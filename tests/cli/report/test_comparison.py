@@ -186,13 +186,6 @@ def test_each_model_is_summarised_after_the_comparison(compared, write):
     assert names[:4] == ["summary", "comparison", "identify", "identify-2"]
 
 
-def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_path):
-    path = write("one.h5")
-    result = cpfls("report", study, path, path, "-o", tmp_path / "twice.json")
-    assert result.exit_code == 0
-    assert f"{path}: given 2 times; shown once" in result.stderr
-
-
 def test_equal_configs_are_called_equal(compared, write):
     _, blocks = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
     assert any("Nothing: the same config" in block.get("text", "") for block in blocks)

@@ -109,12 +109,6 @@ def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
     assert "the model as given leaves the figure" in full.text
 
 
-@pytest.mark.usefixtures("drawn")
-def test_equal_artifacts_give_equal_pages(tmp_path):
-    given = replace(made.diagnosis(), run=None, picture=None, playback=None)
-    assert shown(tmp_path, given).html == shown(tmp_path, given).html
-
-
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
     bare = replace(made.diagnosis(force=False), run=None, picture=None, whiteness=None, playback=None)
     page = shown(tmp_path, bare)

@@ -258,21 +258,6 @@ def test_another_vehicle_is_pointed_out(study, tmp_path):
     assert "another vehicle than this one: flight.h5" in html
 
 
-def test_what_is_not_an_artifact_ends_with_a_message(study, tmp_path):
-    foreign = tmp_path / "foreign.h5"
-    foreign.write_text("no artifact")
-    result = cpfls("report", study.config, foreign, "-o", tmp_path / "out.html", code=2)
-    assert "foreign.h5" in result.stderr
-    assert not (tmp_path / "out.html").exists()
-
-
-def test_an_existing_page_is_kept_and_a_dry_run_writes_nothing(study, full, tmp_path):
-    cpfls("report", study.config, study.flight, "-o", full.output, code=2)
-    assert full.output.read_text(encoding="utf-8") == full.html
-    cpfls("report", study.config, study.flight, "-o", tmp_path / "new.html", "--dry-run")
-    assert not list(tmp_path.iterdir())
-
-
 def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path):
     model = tmp_path / "single.h5"
     single = ("--set", "identification.membership_functions=1", "--set", "identification.base=rigid-body")
