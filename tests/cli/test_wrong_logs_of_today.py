@@ -37,13 +37,6 @@ def changed(cpfls, folder, today, *options):
     return cpfls(*words, "--fail-on-change", *options)
 
 
-def test_a_good_log_of_today_is_unchanged_within_a_size(cpfls, logs):
-    result = changed(cpfls, logs, "same.csv")
-    assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("NO CHANGE: ")
-    assert "unchanged within these sizes: a rotor that pulls " in " ".join(result.stdout.split())
-
-
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_log_of_today_is_never_green(cpfls, logs, what):
     columns, words = WRONG[what]
