@@ -26,8 +26,6 @@ from tests.builders.playback_flights import (
     truth,
 )
 
-RATE = 3
-
 
 def fitted(vehicle, blocks, flights):
     windows = [own for flight in flights for own in windows_of([flight], 0.5, 0.6)]
