@@ -154,6 +154,7 @@ def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_pat
         assert (made.spin, made.position_m) == (rotor.spin, pytest.approx(rotor.position_m))
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("along", [1, 0], ids=["held out", "another flight"])
 def test_a_replay_is_shown_also_of_the_flight_held_out(cpfls, config, flights, found, tmp_path, along):
     replayed = tmp_path / "replay.h5"
