@@ -104,7 +104,6 @@ def test_what_is_no_log_is_refused_with_code_2(refuse, logs):
     assert refuse("look", logs / "none.bbl") == [f"{logs / 'none.bbl'}: no such file"]
 
 
-@pytest.mark.usefixtures("drawn")
 def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = cpfls.done("look", logs / "px4 log.ulg", logs / "bf.bbl", logs / "blind.csv", "-o", "out")

@@ -111,6 +111,7 @@ def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_
     assert (told["verdict"], told["held_out"]) == ("not-judged", None)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     replayed = cpfls.done("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
     model = json.loads(replayed.stdout)["models"]["model"]
