@@ -20,14 +20,12 @@ from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
-from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 COARSE = ("--set", "simulation.closed_loop.integration_rate_hz=100")
 """What a screen says hangs on no step of an integration."""
@@ -55,7 +53,6 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
             terminal.tell(outcome, common)
 
         with (
-            undrawn(),
             patch("cpfls_cli.cli.stages.tell", tell),
             patch.object(terminal, "_columns", lambda *_: COLUMNS),
             pytest.MonkeyPatch.context() as environment,

@@ -345,6 +345,7 @@ def test_a_report_of_one_reading_compares_none():
     assert readings_blocks(given, CLAIMS) == ([], [])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_readings_are_drawn_where_a_search_found_nothing_too():
     nothing = chosen("D", "training", np.nan, 60.0)
     given = readings(reading_sources((0.0, [FULL, chosen("even", "training", 1.0, 101.0), nothing])))

@@ -4,14 +4,11 @@ import json
 import re
 
 import numpy as np
-import pytest
 
 from cpfls_cli.identification.replicates import Sweep
 from cpfls_cli.report.numbers import number
 from cpfls_cli.store import read
 from tests.builders.pages import table_cells
-
-pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def page(cpfls, swept, *options, sweep="sweep.h5"):

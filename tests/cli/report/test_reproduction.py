@@ -12,8 +12,6 @@ from cpfls_cli.identification.replicates import Sweep
 from cpfls_cli.store import read, write
 from tests.builders.pages import table_cells
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
