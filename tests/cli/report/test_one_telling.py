@@ -12,7 +12,7 @@ from cpfls_cli.result import plain
 from cpfls_cli.stages.report import read_sources
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
-FROM_COMMANDS = ("model", "sweep")
+FROM_COMMANDS = ("model",)
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 
 
@@ -25,7 +25,6 @@ def told(cpfls, study, tmp_path_factory):
     assert cpfls("simulate", study, paths["trajectory"], "-o", paths["flight"]).exit_code == 0
     given = {
         "model": ("identify", study, paths["flight"]),
-        "sweep": ("sweep", study, paths["flight"], "--set", "sweep.seeds=2"),
     }
     artifacts = {}
     for name, command in given.items():
