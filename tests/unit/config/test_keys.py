@@ -97,7 +97,7 @@ def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_pa
     assert [line.split(": ")[1] for line in lines] == ["report.evaluation_times", "report.paper"]
     assert all("remove it; `make reproduce`" in line for line in lines)
     path.write_text("sweep: {seeds: 3}\n" + VEHICLE)
-    with pytest.raises(ConfigError, match="sweep.seeds: is no longer a key: remove it; a loop over `cpfls identify"):
+    with pytest.raises(ConfigError, match=r"sweep\.seeds: is no longer a key: remove it; a loop over `cpfls identify"):
         load_study(path)
 
 
