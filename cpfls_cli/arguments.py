@@ -132,21 +132,6 @@ ExportAnywayOption = Annotated[
         "file says so first.",
     ),
 ]
-ResumeSweepOption = Annotated[
-    bool,
-    typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
-]
-SweepTimeLimitOption = Annotated[
-    float | None,
-    typer.Option(
-        "--time-limit",
-        metavar="TIME",
-        parser=seconds,
-        help="Stop all runs together after TIME (90, 90s, 10m, 2h) and write the finished ones; --resume goes on.",
-    ),
-]
-
-
 PlayedArgument = Annotated[
     Path,
     typer.Argument(

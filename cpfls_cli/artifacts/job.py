@@ -38,27 +38,12 @@ def _uninterrupted() -> AbstractContextManager[Interrupted]:
 class Job:
     """One run of a stage.
 
-    Attributes
-    ----------
-    force : bool
-        Replace an existing output.
-    dry_run : bool
-        Check everything, compute and write nothing.
-    reads : callable
-        Takes note of every input file.
-    deferred_interrupts : callable
-        Gives a context in which an interrupt does not end the program, but is told to whoever asks.
-    inputs : list of Path
-        The config, and every input that was taken so far: no output may replace them.
-    config : Path
-        File of the study, as the commands that go on name it.
-    open_numbers : {"refused", "guessed", "found"}
-        What a command does that needs numbers which the config leaves open: it refuses, takes the guesses that stand
-        for them, or has those of a vehicle that was found in their place.
-    found : Path or None
-        Vehicle that was found, whose numbers the commands that go on take as well.
-    cautions : dict of str to None
-        What speaks against the models and numbers that it rests on, in order: the output carries it.
+    `reads` takes note of every input file; `deferred_interrupts` gives a context in which an interrupt does not end the
+    program, but is said to whoever asks; `inputs`: the config, and every input that was taken so far, no output may
+    replace them; `config`: file of the study, as the commands that go on name it; `open_numbers`: whether a command
+    that needs numbers which the config leaves open refuses, takes the guesses that stand for them, or has those of a
+    vehicle that was `found`; `cautions`: what speaks against the models and numbers that it rests on, in order, the
+    output carries it.
     """
 
     study: Study

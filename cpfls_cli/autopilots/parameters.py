@@ -40,27 +40,12 @@ _KINDS: tuple[tuple[FilterKind, int, float], ...] = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an autopilot.
+    """A parameter of an autopilot, as it writes it.
 
-    Attributes
-    ----------
-    name : str
-        As the autopilot writes it.
-    role : str
-        What it is in the law: axes (``roll``, ``pitch``, ``yaw``, ``tilt`` for the first two, ``all``) or ``motors``,
-        a dot, and the quantity.
-    default : float
-    low, high : float
-        Of the range that its documentation gives.
-    meaning : str
-    unit : str
-        Empty for a ratio.
-    scale : float
-        Factor from it to the quantity of the law, SI.
-    step : float
-        It is written in multiples of this.
-    absent : float or None
-        Its value where a log holds parameters but not this one; None: the default.
+    `role`: what it is in the law, axes (``roll``, ``pitch``, ``yaw``, ``tilt`` for the first two, ``all``) or
+    ``motors``, a dot, and the quantity; `low`, `high`: of the range that its documentation gives; `scale`: factor from
+    it to the quantity of the law, SI; it is written in multiples of `step`; `absent`: its value where a log holds
+    parameters but not this one, None for the default.
     """
 
     name: str

@@ -79,23 +79,12 @@ def _unstopped() -> None:
 class SearchRun:
     """Conditions under which a search is run; they do not change the result of a search that comes to its end.
 
-    Attributes
-    ----------
-    resumed : EvolutionState or None
-        Where to go on; None starts with a new population.
-    unfinished : Unfinished or None
-        What need not be evaluated again in the generation that comes first.
-    workers : callable
-        Takes the evaluator; gives the context in which workers evaluate by it, one chromosome after the other in
-        this process by default.
-    progress : callable
-        Takes a `SearchStep`, after each part of a generation that was evaluated.
-    on_generation : callable
-        Takes the state after each generation, the initial population included. The next generation changes it.
-    on_stop : callable
-        Takes what is `Unfinished` where the search is stopped within a generation.
-    should_stop : callable
-        Asked after each part of a generation: why to stop now, or None.
+    `resumed`: where to go on, None starts with a new population; `unfinished`: what need not be evaluated again in the
+    generation that comes first; `workers` takes the evaluator and gives the context in which workers evaluate by it,
+    one chromosome after the other in this process by default; `progress` takes a `SearchStep` after each part of a
+    generation; `on_generation` the state after each generation, the initial population included, which the next one
+    changes; `on_stop` what is `Unfinished` where the search is stopped within one; `should_stop` says after each part
+    why to stop now, or None.
     """
 
     resumed: EvolutionState | None = None

@@ -185,7 +185,7 @@ _EXACT = (
 )
 _HASH_SHOWN = 12
 _ORDER = (
-    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce", "sweep"),
+    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce"),
     *("twin", "response", "tune", "replay", "trend", "changed"),
 )
 """Stages whose results a report shows, answers first; what it does not name comes last."""

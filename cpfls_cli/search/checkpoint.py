@@ -1,4 +1,4 @@
-"""What a stopped search or sweep leaves beside its output, and whether a command may go on from it."""
+"""What a stopped search leaves beside its output, and whether a command may go on from it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ from cpfls_cli.store import Origin, format_name, read, write
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle
-    from cpfls_cli.identification.replicates import Sweep
 
 T = TypeVar("T")
 Genes = np.ndarray[Any, np.dtype[np.uint16]]
@@ -74,7 +73,7 @@ class SearchState:
     """An unfinished search: everything that its next generation depends on."""
 
     FORMAT: ClassVar = "cpfls/checkpoint"
-    MADE_BY: ClassVar = "identify or sweep"
+    MADE_BY: ClassVar = "identify"
 
     generation: int = about("generations bred; 0: initial population, -1: not even that")
     generator: str = about("state of the random generator, one for all subpopulations, as JSON; null at -1")
@@ -163,7 +162,7 @@ class KeptFile:
     header: Origin
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedModel | Sweep | Vehicle]]
+    OUTPUT: ClassVar[type[IdentifiedModel | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Origin) -> Self:

@@ -83,7 +83,6 @@ def _of_torque(show):
     show("simulate", "simulate", "tiny.yaml", "path.h5", output="other.h5")
     show("reduce", "reduce", "tiny.yaml", "flight.h5", output="few.h5")
     show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
-    show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
     show("response", "response", "tiny.yaml", "flight.h5", output="response.h5")
     show("replay", "replay", "tiny.yaml", "model.h5", "flight.h5", output="replay.h5")
     show("report", "report", "tiny.yaml", "model.h5", output="report.md")
@@ -161,7 +160,7 @@ def _of_open_numbers(show, folder):
 
 
 NAMES = (
-    *("trajectory", "mission", "simulate", "reduce", "identify", "sweep", "response"),
+    *("trajectory", "mission", "simulate", "reduce", "identify", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
     *("changed", "not changed", "trend", "tune"),

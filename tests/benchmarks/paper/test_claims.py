@@ -19,6 +19,7 @@ from benchmarks.paper.claims import (
     PaperSources,
 )
 from benchmarks.paper.readings import readings, readings_blocks, readings_figure
+from benchmarks.paper.replicates import Sweep
 from benchmarks.paper.reproduction import CLAIMS, partitions_compared, seesaw_compared
 from benchmarks.paper.search_claims import (
     AS_GOOD,
@@ -45,7 +46,9 @@ NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 def sources(*records, times=()):
     """A report about records."""
     given = [Source("s.h5", "", record, {}, None, 0, header=Origin(stage="reduce")) for record in records]
-    return PaperSources(given, VehicleSettings(), ReportSettings(), times)
+    sweeps = [source for source in given if isinstance(source.record, Sweep)]
+    others = [source for source in given if source not in sweeps]
+    return PaperSources(others, VehicleSettings(), ReportSettings(), times, sweeps)
 
 
 def with_runs(setting, **values):

@@ -38,7 +38,7 @@ report: {title: "<script>alert(1)</script> & a study"}
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
     "summary", "comparison", "identify", "identify-2", "stated-vehicle", "trajectory", "simulate", "simulate-2",
-    "reduce", "sweep", "provenance",
+    "reduce", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -81,7 +81,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     config = folder / "study.yaml"
     config.write_text(CONFIG + VEHICLE)
-    names = ("trajectory", "flight", "selection", "model", "ridge", "noisy", "sweep")
+    names = ("trajectory", "flight", "selection", "model", "ridge", "noisy")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)
     cpfls("simulate", config, files.trajectory, "-o", files.flight)
@@ -90,8 +90,6 @@ def study(tmp_path_factory):
     cpfls("identify", config, files.flight, "--selection", files.selection, "-o", files.model)
     based = ("--set", "identification.base=rigid-body", "--set", "identification.ridge.count=3")
     cpfls("identify", config, files.noisy, "-o", files.ridge, *based)
-    settings = "sweep.settings=[{name: <b>small</b>}, {name: all, set: {reduction.size: null}}]"
-    cpfls("sweep", config, files.flight, "-o", files.sweep, "--set", settings, "--set", "sweep.seeds=2")
     return files
 
 
@@ -104,7 +102,6 @@ def full(study):
         study.selection,
         study.model,
         study.ridge,
-        study.sweep,
     )
     output = study.folder / "report.html"
     with drawn():
@@ -129,7 +126,7 @@ def test_everything_given_everything_shown(full):
     assert kinds == {
         "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
         "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure",
-        "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
+        "identify-1-convergence", "identify-1-pareto-front",
         "identify-1-figure", "identify-2-convergence", "identify-2-pareto-front", "identify-2-ridge-curve",
     }  # fmt: skip
 
