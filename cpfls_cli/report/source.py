@@ -111,7 +111,7 @@ class Sources:
 
     @property
     def gap(self) -> list[Source]:
-        """Everything that the gap workflow wrote, answers before their grounds."""
+        """Everything that the gap workflow wrote, answers before their evidence."""
         return [*self.diagnoses, *self.extensions, *self.disagreements]
 
     @property

@@ -22,7 +22,7 @@ from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
-from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
 from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
 from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
@@ -112,7 +112,7 @@ def validate(
     torques = {MODEL: model.torque, RIGID_BODY: result.baselines[0].torque}
     missing = {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
     ours, theirs = (with_constant(torques[name], missing[name]) for name in (MODEL, RIGID_BODY))
-    grounds = Grounds(
+    evidence = Evidence(
         identification=result,
         torque={name: compare_torque(judged, ours, theirs) for name, judged in held_out.items()},
         steps=steps,
@@ -126,7 +126,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = beside_loop(verdict(grounds), result.loop, by_past=result.freed is not None)
+    judged = beside_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
 
 

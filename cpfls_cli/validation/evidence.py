@@ -24,7 +24,7 @@ _MANY_LOST = 0.05
 
 
 @dataclass(frozen=True)
-class Grounds:
+class Evidence:
     """Evidence that the verdict on a model rests on.
 
     `torque`: errors of torque, the model beside the rigid body, by held-out part, each with the constant torque that it
