@@ -113,8 +113,8 @@ AnywayOption = Annotated[
     bool,
     typer.Option(
         "--anyway",
-        help="Search in logs that contradict themselves, or are too slow to tell what is sought, too; nothing found "
-        "there is to be used.",
+        help="Search in logs that contradict themselves, or are too slow to identify what is sought, too; nothing "
+        "found there is to be used.",
     ),
 ]
 QuickOption = Annotated[

@@ -82,7 +82,7 @@ class Run(Job):
     """One run of a stage; in a dry run it checks its inputs, and gives None in place of a result.
 
     `writes`: False where the answer is only printed; `next`: commands to go on with; `exit_code`: of an answer that a
-    script has to tell from others; `with_config`: whether the stage takes a config, which its results hold; `files`:
+    script has to distinguish; `with_config`: whether the stage takes a config, which its results hold; `files`:
     inputs of all results, by role; `outputs`: files that will be written, as far as they are known before, no input is
     one; `also`: what ``--json`` says beside its result; `last_words`: behind the answer; `texts`: other files that are
     written with the result; `said`: of this run alone, its file says none of it again; `until_written`: contexts that

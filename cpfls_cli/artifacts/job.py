@@ -74,7 +74,7 @@ def require_numbers(job: Job, command: str, *, whole: bool = True) -> None:
 def go_on(job: Job, command: str, *words: str | Path, output: Path) -> tuple[str | Path, ...]:
     """Give a command that goes on with the config of a job; what that leaves open it takes as the job did."""
     taken: Sequence[str | Path] = ()
-    # A path asks for none of them, but what a flight is to tell hangs on all.
+    # A path asks for none of them, but what a flight is to identify depends on all.
     if needs_numbers(job.study.vehicle, command) or (job.study.vehicle.unknown and "--for" in words):
         if job.found is not None:
             taken = () if "--model" in words else ("--model", job.found)

@@ -11,7 +11,7 @@ from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 VERTICAL = 0.1
-"""|cos(pitch)| below which the nose points up or down, so that Euler angles tell little of the body's axes."""
+"""|cos(pitch)| below which the nose points up or down, so that Euler angles hardly determine the body's axes."""
 
 # Shares of the largest eigenvalue. Near a vertical pitch a body's own smallest one is not larger than the second.
 _ROUNDING, _VERTICAL_ROUNDING = 1e-9, 0.01

@@ -56,7 +56,7 @@ class Recordings:
 class ReadFlight:
     """A flight as it was read.
 
-    `flown_at`: when the log begins, s since 1970 began (UTC), NaN where it does not tell, and of an artifact;
+    `flown_at`: when the log begins, s since 1970 began (UTC), NaN where it does not say, and of an artifact;
     `updated_hz`: updates a second of signals that its log has more rows than; `begins`: stamp of the log's own clock at
     time 0, s, NaN where there is none; `stated`: what the log says of its vehicle, as `stated_vehicle`; `system`: what
     wrote the log, such as ``PX4``, with its version where it is known.

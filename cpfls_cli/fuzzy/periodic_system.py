@@ -128,7 +128,7 @@ class FitQuality:
         """Share of the coefficients that the samples determine, ``rank / coefficients``.
 
         Below 1 the system is the smallest of many that fit as well: where no samples were, its values mean nothing,
-        and `cross_validation_rms` does not tell.
+        and `cross_validation_rms` does not show.
         """
         return self.rank / self.coefficients
 

@@ -99,7 +99,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints; or by the past.
 
     Flights that have none are left out. So where there are such, the rest is taken only if least squares of it shows
-    the loop in all, or instruments find another body; setpoints, which tell less than repeats, only then.
+    the loop in all, or instruments find another body; setpoints, which identify less than repeats, only then.
 
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
     ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
@@ -192,7 +192,7 @@ def _by_past(
         return None
     inertia, yaw = found.fitted.model.body.inertia, list(_OF_YAW)
     rigid_body = np.array([inertia[entry] for entry in INERTIA_ENTRIES])
-    # What was before does not tell it.
+    # Past windows do not identify it.
     rigid_body[yaw] = least_squares[yaw]
     if why_unphysical(rigid_body) is not None:
         return None

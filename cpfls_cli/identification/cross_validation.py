@@ -18,7 +18,7 @@ from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled
 
 SMALLEST_ERROR = 1e-12
-"""Share of the mean squared torque below which sums of products cannot tell errors apart."""
+"""Share of the mean squared torque below which sums of products cannot resolve errors."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weight
     """Cross-validate the ridge weight of the fuzzy columns, which stand after the six of the rigid body.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
-    eigendecomposition of the rest serves all weights. Errors that only rounding tells apart count as equal.
+    eigendecomposition of the rest serves all weights. Errors that differ by rounding alone count as equal.
 
     Parameters
     ----------

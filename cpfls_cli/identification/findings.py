@@ -51,8 +51,8 @@ class FitDiagnostics:
     which D(q) is not positive definite; `samples`, `outside`, `vertical`: samples judged, and of them outside the
     visited attitudes, and near a pitch of +-90 degrees, by part, the training part first; `scores`: by part, then by
     model; `learned`: of the model on the samples learned from; `freed`: what the parameters were learned from, where
-    instruments tell the vehicle from the loop; `loop`: how far it may have misled the model, where nothing from outside
-    separates it from the vehicle.
+    instruments identify the vehicle and not its loop; `loop`: how far it may have misled the model, where nothing from
+    outside separates it from the vehicle.
     """
 
     fit: Fit
@@ -112,7 +112,7 @@ def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
-    """Say what the parameters rest on where instruments tell the vehicle from the loop."""
+    """Say what the parameters rest on where instruments identify the vehicle and not its loop."""
     freed = diagnostics.freed
     if freed is None:
         return
@@ -126,7 +126,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         source = (
             "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
         )
-        little, without = "what was before does not tell it", ""
+        little, without = "past windows do not identify it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
         source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, {pure}"
@@ -172,7 +172,7 @@ def loop_in_words(loop: LoopBounds, *, by_past: bool = False) -> str:
     )
     return (
         f"{shown}. An autopilot that reacts to gusts, or an effect missing here, makes a body look heavier or lighter "
-        f"than it is; true moments over those found: {bounds}. What was before does not tell them closer. {fly}"
+        f"than it is; true moments over those found: {bounds}. Past windows do not identify them better. {fly}"
     )
 
 

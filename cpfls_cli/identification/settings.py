@@ -138,7 +138,7 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         float,
         Gt(0),
         Le(1e-2),
-        Doc("singular values below this share of the largest count as zero; the search cannot tell less than 3e-7"),
+        Doc("singular values below this share of the largest count as zero; the search cannot resolve less than 3e-7"),
     ] = 3e-7
     training_share: Annotated[
         float, Gt(0), Le(1), Doc("leading share of the flight that trains; the rest is held out")

@@ -96,7 +96,7 @@ def compared_curves(models: Sequence[_Model]) -> list[tuple[str, list[tuple[str,
 
 
 def _parts(model: _Model) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
-    """Name each part, what tells it from all others, and the flights that it is taken from."""
+    """Name each part, what distinguishes it from all others, and the flights that it is taken from."""
     inputs = model.header.inputs
     learned = tuple(file.sha256 for role, file in inputs.items() if role.split("-")[0] == "flight")
     others = sorted((role for role in inputs if role.startswith("validate-")), key=lambda role: int(role.split("-")[1]))

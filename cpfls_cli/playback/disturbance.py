@@ -37,7 +37,7 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 _Complex = npt.NDArray[np.complex128]
 
 _PIECE_S, _SHORTEST_S = 8.0, 3.0
-"""Pieces whose power is taken by frequency: several times what gusts remember; the shortest that tell anything."""
+"""Pieces whose power is taken by frequency: several times what gusts remember; the shortest that show anything."""
 _RUN_SHARE = 0.4
 """Of the longest run, that a piece may take."""
 _OVERLAP = 0.75
@@ -254,7 +254,7 @@ def gusts_in(
     instrument_kind : str
         Which instruments to take.
     parts : mapping of str to sequence of array, shape (time, axis), N m and N
-        For each run what parts of the model give; what is left is held against them to tell what the model lacks.
+        For each run what parts of the model give; the residual is compared with them to show what the model lacks.
 
     Returns
     -------
@@ -360,7 +360,7 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
 
 
 def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Array]:
-    """Predict what is left from what was asked for, each part of the flights as the other parts tell; NaN for others.
+    """Predict what is left from what was asked for, each part of the flights by a fit to the others; NaN elsewhere.
 
     A delay of what was asked for is a turn of its phase.
     """

@@ -451,7 +451,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     """Estimate how far the numbers scatter, from blocks of neighbouring windows that they were fitted to.
 
     Without a block b, windows within which are alike, the fit moves by ``(H - H_b)^-1 g_b``; the covariance is ``(n -
-    1) / n`` times the sum of the squares of these moves about their mean. A block that alone tells of a number has
+    1) / n`` times the sum of the squares of these moves about their mean. A block that alone identifies a number has
     drawn the fit to itself, which a fixed ``H^-1`` would not see. Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb
     2023 (jackknife by cluster); Ljung, section 9.4.
     """

@@ -59,7 +59,7 @@ class PlaybackFlight:
 
     @property
     def shown(self) -> BoolArray:
-        """Whether runs tell position, velocity, attitude and rate, shape (4,)."""
+        """Whether runs show position, velocity, attitude and rate, shape (4,)."""
         return np.array([self.translates, self.translates, self.has_attitude, True])
 
     @cached_property

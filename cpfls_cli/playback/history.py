@@ -48,7 +48,7 @@ class Observer:
 
 
 def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[IntArray, Array]:
-    """List the steps before each start, and which of them are in its stretch: earlier ones tell nothing of it.
+    """List the steps before each start, and which of them are in its stretch: earlier ones hold nothing of it.
 
     Parameters
     ----------

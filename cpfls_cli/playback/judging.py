@@ -38,8 +38,8 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
 
     Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
     predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
-    an axis about which hardly anything turns in the others: no model can be asked for what nothing tells. `InputError`
-    where a flight shows nothing that a model predicts, or all are too short.
+    an axis about which hardly anything turns in the others: no model can be asked for what nothing identifies.
+    `InputError` where a flight shows nothing that a model predicts, or all are too short.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     most = min(settings.search_windows, _QUICK) if settings.quick else settings.search_windows

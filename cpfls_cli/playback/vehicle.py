@@ -1,4 +1,4 @@
-"""A whole vehicle found in flights: structure, numbers with intervals, and what the flights cannot tell apart."""
+"""A whole vehicle found in flights: structure, numbers with intervals, and what the flights cannot separate."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class FoundVehicle:
     choice: Choice | None = None
     """How it was chosen; in no file, as all that follows."""
     sources: Instruments | None = None
-    """All that tells how the flights were moved, apart from gusts."""
+    """All that identifies how the flights were moved, apart from gusts."""
     others: Mapping[str, VehicleModel] = field(default_factory=dict)
     """Other configurations, by name of the group."""
 
@@ -387,7 +387,7 @@ def estimate_correlation(fitted: Fitted, spread: Uncertainty) -> Array:
     """Correlate the estimates of numbers as people know them, shape (number, number)."""
     covariance = _covariance(fitted.free.physical, fitted, spread)
     deviation = np.sqrt(np.diag(covariance))
-    # Of a number on a bound no block tells anything, so that it goes with no other.
+    # A number on a bound is the same in all blocks, so that it correlates with no other.
     correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
     np.fill_diagonal(correlation, 1.0)
     return np.asarray(correlation)

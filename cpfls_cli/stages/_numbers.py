@@ -70,7 +70,7 @@ def why_no_body_found(job: Job, found: Path) -> str:
 
 
 def to_fly(job: Job, output: Path | None = None) -> Command:
-    """Give the command that plans flights that tell more, or what to fly by hand where the autopilot flies no file."""
+    """Give the command that plans flights that show more, or what to fly by hand where the autopilot flies no file."""
     formats = log_formats(job.inputs)
     if formats and formats <= FLOWN_BY_HAND:
         return f"fly {BY_HAND}"

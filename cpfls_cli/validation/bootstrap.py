@@ -147,7 +147,7 @@ def bootstrap(
     attitudes that few blocks speak of are then too narrow, -1 (CR3, the jackknife) gives bands that are too wide;
     benchmarks/band_coverage.py.
 
-    A ridge pulls the parameters towards a rigid body, most where the samples say least. What it hides cannot be told
+    A ridge pulls the parameters towards a rigid body, most where the samples say least. What it hides cannot be seen
     from the parameters that it has shrunk, so the band of a model with a ridge does not lean on it: the sum above is
     taken under the weakest ridge that has a meaning, P_1, with the residuals r_b that it leaves, and to it are added
     ``(A^T A + P_1)^-1 P_1 z`` and ``0.75 u (x_1 - x)``, x_1 its parameters, z and u standard normal. P_1 is the mean

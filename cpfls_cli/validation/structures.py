@@ -151,7 +151,7 @@ class StructureFolds:
         return self._plain(*products, slice(0, RIGID), np.inf)
 
     def structure(self, settings: StructureSettings) -> FoldResult | None:
-        """Cross-validate a structure; None where the samples cannot tell its parameters, or it is not finite."""
+        """Cross-validate a structure; None where the samples do not identify its parameters, or it is not finite."""
         samples = np.bincount(self.learned.label, minlength=self.learned.labels)
         fewest_rows = 3 * int(np.min(~self.choice.left_out @ samples))
         if model_structure(settings).parameters > min(_MOST_PARAMETERS, fewest_rows):

@@ -15,7 +15,7 @@ from cpfls_cli.settings import Settings
 
 _Moment = Annotated[float, Gt(0)]
 Unknown = Literal["thrust_factor", "drag_factor", "inertia"]
-"""Numbers of a vehicle that hardly anybody knows, and that flights tell."""
+"""Numbers of a vehicle that hardly anybody knows, and that flights identify."""
 
 
 @dataclass(frozen=True, kw_only=True)
