@@ -35,7 +35,7 @@ GUST_RECIPE = (
 """How to play gusts, which no equation of an export holds."""
 
 LACK_RECIPE = (
-    "What the model lacks comes again, and is as large as shares of its parts: torque or force on each axis is x times "
+    "What the model lacks is repeatable, and as large as shares of its parts: torque or force on each axis is x times "
     "the root of rest^2 + the sum of (share * what that part of the model gives there now)^2, of a body that does not "
     "turn and rotors that turn alike, at the root mean square of their speeds, with x as of a gust of size 1 and this "
     "memory."

@@ -2,8 +2,8 @@
 
 An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
 Another run of the same path has the same motion asked for, and another gust, and a setpoint from outside of the loop
-knows of no gust: they are the instruments. Where there are none, what was before knows nothing of what is new in a
-gust.
+knows of no gust: they are the instruments. Where there are none, past windows are: they know nothing of the innovations
+of a gust.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class FreedTorque:
     kg m^2, by instruments, and by least squares of the torque as measured; `half`: half of the 95 % intervals of the
     logarithms of the moments of inertia by instruments; `runs` that repeat each other along `paths`, or with setpoints
     of no common path; `alone`: flights without instruments, of all `flights`; `instrument_kind`: "repeats",
-    "setpoints", or "past", which is what was before.
+    "setpoints", or "past", which are past windows.
     """
 
     training: TorqueSource
@@ -110,8 +110,9 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know most of
     what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
-    Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
-    not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the other.
+    Where that is so, or there are none, and least squares shows the loop, the body is identified by past windows,
+    though not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the
+    other.
 
     None where nothing identifies roll and pitch to a factor of two, or finds no body; where no instruments, for long
     enough, are there and the flights do not show the loop; and of flights that stay in their files. Söderström and
@@ -177,7 +178,7 @@ def _by_instruments(
 def _by_past(
     training: TorqueSource, learned: TorqueSource, parts: Sequence[TorqueData], given: Instruments
 ) -> FreedTorque | None:
-    """Free the torque of flights that show the loop by what was before."""
+    """Free the torque of flights that show the loop by past windows."""
     rows = np.concatenate(_laid(parts, 1.0 / axis_scale(training)))
     least_squares, _ = _solved(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None])
     if why_unphysical(least_squares) is not None or not _shows_loop(training, least_squares):

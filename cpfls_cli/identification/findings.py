@@ -124,13 +124,13 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         little, without = "too little of yaw follows", "have no such setpoint"
     elif freed.instrument_kind == "past":
         source = (
-            "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
+            "the flights show the loop, so roll and pitch come from past windows, which know no innovation of a gust"
         )
         little, without = "past windows do not identify it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, {pure}"
-        little, without = "too little of yaw comes again", "repeat none"
+        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the repeatable torque, {pure}"
+        little, without = "too little of yaw is repeatable", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
         if identified

@@ -1,7 +1,7 @@
-"""How large gusts are and how long they last, by what of a balance of torque and force does not come again.
+"""How large gusts are and how long they last, by the non-repeatable part of a balance of torque and force.
 
 Along a flight, what a model's torque and force lack of what the motion takes is gust, noise, and what the model lacks.
-The last comes again in other runs of the path, or goes with what was asked for; the first two do not. Their power by
+The last is repeatable in other runs of the path, or follows what was asked for; the first two do not. Their power by
 frequency is that of a Gauss-Markov process, with the white noise of gyroscope and velocity, which a derivative makes
 grow with frequency, and that of the rotor speeds.
 """
@@ -55,7 +55,7 @@ _KNOWN, _SEEN = 3.0, 0.1
 _LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
 """What was asked for is answered within half a second."""
 _NEW_S, _RARE = 0.4, 0.01
-"""Windows in which what was before is asked, and how surely what is new may grow with it."""
+"""Past windows that are asked, and how surely innovations may grow with them."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 """Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
 
@@ -163,7 +163,7 @@ def find_gusts(
 ) -> FoundGusts | None:
     """Find sizes and memories of gusts in flights of a vehicle that is known; None for too short ones or several rates.
 
-    The power of what does not come again is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
+    The power of what is not repeatable is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
     and memory m seen through the pieces, of white noise through their derivative, and of white noise. All four numbers
     are fitted by Whittle's likelihood (1953); their errors come from the scatter of its slopes over pieces of the runs
     (White 1982; Uhlenbeck and Ornstein 1930).
@@ -197,7 +197,7 @@ def find_gusts(
 
 
 def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Sequence[Array]) -> FoundGusts:
-    """Give gusts where what is new in what is left was not predicted by what was before, nor its size; else the bound.
+    """Give gusts where past windows predict neither the innovations of the residual nor their size; else the bound.
 
     Air turns a vehicle about every axis, and pushes it where flights know their velocity.
     """
@@ -399,7 +399,7 @@ class _Fit(NamedTuple):
 
 
 class _Axis:
-    """What does not come again about one axis, and the process that has this power."""
+    """The non-repeatable part about one axis, and the process that has this power."""
 
     def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
         self._period = band.pieces.period

@@ -61,7 +61,7 @@ def test_what_comes_again_tells_the_body_in_gusts(sources):
 def test_least_squares_of_the_freed_torque_is_the_estimate_by_instruments(identified):
     result = identified["gusts"]
     np.testing.assert_allclose(result.rigid_body[:3], result.freed.rigid_body[:3], rtol=5e-3)
-    assert any("come from the torque that comes again" in finding for finding in result.findings)
+    assert any("come from the repeatable torque" in finding for finding in result.findings)
     assert result.loop is None
 
 
