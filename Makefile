@@ -134,7 +134,7 @@ data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
 	$(CPFLS) reduce configs/paper.yaml $< -o $@ --force --set reduction.size=$*
 
 # Stopped and started again searches go on where they were.
-SEARCHES = $(BIN)/python -m benchmarks.paper.searches
+SEARCHES = $(BIN)/python -m benchmarks.paper.searches --force
 # Table 5 in two parts of equal length, each named by its first seed; what follows is in small pieces.
 data/paper/searches-%.h5: data/paper/flight.h5 data/paper/.part/searches.yaml
 	$(SEARCHES) configs/paper.yaml $< table-5 -o $@ --seed $* --seeds 5 --population 40 --generations 10

@@ -20,7 +20,7 @@ import typer
 
 from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, replicate
 from benchmarks.shared.measure import program
-from cpfls_cli.artifacts.job import Job, origin_before, take_inputs
+from cpfls_cli.artifacts.job import Job, check_outputs, origin_before, take_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.config.load import load_study
@@ -164,11 +164,13 @@ def main(
     generations: int = 200,
     samples: Annotated[list[int] | None, typer.Option()] = None,
     overrides: Annotated[list[str] | None, typer.Option("--set")] = None,
+    force: bool = False,
 ) -> None:
     size = (f"identification.population={population}", f"identification.generations={generations}")
     common = (*(overrides or ()), *size)
     study = load_study(config, common, seed)
-    job = Job(study, output, True, False, lambda *_: None, lambda _: None, deferred_interrupts)
+    job = Job(study, output, force, False, lambda *_: None, lambda _: None, deferred_interrupts)
+    check_outputs(job, output)
     inputs = take_inputs(job, flight_roles([flight]))
     split = split_training([flight], study, inputs)
     chosen = Samples(split)
@@ -176,8 +178,8 @@ def main(
     prepared = [chosen.prepared(each, load_study(config, (*common, *each.overrides), seed)) for each in wanted]
     partial, origin = output.with_name(f"{output.name}.partial"), origin_before(study, inputs)
     nothing = Sweep(parts=(TRAINING,), complete=False, settings=tuple(each.without_runs for each in prepared))
-    sweep = begun(partial, origin, nothing)
     runs, watch = seeds * len(prepared), Watch(job, None)
+    sweep = begun(partial, origin, nothing, runs)
     for number in range(sweep.runs, runs):
         index, own = number % len(prepared), seed + number // len(prepared)
         print(f"run {number + 1} of {runs}: {wanted[index].name}, seed {own}", file=sys.stderr)
@@ -192,13 +194,14 @@ def main(
     partial.replace(output)
 
 
-def begun(partial: Path, origin: Origin, nothing: Sweep) -> Sweep:
-    """Take the finished runs of the same settings, study and flight, where there are any."""
+def begun(partial: Path, origin: Origin, nothing: Sweep, runs: int) -> Sweep:
+    """Take the finished runs of the same settings, study and flight, where there are some but not more than wanted."""
     if not partial.exists():
         return nothing
     known, then = read(partial, Sweep)
     same = all(getattr(then, name) == getattr(origin, name) for name in ("version", "seed", "config", "inputs"))
-    return known if same and not known.differing_settings(nothing) else nothing
+    fits = known.runs < runs or (known.runs == runs and known.complete)
+    return known if same and fits and not known.differing_settings(nothing) else nothing
 
 
 def run(

@@ -104,6 +104,6 @@ def off_clock(delay_s: float, half_s: float = float("nan")) -> str:
 def in_ms(delay_s: float, low_s: float, high_s: float) -> str:
     """Write a delay with its interval where that is known, in whole ms or with the digits that the width needs."""
     half = 500 * (high_s - low_s)
-    decimals = min(max(ceil(-log10(half)), 0), 3) if 0 < half < inf else 0
+    decimals = min(max(ceil(-log10(half) - 1e-9), 0), 3) if 0 < half < inf else 0
     value, *ends = (f"{1000 * each:z.{decimals}f}" for each in (delay_s, low_s, high_s))
     return f"{value} ms [{', '.join(ends)}]" if half < inf else f"{value} ms"

@@ -284,7 +284,7 @@ def _sure(fits: Array) -> Sure:
 
 def _late(apart: Array, slope: Array, block: IntArray) -> Sure:
     """Fit the delay of one against the other."""
-    return _sure(_regressed(slope[:, :, None], apart, block)[:, 0]) if block[-1] and slope.any() else _NOT_KNOWN
+    return _sure(_regressed(slope[:, :, None], apart, block)[:, 0]) if block.any() and slope.any() else _NOT_KNOWN
 
 
 def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
@@ -295,7 +295,7 @@ def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
     columns = np.stack([a[:, :2], a[:, :2] @ _QUARTER, slope[:, :2]], axis=2)
     _, across, late = (columns**2).sum(axis=(0, 1))
     shared = float((columns[..., 1] * columns[..., 2]).sum()) ** 2
-    if not block[-1] or min(across, late) <= 0 or shared > _COULD_BE_LATE * across * late:
+    if not block.any() or min(across, late) <= 0 or shared > _COULD_BE_LATE * across * late:
         return _NOT_KNOWN
     fits = _regressed(columns, b[:, :2], block)
     return _sure(fits[:, 1] / np.where(fits[:, 0], fits[:, 0], TINY))

@@ -79,7 +79,7 @@ def read_ardupilot(file: Path) -> SimulatorModel:
     body = of_one_body(
         mass,
         [*(each for each in moments if each is not None), none, none, none],
-        "motorN_position is from the centre of mass",
+        "the motors are where its frame has them: write motorN_position of each, the other way by as much",
     )
     rotors = _rotors(numbers, round(motors.value), mass.value, size.value, notes)
     return SimulatorModel(file.stem, "ardupilot", (body,), rotors, CANNOT, tuple(notes), (file,), of_commands=True)

@@ -218,6 +218,8 @@ def of_log(
     else:
         # What a log lets one guess is another number for each log, and no other vehicle.
         speed, where = like.rotor_speed_max_rad_s, "Of the model that gives what the file leaves open"
+        if (stated := model.speed_max) is not None:
+            where = f"Of the model that gives other numbers; the file states {stated.value:g} ({stated.where})"
     mass = model.mass_kg if mass_kg is None else mass_kg
     by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
     given, short = mass_kg is not None, _short([mass])[0]
