@@ -173,7 +173,8 @@ class _Flights(NamedTuple):
 
     def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; inertia that instruments do not identify is the loop's."""
-        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self)
+        in_gusts = [in_air(flights, gusts.floor(self.training, flights)) for flights in self]
+        in_gusts[0] = [replace(each, lasting=gusts.lasting(each.windows, len(each))) for each in in_gusts[0]]
         return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 

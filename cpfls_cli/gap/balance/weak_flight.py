@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
@@ -67,6 +68,10 @@ class WeakFlight:
     # Shape (6,), N m and N: standard deviation that gusts and noise give averages over the windows; 0 where no gusts
     # are known.
     air: Array = field(default_factory=lambda: np.zeros(6))
+    # Shape (6, window): what of both lasts from one window to others, by how many windows later; empty without gusts.
+    lasting: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    # Shape (6, window, window): takes rows to what of each the rows before do not predict; None for rows as averaged.
+    whitening: Array | None = None
     # Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
@@ -92,7 +97,7 @@ class WeakFlight:
             self.seen[candidate.key] = self.averaged(columns_of(candidate, self.signals))
         rows = self.seen[candidate.key]
         # Of the vehicle's numbers only the scale of the thrust meets what the rotors do; the motion stays.
-        return rows if as_logged else with_thrust(rows, self.windows.average(signals.wrench[:, 5]) * self.known[5])
+        return rows if as_logged else with_thrust(rows, self.averaged(Columns(signals.wrench))[:, 5])
 
     def noise(self, columns: Columns) -> Array:
         """Give noise as large as that in the rows of columns, or of a residual, and without their motion.
@@ -104,8 +109,7 @@ class WeakFlight:
         """
         if columns.momentum is None:
             return np.zeros((len(self), *columns.direct.shape[1:]))
-        rows = self.windows.alternating().derivative(columns.momentum)
-        return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
+        return self.of_channels(self.windows.alternating().derivative(columns.momentum))
 
     def without_force(self) -> WeakFlight:
         """Drop the force balance."""
@@ -122,7 +126,23 @@ class WeakFlight:
         rows = self.windows.average(columns.direct)
         if columns.momentum is not None:
             rows = rows + self.windows.derivative(columns.momentum)
-        return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
+        return self.of_channels(rows)
+
+    def innovations(self) -> WeakFlight:
+        """Take of each row what the rows before do not predict: of gusts and noise these are alike and independent.
+
+        Reference: Aitken 1936 (generalised least squares).
+        """
+        lasting = np.array([toeplitz(each) for each in self.lasting])
+        white = replace(self, whitening=np.linalg.inv(np.linalg.cholesky(lasting)))
+        return replace(white, seen={key: white.of_channels(rows) for key, rows in self.seen.items()})
+
+    def of_channels(self, rows: Array) -> Array:
+        """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""
+        rows = rows * self.known.reshape(-1, *[1] * (rows.ndim - 2))
+        if self.whitening is not None:
+            rows = np.stack([each @ rows[:, at] for at, each in enumerate(self.whitening)], axis=1)
+        return np.asarray(rows)
 
 
 def weak_flight(

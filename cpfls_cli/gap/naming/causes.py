@@ -56,6 +56,11 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
             selection_frequency=_frequency(own, ranking),
             sentence=effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
         )
+        if hypothesis.flights[0].lasting.size and not candidate.effect.is_lag:
+            # A gust lasts: what of it was there before says nothing about a set. What gusts are off by is no formula's.
+            flown, floor = [flight.innovations() for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
+            step = rank_effects(flown, others, effects, settings, None, also=(candidate,), floor=floor)
+            own, *ranking = in_place_of(candidate, step)
         compared = {
             tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
             for other in ranking

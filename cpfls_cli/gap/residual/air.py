@@ -66,16 +66,31 @@ class Air:
         Result: shape (6,), N m and N.
         """
         windows = learned[0].windows
-        weight, noise = windows.weight, self.noise(windows)
-        apart = windows.period * np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
+        gusts, noise = self._gusts(windows, 0), self.noise(windows)
         seconds = (float(sum(len(f.signals.time) * f.signals.period for f in own)) for own in (learned, flights))
         seldom = 0.0 if flights is learned else sum(1 / each for each in seconds)
         total = np.zeros(6)
         for channel in np.flatnonzero(self.split):
-            memory = self.found.memory[channel]
-            gusts = self.found.size[channel] ** 2 * (weight @ np.exp(-apart / memory) @ weight)
-            total[channel] = gusts * (1 + ERRORS * np.sqrt(2 * memory * seldom)) + noise[channel] ** 2
+            scatter = ERRORS * np.sqrt(2 * self.found.memory[channel] * seldom)
+            total[channel] = gusts[channel] * (1 + scatter) + noise[channel] ** 2
         return np.sqrt(total)
+
+    def lasting(self, windows: Windows, count: int) -> Array:
+        """Compute how gusts and noise of windows correlate by how many windows they are apart, shape (6, count)."""
+        both = np.zeros((count, 6))
+        for later in range(count):
+            apart = later * windows.hop
+            shared = slice(apart, None), slice(None, max(len(windows.weight) - apart, 0))
+            common = [float(each[shared[0]] @ each[shared[1]]) for each in (windows.weight, windows.slope)]
+            both[later] = self._gusts(windows, apart) + self.found.noise @ common
+        return np.asarray(np.where(self.split, both / both[0], np.arange(count)[:, None] == 0).T)
+
+    def _gusts(self, windows: Windows, apart: int) -> Array:
+        """Compute the product of gusts averaged over windows so many samples apart, on average, shape (6,)."""
+        at = windows.period * np.arange(len(windows.weight))
+        seconds = np.abs(np.subtract.outer(at, at + apart * windows.period))
+        decay = np.exp(-seconds / np.where(self.split, self.found.memory, 1.0)[:, None, None])
+        return np.asarray(self.found.size**2 * (decay @ windows.weight @ windows.weight))
 
     def noise(self, windows: Windows) -> Array:
         """Compute what noise does without gusts, shape (6,); infinite where none are split off."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.weak_form.windows import windows
 
@@ -49,3 +50,23 @@ def test_gusts_of_another_flight_seldom_exceed_its_floor(air):
     assert 0.01 < above.mean() < 0.08
     # The shorter the flights, the more one differs from the next.
     assert air.floor(flights(1e6), flights(5.0))[0] > floor > air.floor(flights(1e6), flights(300.0))[0]
+
+
+def test_of_gusts_and_noise_the_rows_before_leave_innovations_alike_and_independent():
+    flat, sloping, seconds = 0.5, 0.004, 10.0
+    found = SimpleNamespace(
+        size=np.full(6, SIZE), memory=np.full(6, MEMORY), noise=np.tile([flat**2, sloping**2], (6, 1))
+    )
+    air = Air(found, gusts_only=np.zeros(6, dtype=bool), split=np.arange(6) < 5)
+    rng, count = np.random.default_rng(5), WINDOWS.count(round(seconds / PERIOD))
+    noise = rng.standard_normal((2, 4000, round(seconds / PERIOD)))
+    rows = averages(seconds, 4000).T + WINDOWS.average(flat * noise[0].T) + WINDOWS.derivative(sloping * noise[1].T)
+    flight = WeakFlight(
+        "gusty", None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=air.lasting(WINDOWS, count)
+    )
+    # A channel without gusts keeps its rows.
+    white = flight.innovations().of_channels(np.repeat(rows[:, None], 6, axis=1))
+    np.testing.assert_array_equal(white[:, 5], rows)
+    spread = np.cov(white[:, 0]) / rows.var()
+    np.testing.assert_allclose(spread, np.eye(count), atol=0.12)
+    assert np.abs(np.cov(rows) / rows.var() - np.eye(count)).max() > 0.8
